@@ -4,20 +4,30 @@ A process prints its address with a key. `UrcProcess` keeps the key here and tel
 without it, so that they append their paths.
 """
 
+import asyncio
 import re
+import time
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
+from weakref import WeakSet
 
 from playwright.async_api import BrowserContext, Page
 
 from tests.e2e.browser import PLAIN_HOST
+from urc.access.grants import parse_grant
+from urc.access.store import AccessStore
 from urc.testing.entry import ACCESS, HERE
 
-__all__ = ["enter", "entering", "headers_for", "known_here", "learn"]
+__all__ = ["enter", "entering", "headers_for", "known_here", "learn", "signed_in"]
 
 _PRINTED = re.compile(r"(dashboard )(https?://[^/\s]+)/\?key=(\S+)")
+_NOTICED_S = 30
 _keys: dict[str, str] = {}
 """Origin → key."""
+_own_browsers: WeakSet[BrowserContext] = WeakSet()
+"""Browsers that hand in no key by themselves."""
 
 
 def learn(line: str) -> str:
@@ -48,12 +58,33 @@ def entering(page: Page) -> None:
 
     async def opened(url: str, **how: Any) -> Any:
         key = _key_of(url)
-        if key not in entered:
+        if key not in entered and page.context not in _own_browsers:
             entered.add(key)
             await enter(page.context, url)
         return await goto(url, **how)
 
     setattr(page, "goto", opened)  # noqa: B010 - a method, for this page alone
+
+
+async def signed_in(
+    context: BrowserContext, address: str, data: Path, name: str, *grants: str
+) -> None:
+    """Sign a new person in at the dashboard of a process with this data folder.
+
+    The browser hands in no start key, because it is the person's own.
+    """
+    _own_browsers.add(context)
+    with closing(AccessStore(data)) as store:
+        now = time.time()
+        person = store.add("person", name, [parse_grant(one) for one in grants], now=now)
+        _, secret = store.open_sign_in(person.id, "passphrase", now=now)
+        cookie = f"urc-sign-in-{store.instance()}"
+    url = _origin(address)
+    await context.add_cookies([{"name": cookie, "value": secret, "url": url}])
+    async with asyncio.timeout(_NOTICED_S):
+        # Until the server, another process, has read the file.
+        while not (await context.request.get(f"{url}/")).ok:  # noqa: ASYNC110
+            await asyncio.sleep(0.02)
 
 
 async def known_here(context: BrowserContext) -> None:

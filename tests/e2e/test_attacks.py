@@ -160,7 +160,7 @@ async def test_its_line_does_not_lead_to_the_dashboard(
             await asyncio.sleep(0.5)  # it would have done its work by now
 
 
-@pytest.mark.parametrize(("host", "refused"), [("127.0.0.1", 401), ("0.0.0.0", 403)])
+@pytest.mark.parametrize(("host", "refused"), [("127.0.0.1", 401), ("0.0.0.0", 401)])
 async def test_without_the_key_it_is_a_stranger(
     host: str, refused: int, urc_process: Callable[..., UrcProcess], tmp_path: Path
 ) -> None:

@@ -59,7 +59,8 @@ def test_dashboard_simulates_a_robot_whose_settings_are_missing(
 
 def test_dashboard_that_others_reach_says_so(urc_process: Start) -> None:
     """There is no sign-in yet, so nobody may overlook it."""
-    dashboard = urc_process("serve", PUPPET, "--host", "0.0.0.0", "--port", "0")
+    words = ("--host", "0.0.0.0", "--port", "0", "--without-sign-in")
+    dashboard = urc_process("serve", PUPPET, *words)
     dashboard.wait_for("^dashboard ")
     assert dashboard.end(signal.SIGTERM) == 0
     assert dashboard.errors == [

@@ -37,7 +37,16 @@ def room_for_files() -> None:
 @pytest.fixture
 async def address(urc_process: Callable[..., UrcProcess], tmp_path: Path) -> str:
     """The address of a dashboard that others reach, too."""
-    words = ("--simulate", "--port", "0", "--host", "0.0.0.0", "--data-dir", str(tmp_path))
+    words = (
+        "--simulate",
+        "--port",
+        "0",
+        "--host",
+        "0.0.0.0",
+        "--without-sign-in",
+        "--data-dir",
+        str(tmp_path),
+    )
     process = urc_process("serve", "robots/tello.yaml", *words)
     found = (await process.wait_for_async(r"^dashboard (http://\S+)"))[1]
     return f"http://127.0.0.1:{urlsplit(found).port}/"

@@ -9,6 +9,8 @@ process. Then `on_change` is called, and sockets without a right are closed. The
 never runs backwards, so a machine with a wrong clock cannot revive an ended sign-in.
 """
 
+import asyncio
+import logging
 import secrets
 import time
 from collections.abc import Callable, Collection
@@ -16,7 +18,7 @@ from hmac import compare_digest
 from typing import Final
 
 from urc.access.directory import Directory, Identity, Principal, SignIn, Way, digest_of
-from urc.access.grants import Grant
+from urc.access.grants import AccessError, Grant
 from urc.access.store import AccessStore
 from urc.model.role import Role
 
@@ -27,6 +29,12 @@ LOCAL_USER: Final = Principal("local", "person", "this computer", (Grant("admini
 LOCAL_SIGN_INS: Final = 1000
 """Most browsers and programs with the start key; the oldest sign-in is closed for a new one."""
 _CODES: Final = 16
+WATCH_S: Final = 0.1
+"""Interval of the look for changes by other processes, in seconds."""
+TOUCH_S: Final = 60.0
+"""Interval at which the use of sign-ins is recorded, in seconds."""
+
+log = logging.getLogger(__name__)
 
 
 class AccessControl:
@@ -60,7 +68,9 @@ class AccessControl:
         program = self._sign_in("token", digest_of(self.key))
         self._program = program
         self.directory = Directory()
-        self.reload()
+        self._used: dict[str, float] = {}
+        """Id of a sign-in → UTC time of its last use that is not recorded yet."""
+        self.load()
 
     # Identities
 
@@ -97,40 +107,73 @@ class AccessControl:
         elif not compare_digest(word.encode(), self.key.encode()):
             return None
         secret = secrets.token_urlsafe(32)
-        sign_in = self._sign_in("link", digest_of(secret))
+        sign_in = self._sign_in("key", digest_of(secret))
         self._local[sign_in.id] = sign_in._replace(place=place, agent=agent)
         while len(self._local) > LOCAL_SIGN_INS:
             self._local.pop(next(iter(self._local)))
-        self.reload()
+        self._merge()
         return secret
+
+    def best_role(self, who: Identity) -> Role | None:
+        """Return the highest present role of `who` at any robot, or None."""
+        return self.directory.best_role(who, self.now())
 
     # Changes
 
-    def reload(self) -> None:
+    async def watch(self) -> None:
+        """Follow the changes by other processes, and record the use of sign-ins, until cancelled.
+
+        The file is read in a thread, because another process may have locked it.
+        """
+        touched_at = self.now()
+        while self.store is not None:
+            await asyncio.sleep(WATCH_S)
+            try:
+                if await asyncio.to_thread(self.store.changed):
+                    await self.reload()
+                if self.now() - touched_at >= TOUCH_S:
+                    touched_at = self.now()
+                    await self._record_use()
+            except AccessError as error:
+                log.warning("%s", error)
+
+    async def reload(self) -> None:
         """Read the store again, and report the change."""
-        kept = self.store.directory() if self.store else Directory()
+        if self.store is not None:
+            self._stored = await asyncio.to_thread(self.store.directory)
+        self._merge()
+
+    def load(self) -> None:
+        """Read the store again, like `reload`, but block meanwhile."""
+        self._stored = self.store.directory() if self.store else Directory()
+        self._merge()
+
+    async def end_sign_in(self, sign_in: str) -> None:
+        """End any sign-in; raise `AccessError` if it is unknown."""
+        if self._local.pop(sign_in, None) is None and self.store is not None:
+            await asyncio.to_thread(self.store.close_sign_in, sign_in)
+        await self.reload()
+
+    def used(self, sign_in: str) -> None:
+        """Note the use of a sign-in, which `watch` records."""
+        self._used[sign_in] = self.now()
+
+    async def _record_use(self) -> None:
+        used, self._used = self._used, {}
+        if used and self.store is not None:
+            await asyncio.to_thread(self.store.touch_all, used)
+            await self.reload()
+
+    def _merge(self) -> None:
         own = {self._program.id: self._program, **self._local}
-        sign_ins = {**kept.sign_ins, **own}
+        sign_ins = {**self._stored.sign_ins, **own}
         self.directory = Directory(
-            {**kept.principals, LOCAL_USER.id: LOCAL_USER},
+            {**self._stored.principals, LOCAL_USER.id: LOCAL_USER},
             sign_ins,
             {sign_in.digest: sign_in.id for sign_in in sign_ins.values()},
         )
         for report in self.on_change:
             report()
-
-    def poll(self) -> bool:
-        """Reload after a change by another process; return whether there was one."""
-        is_changed = self.store is not None and self.store.changed()
-        if is_changed:
-            self.reload()
-        return is_changed
-
-    def close_sign_in(self, sign_in: str) -> None:
-        """Close any sign-in; raise `AccessError` if it is unknown."""
-        if self._local.pop(sign_in, None) is None and self.store is not None:
-            self.store.close_sign_in(sign_in)
-        self.reload()
 
     def _sign_in(self, way: Way, digest: bytes) -> SignIn:
         now = self._utc()

@@ -9,13 +9,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
-from urc.access.grants import Grant, role_at
+from urc.access.grants import Grant, highest, role_at
 from urc.model.role import Role
 
 __all__ = ["NOBODY", "Directory", "Identity", "Kind", "Principal", "SignIn", "Way", "digest_of"]
 
 Kind = Literal["person", "device", "program", "guest"]
-Way = Literal["pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
+Way = Literal["key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
 """How a sign-in began: the right by which a command was given, as the audit log names it."""
 
 
@@ -77,6 +77,8 @@ class Identity(NamedTuple):
     name: str = ""
     kind: Kind | Literal[""] = ""
     way: Way | Literal[""] = ""
+    person: str = ""
+    """Id of the person: the owner of a device, or else the principal itself."""
 
 
 NOBODY: Final = Identity()
@@ -109,7 +111,10 @@ class Directory:
         principal = self.principals.get(sign_in.principal)
         if principal is None or self._ended(principal, now):
             return NOBODY
-        return Identity(principal.id, sign_in.id, principal.name, principal.kind, sign_in.way)
+        person = principal.owner or principal.id
+        return Identity(
+            principal.id, sign_in.id, principal.name, principal.kind, sign_in.way, person
+        )
 
     def role(
         self, who: Identity, now: float, robot: str = "", tags: Collection[str] = ()
@@ -122,14 +127,20 @@ class Directory:
             robot: name of the robot; "" asks for the whole server.
             tags: tags of the robot.
         """
+        return role_at(self._grants(who, now), robot, tags)
+
+    def best_role(self, who: Identity, now: float) -> Role | None:
+        """Return the highest present role of `who` at any robot, or None."""
+        return highest(grant.role for grant in self._grants(who, now))
+
+    def _grants(self, who: Identity, now: float) -> tuple[Grant, ...]:
         sign_in = self.sign_ins.get(who.sign_in)
         principal = self.principals.get(who.principal)
         if sign_in is None or principal is None or sign_in.principal != principal.id:
-            return None
+            return ()
         if sign_in.is_over(now) or self._ended(principal, now):
-            return None
-        owner = self.principals.get(principal.owner, principal)
-        return role_at(owner.grants, robot, tags)
+            return ()
+        return self.principals.get(principal.owner, principal).grants
 
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether the scope of a program's token contains a command."""

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from urc.model.role import ROLES, Role, includes
 from urc.problems import UrcError
 
-__all__ = ["ALL", "AccessError", "Grant", "parse_grant", "role_at"]
+__all__ = ["ALL", "AccessError", "Grant", "highest", "parse_grant", "role_at"]
 
 ALL: Final = "*"
 """Scope of a grant for all robots, now and later."""
@@ -58,8 +58,13 @@ def parse_grant(text: str) -> Grant:
 
 def role_at(grants: Iterable[Grant], robot: str = "", tags: Collection[str] = ()) -> Role | None:
     """Return the highest role of `grants` at a robot; "" asks for the whole server."""
+    return highest(grant.role for grant in grants if grant.covers(robot, tags))
+
+
+def highest(roles: Iterable[Role]) -> Role | None:
+    """Return the highest of `roles`, or None without a role."""
     best: Role | None = None
-    for grant in grants:
-        if grant.covers(robot, tags) and (best is None or includes(grant.role, best)):
-            best = grant.role
+    for role in roles:
+        if best is None or includes(role, best):
+            best = role
     return best

@@ -12,7 +12,7 @@ import json
 import secrets
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -59,6 +59,8 @@ _CREATE: Final = (
     "digest BLOB PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL, grants TEXT NOT NULL, "
     "owner TEXT NOT NULL, ends_at REAL NOT NULL "
     ") STRICT",
+    "CREATE TABLE server (instance TEXT NOT NULL) STRICT",
+    "INSERT INTO server VALUES (lower(hex(randomblob(4))))",
 )
 
 
@@ -119,9 +121,15 @@ class AccessStore:
         was, self._seen = self._seen, self._version()
         return was != self._seen
 
+    def instance(self) -> str:
+        """Return the identifier of this store, which names its cookies."""
+        with self._lock, self._readable():
+            (instance,) = self._base.execute("SELECT instance FROM server").fetchone()
+        return str(instance)
+
     def directory(self) -> Directory:
         """Return the present directory."""
-        with self._lock:
+        with self._lock, self._readable():
             principals = {row[0]: _principal(row) for row in self._rows("principals")}
             sign_ins = {row[0]: SignIn(*row) for row in self._rows("sign_ins")}
         by_digest = {sign_in.digest: sign_in.id for sign_in in sign_ins.values()}
@@ -208,7 +216,7 @@ class AccessStore:
 
     def passphrase_of(self, name: str) -> tuple[str, str | None]:
         """Return id and hash of the person with that name; "" and None without one."""
-        with self._lock:
+        with self._lock, self._readable():
             row = self._base.execute(
                 "SELECT id, hash FROM principals LEFT JOIN passphrases ON principal = id"
                 " WHERE kind = 'person' AND name = ? COLLATE NOCASE",
@@ -254,10 +262,13 @@ class AccessStore:
                 raise AccessError("that person, device or program was removed") from None
         return sign_in, secret
 
-    def touch(self, sign_in: str, now: float) -> None:
-        """Record a use of a sign-in; a removed sign-in stays removed."""
+    def touch_all(self, used: Mapping[str, float]) -> None:
+        """Record the last use of sign-ins, by id; removed sign-ins stay removed."""
         with self._change():
-            self._base.execute("UPDATE sign_ins SET used_at = ? WHERE id = ?", (now, sign_in))
+            self._base.executemany(
+                "UPDATE sign_ins SET used_at = max(used_at, ?) WHERE id = ?",
+                [(at, sign_in) for sign_in, at in used.items()],
+            )
 
     def close_sign_in(self, sign_in: str) -> None:
         """Close a sign-in; raise `AccessError` if it is unknown."""
@@ -316,7 +327,7 @@ class AccessStore:
 
     def _version(self) -> int:
         """Return a number that changes with each change by another process."""
-        with self._lock:
+        with self._lock, self._readable():
             (version,) = self._base.execute("PRAGMA data_version").fetchone()
         return int(version)
 
@@ -327,13 +338,22 @@ class AccessStore:
             if self._base.in_transaction:
                 yield
                 return
-            self._base.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-            except BaseException:
-                self._base.execute("ROLLBACK")
-                raise
-            self._base.execute("COMMIT")
+            with self._readable():
+                self._base.execute("BEGIN IMMEDIATE")
+                try:
+                    yield
+                except BaseException:
+                    self._base.execute("ROLLBACK")
+                    raise
+                self._base.execute("COMMIT")
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Raise `AccessError` in place of an error of the disk, or of a file that stays locked."""
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            raise AccessError(f"{self.file}: cannot be used: {error}") from None
 
     def _rows(self, table: str) -> list[Any]:
         return self._base.execute(f"SELECT * FROM {table}").fetchall()  # noqa: S608 - our names

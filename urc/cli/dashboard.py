@@ -55,8 +55,8 @@ class DashboardAddress:
     """Whether to start a guard process, which stops motion if this process fails."""
     tiles: Path | None = None
     """Folder of map tiles; None means maps without background tiles."""
-    token: str = ""
-    """Token for remote management of packages and settings; "" disables remote management."""
+    is_open: bool = False
+    """Whether visitors without a sign-in may watch and drive."""
     shows_installed: bool = False
     """Whether the menu lists installed robots and drivers."""
     trusted: Sequence[str] = ()
@@ -112,7 +112,7 @@ async def _serve(
         robot_options = workshop_of(place, given, faulty)
         if warning := await asyncio.to_thread(clock_warning, robot_options.data):
             complain(f"urc: {warning}")
-        access = access_for(place.host, place.token)
+        access = access_for(robot_options.data, is_open=place.is_open)
 
         def ready(url: str) -> None:
             ready_dashboard = ReadyDashboard(url, access)

@@ -81,7 +81,7 @@ async def _serve(player: "Player", host: str, port: int) -> int:
 
     profile = player.profile
     robot = Robot(profile, player.settings, player.session, playback=player)
-    access = access_for(host)
+    access = access_for()
     app = build_app({profile.name: robot}, access=access)
     await serve(
         app, host=host, port=port, on_ready=lambda url: print_entrance(ReadyDashboard(url, access))

@@ -41,16 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also serve all installed robots and drivers",
     )
     parser.add_argument(
-        "--manage",
+        "--without-sign-in",
+        dest="is_open",
         action="store_true",
-        help="let other machines install packages and change settings; requires --token",
-    )
-    parser.add_argument(
-        "--token",
-        dest="token_file",
-        metavar="FILE",
-        type=Path,
-        help="file with the token for --manage; created if missing",
+        help="let everyone on the network watch and drive; each page shows a red warning",
     )
     parser.add_argument(
         "--no-guard",
@@ -84,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
     from urc.cli.dashboard import DashboardAddress, run_dashboard
     from urc.cli.settings import settings_given
-    from urc.cli.start_addresses import print_entrance, token_in
+    from urc.cli.start_addresses import print_entrance
     from urc.runtime.settings import resolve_settings
     from urc.runtime.widget_registry import hidden_beside
 
@@ -95,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings_given(profiles, arguments)  # report invalid settings before the server starts
     for folder in dict.fromkeys(each for one in profiles for each in hidden_beside(one.file)):
         complain(f"urc serve: {folder} is ignored: a widget with this name ships with URC")
-    if not is_loopback(arguments.host):
+    if arguments.is_open:
         _warn(arguments)
 
     def given(profile: "Profile") -> Mapping[str, "Value"]:
@@ -124,7 +118,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.data_dir,
             arguments.has_guard,
             arguments.tiles,
-            token_in(arguments.token_file) if arguments.token_file else "",
+            arguments.is_open,
             arguments.installed or not profiles,
             tuple(arguments.trust_widget),
             arguments.record,
@@ -148,13 +142,8 @@ def _check(arguments: argparse.Namespace) -> None:
             "--dev shows all traffic, so it is allowed only on this machine;"
             f" found --host {arguments.host}"
         )
-    if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
-        raise Misuse(
-            f"--manage lets others at {arguments.host} install packages and change settings:"
-            " add --token FILE to require a token"
-        )
-    if arguments.token_file and not arguments.manage:
-        raise Misuse("--token is for management from other machines: add --manage")
+    if arguments.is_open and is_loopback(arguments.host):
+        raise Misuse("--without-sign-in is for other machines: add --host")
     if arguments.faults and not arguments.simulate:
         raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():

@@ -1,7 +1,6 @@
 """The start addresses of a dashboard, including their keys."""
 
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, ExitStack
 from ipaddress import ip_address
@@ -10,17 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlsplit
 
 from urc.cli.arguments import is_loopback
-from urc.cli.error_report import Misuse
 from urc.cli.output import complain
-from urc.problems import UrcError
 
 if TYPE_CHECKING:
     from urc.web.serve.access import Access
 
-__all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance", "token_in"]
-
-_SHORTEST = 16
-_LONGEST = 200
+__all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance"]
 
 
 class ReadyDashboard(NamedTuple):
@@ -43,10 +37,10 @@ class ReadyDashboard(NamedTuple):
     def lines(self) -> Iterator[str]:
         """Yield the lines of the start message. The first line is the address with all rights."""
         yield f"dashboard {self.address}"
-        if self.access.is_open:
-            yield f"for others {self.url} (without a key: watch and drive)"
-        if managers := self.access.address_of_managers(self.url):
-            yield f"for managers {managers}"
+        if self.access.anonymous:
+            yield f"for others {self.url} (without a sign-in: {self.access.anonymous})"
+        elif not is_loopback(urlsplit(self.url).hostname or ""):
+            yield f"for others {self.url} (with a sign-in)"
 
 
 def print_entrance(ready_dashboard: ReadyDashboard) -> None:
@@ -54,34 +48,22 @@ def print_entrance(ready_dashboard: ReadyDashboard) -> None:
     print("\n".join(ready_dashboard.lines()), flush=True)
 
 
-def access_for(host: str, token: str = "") -> "Access":
-    """Return the keys of a dashboard that listens on `host`."""
-    from urc.web.serve.access import Access
+def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
+    """Return the identities and rights of a dashboard.
 
-    return Access(is_open=not is_loopback(host), token=token)
-
-
-def token_in(file: Path) -> str:
-    """Return the token in a file; create a missing file.
+    Args:
+        data: folder with the store of people, devices and programs; None for the local user alone.
+        is_open: whether visitors without a sign-in may watch and drive.
 
     Raises:
-        UrcError: the file cannot be read or written, or contains no valid token.
+        AccessError: the store cannot be used.
     """
-    from urc.private_files import put_private
+    from urc.access.control import AccessControl
+    from urc.access.store import AccessStore
+    from urc.web.serve.access import Access
 
-    try:
-        if not file.exists():
-            put_private(file, secrets.token_urlsafe(24).encode() + b"\n")
-        token = file.read_text("ascii").strip()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "the file is not plain text"
-        raise UrcError(f"--token: cannot use {file}: {reason}") from error
-    if not _SHORTEST <= len(token) <= _LONGEST or not token.isprintable() or " " in token:
-        raise Misuse(
-            f"--token: {file} must contain {_SHORTEST} to {_LONGEST} characters without spaces;"
-            " remove the file to create a new token"
-        )
-    return token
+    control = AccessControl(AccessStore(data) if data else None)
+    return Access(control, anonymous="drive" if is_open else None)
 
 
 def announce(

@@ -29,7 +29,18 @@ class Operator(NamedTuple):
     """Unique while connected."""
     name: str = ""
     """Name shown to other operators."""
-    role: Role = "drive"
+    role: Role | None = "drive"
+    """Role at the last look; None without any right."""
+    who: str = ""
+    """Name of the person, device or program; "" without a sign-in."""
+    principal: str = ""
+    """Identifier of the person, device or program; "" without a sign-in."""
+    person: str = ""
+    """Identifier of the person: the owner of a device, or else the principal; "" if unknown."""
+    way: str = ""
+    """How the sign-in began, such as ``passkey``."""
+    place: str = ""
+    """Network address; "" for this machine."""
 
 
 class LeaseState(NamedTuple):

@@ -221,7 +221,7 @@ class AuditRecorder:
             robot=self.robot,
             what=what,
             who=who.name,
-            role=who.role if who is not _NOBODY else "",
+            role=(who.role or "") if who is not _NOBODY else "",
             client=who.id,
             epoch=epoch,
             command=command,

@@ -22,6 +22,7 @@ from secrets import randbelow
 
 from urc.model.driver import Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
+from urc.model.role import includes
 from urc.model.values import Reading
 from urc.motion.freshness import ControlInput, Freshness
 from urc.motion.hold_to_run import HoldTerms, Reason
@@ -158,6 +159,15 @@ class MotionController:
         if len(self._screens) >= MOST_SCREENS:
             raise UrcError(f"{MOST_SCREENS} pages already show this robot")
         self._screens[client.id] = _Screen(client)
+
+    def change(self, client: Operator) -> None:
+        """Replace the rights of a page; without the right to drive, its lease ends and it stops."""
+        screen = self._screens.get(client.id)
+        if screen is None:
+            return
+        screen.client = client
+        if not includes(client.role, "drive"):
+            self._settle(self.lease.leave(client.id))
 
     def part(self, client: str) -> None:
         """Remove a page and stop the commands that the page held."""

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from urc.model.driver import Command, Driver
 from urc.model.payload import Payload
-from urc.model.role import includes
+from urc.model.role import Role, includes
 from urc.model.values import NOTHING, Reading
 from urc.motion.lease import WATCHES, Operator
 from urc.protocol.events import Replied
@@ -25,11 +25,21 @@ from urc.runtime.hub import Hub
 from urc.runtime.motion_controller import MotionController
 from urc.runtime.session import CommandFailed
 
-__all__ = ["HELD", "CommandRefused", "Drivable", "OneShotCommands", "can_move", "needs_holding"]
+__all__ = [
+    "HELD",
+    "OUT_OF_SCOPE",
+    "CommandRefused",
+    "Drivable",
+    "OneShotCommands",
+    "can_move",
+    "needs_holding",
+    "role_refusal",
+]
 
 AGAIN_S = 1.0
 """Delay before a STOP that has not reached the robot is sent again, in seconds."""
 _STOP = Operator("", "STOP")
+OUT_OF_SCOPE = "this token does not permit the command"
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
 
 
@@ -78,6 +88,13 @@ def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
         return False  # the engine reports the mistake; nothing is sent
 
 
+def role_refusal(client: Operator, needed: Role) -> str:
+    """Return the reason why the role of `client` is too low for a command, or ""."""
+    if includes(client.role, needed):
+        return ""
+    return WATCHES if needed == "drive" else f"this command needs the role {needed}"
+
+
 class OneShotCommands:
     """The commands of one robot that need no held control."""
 
@@ -121,8 +138,10 @@ class OneShotCommands:
         """
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
-            return self._controller().lease.interlock(client, stops)
-        return "" if includes(client.role, "drive") else WATCHES
+            reason = self._controller().lease.interlock(client, stops)
+            if reason:
+                return reason
+        return role_refusal(client, known.role if known is not None else "drive")
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
         """Return the reason to refuse control of a sequence.

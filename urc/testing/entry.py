@@ -3,26 +3,39 @@
 For tests alone.
 """
 
-from copy import copy
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from urc.access.control import AccessControl
+from urc.access.grants import parse_grant
+from urc.access.store import AccessStore
 from urc.web.serve.access import Access
 
-__all__ = ["ACCESS", "BEARER", "HERE", "HERE_COOKIE", "KEY", "MANAGER", "OPEN"]
+__all__ = ["ACCESS", "BEARER", "HERE", "HERE_COOKIE", "KEY", "OPEN", "person"]
 
 KEY = "the-start-key-of-a-test"
-TOKEN = "the-token-of-managers-in-a-test"  # noqa: S105 - valid only in tests
 
-ACCESS = Access(key=KEY, instance="test", token=TOKEN)
-"""Access to a dashboard that only this machine can reach."""
-OPEN = copy(ACCESS)
-"""Access to a dashboard that other machines can reach too, with the same admitted browsers."""
-OPEN.is_open = True
+_FOLDER = TemporaryDirectory(prefix="urc-test-people-")  # removed when the process ends
+STORE = AccessStore(Path(_FOLDER.name))
+CONTROL = AccessControl(STORE, key=KEY)
+
+ACCESS = Access(CONTROL, instance="test")
+"""Access to a dashboard that requires a sign-in."""
+OPEN = Access(CONTROL, instance="test", anonymous="drive")
+"""Access to a dashboard that requires no sign-in, with the same admitted browsers."""
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
 """Cookies of a browser that has sent the start key."""
 HERE_COOKIE = f"{ACCESS.cookie}={HERE[ACCESS.cookie]}"
 """Cookie header of a browser that has sent the start key."""
-MANAGER = {ACCESS.cookie: str(ACCESS.admit(TOKEN))}
-"""Cookies of a browser that has sent the token of managers."""
 BEARER = {"authorization": f"Bearer {KEY}"}
 """Authorization header for requests from a program."""
+
+
+def person(name: str, *grants: str) -> dict[str, str]:
+    """Return the cookies of a new person with these grants, who has signed in."""
+    now = CONTROL.now()
+    added = STORE.add("person", name, [parse_grant(one) for one in grants], now=now)
+    _, secret = STORE.open_sign_in(added.id, "passphrase", now=now)
+    CONTROL.load()
+    return {ACCESS.sign_in_cookie: secret}

@@ -1,34 +1,34 @@
-"""Access control of pages: admission of browsers with a key, and instructions for other browsers.
+"""Access control of pages: admission of browsers with a key, and the sign-in page for all others.
 
-Layer 5. The module contains an ASGI middleware inside the page policy. STOP and the files of the
-access page need no key.
+Layer 5. The module contains an ASGI middleware inside the page policy. A visitor without a role
+reaches only the routes whose right is `ANYONE`, among them STOP and the files of the sign-in page.
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 from urllib.parse import parse_qsl, quote, unquote, urlencode
 
 from starlette.responses import HTMLResponse, JSONResponse
+from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from urc.web.serve.access import PARAMETER, Access, Visitor
-from urc.web.serve.connection_quota import is_stop
+from urc.web.serve.access import PARAMETER, Access
+from urc.web.serve.rights import ANYONE, ProtectedRoute, turn_away
+from urc.web.serve.visitor import Visitor
 from urc.web.show.pages import PageHead, render
-from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
+from urc.web.show.warnings import current_warnings
+from urc.web.words import t
 
 __all__ = ["AccessMiddleware", "AccessPage", "Stoppable"]
 
 SAID = "open the address that URC printed when it started: it has the key"
 """Refusal message for programs and sockets; `words.js` translates the message."""
-_OPEN = re.compile(
-    r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words)/.+\.\w+"
-)
-"""Paths of static files without any data about a robot."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
 """Paths of the files that frames load, without the secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
+_LONGEST_AGENT = 200
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
@@ -64,17 +64,25 @@ class AccessMiddleware:
     """The middleware."""
 
     def __init__(
-        self, app: ASGIApp, access: Access, robots: Callable[[], Iterable[Stoppable]]
+        self,
+        app: ASGIApp,
+        access: Access,
+        routes: Sequence[BaseRoute],
+        robots: Callable[[], Iterable[Stoppable]],
     ) -> None:
         """Prepare.
 
         Args:
             app: the wrapped application.
-            access: the keys and sessions of the server.
+            access: the identities and rights of the server.
+            routes: the routes of the application.
             robots: function that returns all robots that STOP can stop.
         """
         self._app = app
         self._access = access
+        self._open = [
+            one for one in routes if isinstance(one, ProtectedRoute) and one.right == ANYONE
+        ]
         self._robots = robots
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -87,27 +95,25 @@ class AccessMiddleware:
             scope["state"]["is_code"] = True
             await self._app({**scope, "path": code}, receive, send)
             return
+        if self._access.anonymous is not None:
+            text = t("Sign-in is off: everyone on this network can drive these robots.")
+            current_warnings.set((text,))
         visitor: Visitor = scope["state"]["visitor"]
         query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         word = next((value for name, value in query if name == PARAMETER), None)
-        is_let_in = self._access.is_open or visitor.standing != "stranger"
+        is_let_in = visitor.best_role() is not None
         if word is not None and scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
             answer = self._answer_to(word, query, scope)
             await answer(scope, receive, send)
         elif is_let_in or self._is_for_all(scope):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
-            await _turn_away(receive, send)
+            await turn_away(receive, send, SAID)
         else:
             await self._refusal(scope)(scope, receive, send)
 
     def _is_for_all(self, scope: Scope) -> bool:
-        if scope["type"] == "websocket":
-            return False
-        path = scope["path"]
-        if is_stop(scope["method"], path):
-            return True
-        return scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path) is not None
+        return any(one.matches(scope)[0] is Match.FULL for one in self._open)
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
         """Return the response to a request with a key in its query."""
@@ -115,14 +121,17 @@ class AccessMiddleware:
         # Never "//…", which would be another host.
         path = "/" + quote(scope["path"].lstrip("/"))
         url = f"{path}?{rest}" if rest else path
-        session = self._access.admit(word)
-        if session is None and scope["state"]["visitor"].standing == "stranger":
-            return self._page(scope, url=url if self._access.is_open else "", is_old=True)
+        visitor: Visitor = scope["state"]["visitor"]
+        client = scope.get("client") or ("",)
+        secret = self._access.admit(word, place=client[0], agent=_agent(scope))
+        if secret is None and not visitor.is_known:
+            is_open = self._access.anonymous is not None
+            return self._page(scope, url=url if is_open else "", is_old=True)
         # A page, not a redirect: browsers send no strict cookie after a redirect from another site.
         page = self._page(scope, url=url)
-        if session is not None:
+        if secret is not None:
             is_secure = scope["scheme"] == "https"
-            for line in self._access.cookies(session, scope["headers"], is_secure=is_secure):
+            for line in self._access.cookies(secret, scope["headers"], is_secure=is_secure):
                 page.headers.append("set-cookie", line)
         return page
 
@@ -147,9 +156,7 @@ class AccessMiddleware:
         return HTMLResponse(html, 200 if is_in else 401, _HEADERS if is_in else _REFUSED)
 
 
-async def _turn_away(receive: Receive, send: Send) -> None:
-    """Accept a socket and close it with the reason; a page cannot read a refused handshake."""
-    await receive()
-    await send({"type": "websocket.accept"})
-    await send({"type": "websocket.send", "text": encode_error("refused", SAID)})
-    await send({"type": "websocket.close", "code": CLOSE_NOT_LET_IN, "reason": SAID})
+def _agent(scope: Scope) -> str:
+    """Return the browser's own name, cut to a length for lists."""
+    found = (value for name, value in scope["headers"] if name == b"user-agent")
+    return next(found, b"").decode("latin-1")[:_LONGEST_AGENT]

@@ -16,7 +16,6 @@ from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
@@ -49,8 +48,19 @@ from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
 from urc.web.serve.access import Access
 from urc.web.serve.policy import Policy
+from urc.web.serve.rights import (
+    ANYONE,
+    DRIVE,
+    LOCAL,
+    MAINTAIN,
+    MAINTAIN_SERVER,
+    SIGNED_IN,
+    WATCH,
+    ProtectedRoute,
+    ProtectedSocket,
+)
 from urc.web.serve.server import serve
-from urc.web.serve.visitor import guest_of, is_here, may_manage
+from urc.web.serve.visitor import peer_of, stopper_of, visitor_of
 from urc.web.show.card import Cards
 from urc.web.show.external_pages import ExternalPages
 from urc.web.show.frame_document import FrameDocuments
@@ -81,7 +91,7 @@ def build_app(
 
     Args:
         robots: the robots, by the name in their URL.
-        access: the keys of the server; None to create keys that are never shown.
+        access: the identities and rights of the server; None to create a key that is never shown.
         allowed_hosts: further accepted host names, besides addresses, ``localhost`` and the
             server's own names.
         linger_s: time for which a robot stays connected after its last client has left, in seconds.
@@ -96,15 +106,18 @@ def build_app(
     Raises:
         UrcError: two robots use different widgets of the same name.
     """
+    access = access or Access()
     audit = AuditLog(data / "audit.sqlite") if data else None
     fleet = _fleet(robots, data, audit, linger_s)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
         ways=NavigationLinks(has_managers=robot_options is not None, has_dev=remake is not None),
+        access=access,
         audit=audit,
         trust=WidgetTrust.of(trusted),
     )
+    access.tags_of = routes.tags_of
 
     def renew(name: str, robot: Robot) -> None:
         routes.renew(name, robot, _latch(data, robot))
@@ -113,10 +126,10 @@ def build_app(
         routes.manager = Manager(RobotFactory(robot_options), fleet, time.monotonic, renew)
     dev = None
     if remake is not None:
-        dev = Dev(fleet.stations, remake, renew, is_here)
-        routes.dev_start = DevStart(fleet, remake, renew, routes.ways, is_here)
+        dev = Dev(fleet.stations, remake, renew)
+        routes.dev_start = DevStart(fleet, remake, renew, routes.ways)
     files = FileRoutes(vendored(), tiles, routes.widget_files)
-    return _Dashboard(routes, files, access or Access(), frozenset(allowed_hosts), dev)
+    return _Dashboard(routes, files, frozenset(allowed_hosts), dev)
 
 
 def _fleet(
@@ -156,11 +169,10 @@ class _Dashboard(Starlette):
         self,
         routes: "_Routes",
         files: FileRoutes,
-        access: Access,
         allowed_hosts: frozenset[str],
         dev: Dev | None,
     ) -> None:
-        self._access = access
+        self._access = access = routes.access
         self._stoppable = routes.stoppable
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
@@ -174,23 +186,25 @@ class _Dashboard(Starlette):
         frames = FrameDocuments(routes.modules, files.has_widget, access.frame_code)
         super().__init__(
             routes=[
-                Route("/", routes.menu),
-                Route("/robots/{name}/", routes.robot),
+                ProtectedRoute("/", routes.menu, SIGNED_IN),
+                ProtectedRoute("/robots/{name}/", routes.robot, WATCH),
                 *Cards(lambda: routes.stations).routes(),
-                Route("/healthz", routes.health),
-                Route(DOCUMENT, document),
-                Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
-                Route("/api/v1/robots/{name}/controls", routes.controls),
-                Route("/api/v1/robots/{name}/timeline", routes.timeline),
-                Route("/api/v1/robots/{name}/recording", routes.recording),
-                Route("/api/v1/robots/{name}/recording/move", routes.move, methods=["POST"]),
+                ProtectedRoute("/healthz", routes.health, ANYONE),
+                ProtectedRoute(DOCUMENT, document, SIGNED_IN),
+                ProtectedRoute("/api/v1/robots/{name}/stop", routes.stop, ANYONE, methods=["POST"]),
+                ProtectedRoute("/api/v1/robots/{name}/controls", routes.controls, WATCH),
+                ProtectedRoute("/api/v1/robots/{name}/timeline", routes.timeline, MAINTAIN),
+                ProtectedRoute("/api/v1/robots/{name}/recording", routes.recording, WATCH),
+                ProtectedRoute(
+                    "/api/v1/robots/{name}/recording/move", routes.move, DRIVE, methods=["POST"]
+                ),
                 *routes.manage_routes(),
                 *gallery.routes(),
                 *files.routes(),
-                Route("/frames/{widget}", frames.frame),
+                ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
-                WebSocketRoute("/ws", routes.socket),
-                WebSocketRoute("/ws/spare", routes.spare),
+                ProtectedSocket("/ws", routes.socket, SIGNED_IN),
+                ProtectedSocket("/ws/spare", routes.spare, SIGNED_IN),
                 *(dev.routes() if dev else no_dev_routes()),
                 *(routes.dev_start.routes() if routes.dev_start else no_dev_start()),
             ],
@@ -200,7 +214,8 @@ class _Dashboard(Starlette):
 
     def build_middleware_stack(self) -> ASGIApp:
         """Put the page policy around the whole application, with its error handlers."""
-        door = AccessMiddleware(super().build_middleware_stack(), self._access, self._stoppable)
+        inner = super().build_middleware_stack()
+        door = AccessMiddleware(inner, self._access, self.routes, self._stoppable)
         return Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
         )
@@ -211,6 +226,7 @@ class _Routes:
     fleet: Fleet
     modules: Mapping[str, object]
     ways: NavigationLinks
+    access: Access
     audit: AuditLog | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
@@ -228,11 +244,11 @@ class _Routes:
         """The stations of the robots, by the name in their URL."""
         return self.fleet.stations
 
-    def manage_routes(self) -> list[Route]:
+    def manage_routes(self) -> list[ProtectedRoute]:
         """Return the routes of the managers; empty without managers."""
         if self.manager is None:
             return []
-        manage = ManageRoutes(self.manager, self.ways, is_here, may_manage)
+        manage = ManageRoutes(self.manager, self.ways)
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
 
     def stoppable(self) -> list[Stoppable]:
@@ -242,6 +258,11 @@ class _Routes:
             for name, each in self.robots.items()
             if each.playback is None and can_move(each.profile.driver)
         ]
+
+    def tags_of(self, name: str) -> tuple[str, ...]:
+        """Return the tags of a robot; () for an unknown robot."""
+        robot = self.robots.get(name)
+        return robot.profile.tags if robot is not None else ()
 
     def profiles(self) -> list[Profile]:
         """Return the profiles of the served robots."""
@@ -265,15 +286,16 @@ class _Routes:
             async with self.fleet.running() as group:
                 if self.manager is not None:
                     await self.manager.changed()
-                watching = group.create_task(self.dev.run()) if self.dev else None
-                blocking = group.create_task(self.manager.watch_blocks()) if self.manager else None
+                tasks = [group.create_task(self.access.run())]
+                if self.dev:
+                    tasks.append(group.create_task(self.dev.run()))
+                if self.manager is not None:
+                    tasks.append(group.create_task(self.manager.watch_blocks()))
                 yield
-                if blocking is not None:
-                    blocking.cancel()
+                for task in tasks:
+                    task.cancel()
                 if self.manager is not None:
                     await self.manager.close()
-                if watching is not None:
-                    watching.cancel()
         finally:
             if self.audit:  # closed last: it records the stops at the end
                 await asyncio.to_thread(self.audit.close)
@@ -284,8 +306,13 @@ class _Routes:
         if self.manager is not None:
             await self.manager.refresh()
             drivers = self.manager.drivers()
+        visitor = visitor_of(request)
         html = menu_page(
-            head, self.robots, ways=self.ways, drivers=drivers, broken=self.fleet.broken
+            head,
+            {name: one for name, one in self.robots.items() if visitor.may(WATCH, name)},
+            ways=self.ways,
+            drivers=drivers,
+            broken=self.fleet.broken if visitor.may(MAINTAIN_SERVER) else {},
         )
         return HTMLResponse(html, headers=_PAGE)
 
@@ -303,7 +330,7 @@ class _Routes:
         interface = chosen(robot.profile, query.get("interface"), kept)
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface of that name."))
-        is_dev = self.dev is not None and is_here(request)
+        is_dev = self.dev is not None and visitor_of(request).may(LOCAL)
         # Another process renders third-party widgets; the call blocks until it is done.
         html = await asyncio.to_thread(
             robot_page,
@@ -331,7 +358,7 @@ class _Routes:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         if not service.controls.controller.can_move or service.robot.playback is not None:
             return JSONResponse({"error": "this robot has no motion to stop"}, 409, _PAGE)
-        service.controls.stop(guest_of(request).place or "a screen of this machine")
+        service.controls.stop(stopper_of(request))
         is_confirmed = await service.deliver_stop()
         by = service.controls.controller.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
@@ -348,7 +375,7 @@ class _Routes:
         name = request.path_params["name"]
         if name not in self.stations:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        return await timeline(request, self.audit, name, is_here=is_here(request))
+        return await timeline(request, self.audit, name)
 
     async def recording(self, request: Request) -> Response:
         """Return the state of a playback."""
@@ -363,29 +390,34 @@ class _Routes:
         return robot.playback if robot is not None else None
 
     async def socket(self, websocket: WebSocket) -> None:
-        service = await self._accepted(websocket)
+        name, service = await self._accepted(websocket)
         if service is not None:
             flow = websocket.scope["state"]["flow"]
-            peer = guest_of(websocket)
-            if service.robot.playback is not None:
-                peer = peer._replace(role="watch")
-            await BrowserClient(websocket, service, flow, peer).serve()
+            is_recorded = service.robot.playback is not None
+            peer = peer_of(websocket, name, only_watches=is_recorded)
+            client = BrowserClient(websocket, service, flow, peer)
+            with self.access.followed(client.recheck):
+                await client.serve()
 
     async def spare(self, websocket: WebSocket) -> None:
         """Serve the redundant socket of a page that drives."""
-        service = await self._accepted(websocket)
+        _, service = await self._accepted(websocket)
         if service is not None:
             flow = websocket.scope["state"]["flow"]
             await RedundantSocket(websocket, service.controls, service.clock, flow).serve()
 
-    async def _accepted(self, websocket: WebSocket) -> RobotService | None:
+    async def _accepted(self, websocket: WebSocket) -> tuple[str, RobotService | None]:
+        """Accept a socket; return name and service of its robot, or close the socket."""
         await websocket.accept()
         names = list(self.stations)
-        default = names[0] if len(names) == 1 else ""
-        service = self.stations.get(websocket.query_params.get("robot", default))
+        name = websocket.query_params.get("robot", names[0] if len(names) == 1 else "")
+        service = self.stations.get(name)
+        if not visitor_of(websocket).may(WATCH, name):
+            await websocket.close(wire.CLOSE_NOT_LET_IN, WATCH.refusal)
+            return name, None
         if service is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
-        return service
+        return name, service
 
 
 def _playback_url(name: str) -> str:
@@ -395,6 +427,8 @@ def _playback_url(name: str) -> str:
 async def _told(request: Request, error: Exception) -> Response:
     if not isinstance(error, HTTPException):
         raise error
+    if request.url.path.startswith("/api/"):
+        return JSONResponse({"error": error.detail}, error.status_code, _PAGE)
     standard = HTTPStatus(error.status_code).phrase
     text = (
         words.t("There is no such page.")

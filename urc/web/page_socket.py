@@ -17,7 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
-from urc.runtime.one_shot_commands import CommandRefused
+from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused
 from urc.runtime.session import CommandFailed
 from urc.web.drive.control_service import OperatorSession
 from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
@@ -41,6 +41,8 @@ COMMANDS_AT_ONCE = 16
 COMMAND_TIMEOUT_S = 30.0
 STALL_S = 15.0
 GOODBYE_S = 2.0
+
+SIGNED_OUT = "your sign-in has ended, or you may no longer watch this robot"
 
 log = logging.getLogger(__name__)
 
@@ -88,6 +90,17 @@ class BrowserClient:
             with self._service.visit(self._peer.who):
                 await self._visit()
 
+    def recheck(self) -> None:
+        """Look at the visitor's rights again: stop what it may no longer drive, or close the page.
+
+        A page of a visitor without any right at the robot closes, and the robot that it drove
+        stops, before this method returns.
+        """
+        if self._operator is not None:
+            self._service.controls.recheck(self._operator)
+        if self._peer.rights.role() is None and not self._closing:
+            self._close(wire.CLOSE_NOT_LET_IN, SIGNED_OUT)
+
     async def _visit(self) -> None:
         opening = asyncio.ensure_future(self._service.live())
         leaving = asyncio.ensure_future(self._line.receive())
@@ -111,7 +124,7 @@ class BrowserClient:
         self._place = live.fanout.join(self._flushed)
         controls = self._service.controls
         try:
-            self._operator = controls.add_page(self._peer.place, self._peer.role, self._news.set)
+            self._operator = controls.add_page(self._peer, self._news.set)
             self._service.consent.welcome(self._operator)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
@@ -234,6 +247,7 @@ class BrowserClient:
             asked = wire.decode(message.get("text") or message.get("bytes") or "")
         except wire.BadMessage as error:
             fault = str(error)
+        self.recheck()
         if isinstance(asked, (Tick, Release, Stop)):
             self._drive(asked)  # STOP is never counted, so no limit can refuse it
         elif not self._allowance.allow(now_s):
@@ -272,11 +286,16 @@ class BrowserClient:
             self._answer(encode_token(said.id, consent.prepare(self._operator, said)))
         elif isinstance(said, Approval):
             consent.handle(self._operator, said)
-        elif refused := controls.once.pull_refusal(who, said.command, said.verb):
+        elif refused := self._pull_refusal(self._operator, said):
             controls.recorder.refused(who, said.command, refused, self._service.clock.now())
         else:
             live.session.pull(said.command, said.verb)
             controls.recorder.ran(who, said.command, {}, f"told to {said.verb}")
+
+    def _pull_refusal(self, operator: OperatorSession, said: SequenceAction) -> str:
+        if not operator.rights.may_give(said.command):
+            return OUT_OF_SCOPE
+        return self._service.controls.once.pull_refusal(operator.client, said.command, said.verb)
 
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1
@@ -344,15 +363,23 @@ class BrowserClient:
         if self._operator is None:
             return ()
         known = self._service.robot.profile.driver.commands.get(asked.command)
-        who, admit = self._operator.client, self._service.controls.once.admit
-        admit(who, asked.command, asked.arguments, asked.stops)
+        self._admit(self._operator, asked)
         if known is None:
             return ()
         people = await self._service.consent.people(
             self._operator, asked.id, known, asked.arguments, asked.token
         )
-        admit(who, asked.command, asked.arguments, asked.stops)  # again: a confirmation takes time
+        self._admit(self._operator, asked)  # again: a confirmation takes time
         return people
+
+    def _admit(self, operator: OperatorSession, asked: wire.CommandRequest) -> None:
+        """Raise `CommandRefused` if the page may not run a command now."""
+        self._service.controls.recheck(operator)
+        if not operator.rights.may_give(asked.command):
+            raise CommandRefused("refused", OUT_OF_SCOPE)
+        self._service.controls.once.admit(
+            operator.client, asked.command, asked.arguments, asked.stops
+        )
 
     def _reply(
         self,

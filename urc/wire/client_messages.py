@@ -4,14 +4,17 @@ Layer 3½. Pure: `urc.client` encodes these messages, and `urc.web.wire` decodes
 limit the nesting depth: the decoder refuses anything deeper than a map of plain arguments.
 """
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal
 
 import msgspec
 
+from urc.model.role import Role
 from urc.motion.lease import REQUEST_S
 from urc.protocol.sequences.sequence_control import Pull
 
 __all__ = [
+    "RIGHTS",
     "INBOUND_BYTES",
     "Arguments",
     "ClientMessage",
@@ -159,3 +162,18 @@ ClientMessage = (
     | Stop
 )
 """Every message of a client over its main socket."""
+
+RIGHTS: Final[Mapping[type, Role | None]] = {
+    Ping: "watch",
+    ImageSelection: "watch",
+    CommandRequest: "drive",
+    ApprovalRequest: "drive",
+    Approval: "drive",
+    SequenceAction: "drive",
+    Drive: "drive",
+    Tick: "drive",
+    Release: "drive",
+    Stop: None,
+}
+"""The least role that each message needs at the robot; None: every page may send it. A command may
+need more, see `urc.model.driver.Command`, and taking the controls by force needs ``maintain``."""

@@ -139,7 +139,8 @@ async def crane(
     file = folder / "crane.yaml"
     file.write_text(text.replace("PORT", str(server.sockets[0].getsockname()[1])), "utf-8")
     try:
-        process = urc_process("serve", str(file), "--port", "0")
+        words = ("--port", "0", "--data-dir", str(folder / "data"))
+        process = urc_process("serve", str(file), *words)
         address = (await process.wait_for_async(r"(http://\S+)"))[1]
         yield robot, f"{address}robots/crane/"
     finally:

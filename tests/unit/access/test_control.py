@@ -1,5 +1,6 @@
 """The access control of one server: the local user, and changes by others."""
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from urc.access.control import LOCAL_SIGN_INS, AccessControl
 from urc.access.directory import NOBODY
 from urc.access.grants import AccessError, Grant
 from urc.access.store import AccessStore
+
+pytestmark = pytest.mark.anyio
 
 KEY = "k" * 32
 
@@ -57,10 +60,10 @@ def test_a_browser_hands_the_start_key_in_for_a_session() -> None:
     assert access.admit(code) is None, "a code works once"
 
 
-def test_local_sessions_are_closed_one_by_one_and_the_oldest_first() -> None:
+async def test_local_sessions_are_closed_one_by_one_and_the_oldest_first() -> None:
     access = AccessControl(key=KEY)
     first, second = (access.admit(KEY) or "" for _ in range(2))
-    access.close_sign_in(access.identify(second).sign_in)
+    await access.end_sign_in(access.identify(second).sign_in)
     assert access.identify(second) == NOBODY
     assert access.identify(first) != NOBODY
     for _ in range(LOCAL_SIGN_INS):
@@ -69,49 +72,72 @@ def test_local_sessions_are_closed_one_by_one_and_the_oldest_first() -> None:
     assert access.identify(KEY) != NOBODY
 
 
-def test_people_of_the_store_and_the_local_user_stand_side_by_side(store: AccessStore) -> None:
+async def test_people_and_the_local_user_stand_side_by_side(store: AccessStore) -> None:
     access = AccessControl(store, key=KEY)
     changes: list[str] = []
     access.on_change.append(lambda: changes.append("changed"))
     ann = store.add("person", "Ann", [Grant("drive")], now=access.now())
     sign_in, secret = store.open_sign_in(ann.id, "passkey", now=access.now())
-    access.reload()
+    await access.reload()
     who = access.identify(secret)
     assert access.role(who) == "drive"
     assert access.role(access.identify(KEY)) == "administer"
-    access.close_sign_in(sign_in.id)
+    await access.end_sign_in(sign_in.id)
     assert access.role(who) is None
     assert changes == ["changed"] * 2
     with pytest.raises(AccessError, match="it was removed already"):
-        access.close_sign_in(sign_in.id)
+        await access.end_sign_in(sign_in.id)
 
 
-def test_a_change_by_another_process_is_noticed(store: AccessStore, tmp_path: Path) -> None:
+async def test_a_change_by_another_process_is_noticed(store: AccessStore, tmp_path: Path) -> None:
     access = AccessControl(store)
     ann = store.add("person", "Ann", [Grant("drive")], now=access.now())
     _, secret = store.open_sign_in(ann.id, "passkey", now=access.now())
-    access.reload()
+    await access.reload()
     who = access.identify(secret)
-    changes: list[str] = []
-    access.on_change.append(lambda: changes.append("changed"))
-    assert not access.poll()
+    heard = asyncio.Event()
+    access.on_change.append(heard.set)
     other = AccessStore(tmp_path)
-    other.set_grants(ann.id, [Grant("watch")])
-    assert access.poll()
-    assert (access.role(who), changes) == ("watch", ["changed"])
-    other.remove(ann.id)
-    other.close()
-    assert access.poll()
-    assert access.role(who) is None
-    assert not access.poll()
-    assert not AccessControl().poll(), "without a store"
+    watching = asyncio.create_task(access.watch())
+    try:
+        other.set_grants(ann.id, [Grant("watch")])
+        await heard.wait()
+        assert access.role(who) == "watch"
+        heard.clear()
+        other.remove(ann.id)
+        await heard.wait()
+        assert access.role(who) is None
+    finally:
+        watching.cancel()
+        other.close()
 
 
-def test_a_clock_that_is_set_back_revives_no_session(store: AccessStore, clock: Clock) -> None:
+async def test_the_use_of_sign_ins_is_recorded_now_and_then(
+    store: AccessStore, clock: Clock
+) -> None:
+    access = AccessControl(store, utc=clock)
+    ann = store.add("person", "Ann", [Grant("drive")], now=clock())
+    sign_in, _ = store.open_sign_in(ann.id, "passkey", now=clock(), idle_s=100)
+    heard = asyncio.Event()
+    access.on_change.append(heard.set)
+    watching = asyncio.create_task(access.watch())
+    await asyncio.sleep(0)
+    clock.now += 61
+    access.used(sign_in.id)
+    await heard.wait()
+    watching.cancel()
+    assert store.directory().sign_ins[sign_in.id].used_at == clock.now
+
+
+async def test_a_server_without_people_has_nothing_to_watch() -> None:
+    await AccessControl().watch()
+
+
+async def test_a_clock_set_back_revives_no_sign_in(store: AccessStore, clock: Clock) -> None:
     access = AccessControl(store, utc=clock)
     ann = store.add("person", "Ann", [Grant("drive")], now=clock())
     _, secret = store.open_sign_in(ann.id, "passkey", now=clock(), ends_at=clock() + 60)
-    access.reload()
+    await access.reload()
     assert access.identify(secret) != NOBODY
     clock.now += 61
     assert access.identify(secret) == NOBODY

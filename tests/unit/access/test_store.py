@@ -70,7 +70,7 @@ def test_a_session_ends_by_itself(store: AccessStore) -> None:
     assert directory.identify(secret, NOW + 59.9) == who
     assert directory.identify(secret, NOW + 60) == NOBODY
     assert directory.role(who, NOW + 60) is None
-    store.touch(who.sign_in, NOW + 50)
+    store.touch_all({who.sign_in: NOW + 50})
     assert store.directory().identify(secret, NOW + 100) == who
     token, key = store.open_sign_in(who.principal, "token", now=NOW, ends_at=NOW + 10)
     assert store.directory().identify(key, NOW + 9.9).sign_in == token.id

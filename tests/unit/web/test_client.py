@@ -18,13 +18,13 @@ from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.page_socket import (
     BAD_MESSAGES,
     MESSAGES_PER_S,
     TICKS_PER_S,
     BrowserClient,
-    SocketPeer,
     TokenBucket,
 )
 from urc.web.wire.messages import CLOSE_TOO_FAST
@@ -117,7 +117,9 @@ class Scene:
         self.service = service
         self.audit: list[AuditEntry] = []
         self.line = FakeLine()
-        self.client = BrowserClient(self.line, service, self.line, SocketPeer("", role))
+        self.client = BrowserClient(
+            self.line, service, self.line, SocketPeer(rights=FixedRights(role))
+        )
         self.task = asyncio.create_task(self.client.serve())
 
 

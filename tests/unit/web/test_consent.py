@@ -16,8 +16,9 @@ from urc.runtime.audit_recorder import AuditRecorder
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.drive.two_person import TOKEN_S, WAIT_S
+from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
-from urc.web.page_socket import BrowserClient, SocketPeer
+from urc.web.page_socket import BrowserClient
 
 pytestmark = pytest.mark.anyio
 
@@ -45,7 +46,7 @@ class Screens:
         """Let one more look."""
         line = FakeLine()
         self.lines.append(line)
-        client = BrowserClient(line, self.service, line, SocketPeer("", role))
+        client = BrowserClient(line, self.service, line, SocketPeer(rights=FixedRights(role)))
         self._tasks.append(asyncio.create_task(client.serve()))
         await settle()
         return line

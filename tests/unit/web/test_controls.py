@@ -19,6 +19,7 @@ from urc.runtime.latch import LatchStore
 from urc.testing.clock import FakeClock, settle
 from urc.testing.movers import FakeFrames, FakeMotionBackend
 from urc.web.drive.control_service import BEAT_S, THINNED_S, ControlService, OperatorSession
+from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
@@ -45,7 +46,8 @@ class Scene:
 
     def add_page(self, place: str = "", role: Role = "drive") -> OperatorSession:
         """Sit down, and read what is told at once."""
-        operator = self.controls.add_page(place, role, lambda: None)
+        peer = SocketPeer(place, rights=FixedRights(role))
+        operator = self.controls.add_page(peer, lambda: None)
         self.told[operator.client.id] = []
         self.read(operator)
         return operator

@@ -21,6 +21,7 @@ from urc.testing.profile import text
 from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
 from urc.web.dev.rows import TrafficRow
 from urc.web.dev.watch import CheckedProfile, ProfileWatch
+from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
 
 pytestmark = pytest.mark.anyio
@@ -206,7 +207,7 @@ async def test_a_latched_stop_holds_over_a_new_version() -> None:
     """Nothing moves because somebody saved a file; the screens are still known."""
     async with scene(with_commands("go", is_held=True)) as it:
         controls = it.service.controls
-        operator = controls.add_page("", "maintain", lambda: None)
+        operator = controls.add_page(SocketPeer(rights=FixedRights("maintain")), lambda: None)
         controls.stop("screen 1")
         await settle()
         assert it.service.is_at_rest

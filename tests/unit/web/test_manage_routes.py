@@ -15,7 +15,7 @@ from urc.packages.package import Package
 from urc.packages.store import Store
 from urc.runtime.settings_store import SettingsStore, StoredSettings
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.testing.entry import HERE, MANAGER, OPEN
+from urc.testing.entry import HERE, OPEN, person
 from urc.web.app import build_app
 from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
@@ -90,7 +90,7 @@ def test_only_who_has_a_key_may_change_anything(
     with served(tmp_path, cookies={}) as client:
         answer = client.post(f"/api/v1/{path}", json=body)
         assert answer.status_code == 403
-        assert "--manage" in answer.json()["error"]
+        assert "the role maintain" in answer.json()["error"]
     with served(tmp_path) as client:
         assert client.get(f"/api/v1/{path}").status_code in (404, 405)
         foreign = {"origin": "http://evil.example"}
@@ -105,10 +105,10 @@ def test_only_who_has_a_key_may_change_anything(
     assert Store(tmp_path / "packages").installed() == before
 
 
-def test_who_has_the_token_of_managers_may(tmp_path: Path) -> None:
+def test_a_person_with_the_role_maintain_may(tmp_path: Path) -> None:
     """But a path of this machine is only named with the start key."""
     stock(tmp_path)
-    with served(tmp_path, cookies=MANAGER) as client:
+    with served(tmp_path, cookies=person("Mia", "maintain")) as client:
         gone = client.post("/api/v1/packages/remove", json={"package": "wide", "yes": True})
         assert gone.json()["gone"] == ["interfaces/wide 1.0.0"]
         path = client.post("/api/v1/packages/add", json={"path": "/etc/passwd"})

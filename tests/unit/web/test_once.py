@@ -12,6 +12,7 @@ from urc.model.sequence import WaitStep
 from urc.protocol.events import Replied
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
+from urc.web.feed.client_socket import SocketPeer
 from urc.web.page_socket import BrowserClient
 from urc.web.wire.drive import Drive
 
@@ -69,7 +70,7 @@ async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop()
 async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> None:
     """Whoever has the controls may give it."""
     async with scene(commands=FOLD) as it:
-        other = it.service.controls.add_page("10.0.0.7", "drive", lambda: None)
+        other = it.service.controls.add_page(SocketPeer("10.0.0.7"), lambda: None)
         it.service.controls.handle(other, Drive("take"))
         it.line.say({"t": "run", "id": 1, "command": "fold"})
         it.line.say({"t": "run", "id": 2, "command": "ask"})
@@ -107,7 +108,7 @@ async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_el
     text = WriteSpec("text", {})
     command = Command("steer", "wire", text, {"mode": mode}, moves=True, moves_if=moves_if)
     async with scene(commands={"steer": command}) as it:
-        other = it.service.controls.add_page("10.0.0.7", "drive", lambda: None)
+        other = it.service.controls.add_page(SocketPeer("10.0.0.7"), lambda: None)
         it.service.controls.handle(other, Drive("take"))
         for number, given in enumerate((4, 10, 10.0, "fast")):
             it.line.say(

@@ -8,10 +8,21 @@ from urc.testing.clock import FakeClock
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, RobotService
-from urc.web.serve.access import UNKNOWN_VISITOR, Visitor
+from urc.web.serve.access import Access
 from urc.web.serve.connection_quota import KNOWN_PLACES, PLACES, ConnectionQuota, is_stop
+from urc.web.serve.visitor import Visitor
 
-HOLDER = Visitor("here", "browser 1")
+ACCESS = Access()
+
+
+def holder() -> Visitor:
+    """Return another browser with the start key."""
+    secret = ACCESS.admit(ACCESS.key)
+    return ACCESS.visitor([(b"cookie", f"{ACCESS.cookie}={secret}".encode())])
+
+
+UNKNOWN_VISITOR = ACCESS.visitor([])
+HOLDER = holder()
 
 
 @pytest.mark.parametrize(("visitor", "most"), [(UNKNOWN_VISITOR, PLACES), (HOLDER, KNOWN_PLACES)])
@@ -23,7 +34,7 @@ def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int)
             assert open_ones.enter_context(places.taken(visitor, "192.0.2.7"))
         with places.taken(visitor, "192.0.2.7") as has_place:
             assert not has_place
-        for other in (UNKNOWN_VISITOR, HOLDER._replace(name="browser 2")):
+        for other in (UNKNOWN_VISITOR, holder()):
             with places.taken(other, "192.0.2.8") as has_place:
                 assert has_place
     with places.taken(visitor, "192.0.2.7") as has_place:
@@ -43,8 +54,8 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
 @pytest.mark.parametrize(
     ("peer", "operators"),
     [
-        (SocketPeer("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
-        (SocketPeer("", "maintain", "here browser 1", True), KNOWN_SEATS),
+        (SocketPeer("192.0.2.7", "at 192.0.2.7"), SEATS),
+        (SocketPeer("", "ann", is_known=True), KNOWN_SEATS),
     ],
 )
 def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(

@@ -18,6 +18,7 @@ from urc.web.drive.redundant_socket import (
     MESSAGES_PER_S,
     RedundantSocket,
 )
+from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
@@ -200,6 +201,6 @@ async def test_a_flood_closes_it() -> None:
 async def test_viewers_are_told_no_key() -> None:
     """They drive nothing."""
     async with scene() as it:
-        operator = it.controls.add_page("", "watch", lambda: None)
+        operator = it.controls.add_page(SocketPeer(rights=FixedRights("watch")), lambda: None)
         (lease,) = it.read(operator)
         assert lease["spare"] == ""

@@ -31,7 +31,7 @@ def client(tmp_path: Path) -> Iterator[TestClient]:
 
 def asking(log: AuditLog) -> TestClient:
     async def answer(request: Request) -> Response:
-        return await timeline(request, log, "rover", is_here=True)
+        return await timeline(request, log, "rover")
 
     return TestClient(Starlette(routes=[Route("/", answer)]))
 
@@ -83,7 +83,7 @@ def dashboard(data: Path | None, *, has_key: bool = True) -> TestClient:
     ("has_data", "has_key", "path", "status", "told"),
     [
         (True, True, "nobody", 404, "no robot of that name is served here"),
-        (True, False, "puppet", 403, "needs the key in the address that URC printed"),
+        (True, False, "puppet", 403, "This needs the role maintain."),
         (False, True, "puppet", 404, "there is no audit log: this server has no folder"),
     ],
 )

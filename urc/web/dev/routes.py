@@ -11,21 +11,21 @@ from functools import partial
 from urllib.parse import quote
 
 from starlette.exceptions import HTTPException
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
-from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.routing import BaseRoute
 from starlette.websockets import WebSocket
 
 from urc.web.dev.client import DevClient
 from urc.web.dev.watch import ProfileWatch, Remake
 from urc.web.fleet.robots import Robot, RobotService
+from urc.web.serve.rights import LOCAL, WATCH, ProtectedRoute, ProtectedSocket
 from urc.web.show.pages import PageHead, render
 from urc.web.wire import messages as wire
 
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 
 HOW_TO_TURN_ON = "The developer page is disabled. Start URC with --dev to enable it."
-_ONLY_HERE = "The developer page needs the key in the address that URC printed."
 CLIENTS = 16
 """Maximum number of open developer pages."""
 
@@ -57,7 +57,7 @@ def no_dev_routes() -> list[BaseRoute]:
     async def tell(_: Request) -> Response:
         raise HTTPException(404, HOW_TO_TURN_ON)
 
-    return [Route("/robots/{name}/dev", tell)]
+    return [ProtectedRoute("/robots/{name}/dev", tell, WATCH)]
 
 
 class Dev:
@@ -68,7 +68,6 @@ class Dev:
         stations: Mapping[str, RobotService],
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
-        is_here: Callable[[HTTPConnection], bool],
     ) -> None:
         """Prepare.
 
@@ -76,9 +75,7 @@ class Dev:
             stations: the robots, by the name in their URL.
             remake: functions that create a robot from a new version of its profile, by name.
             take: function that switches to a new version of a robot; may raise `UrcError`.
-            is_here: function that returns whether the request has the start key.
         """
-        self._is_here = is_here
         self._open = 0
         self._watches = {
             name: ProfileWatch(service, remake[name], partial(take, name))
@@ -94,8 +91,8 @@ class Dev:
     def routes(self) -> list[BaseRoute]:
         """Return the routes of the developer pages and their sockets."""
         return [
-            Route("/robots/{name}/dev", self._page),
-            WebSocketRoute("/robots/{name}/dev/ws", self._socket),
+            ProtectedRoute("/robots/{name}/dev", self._page, LOCAL),
+            ProtectedSocket("/robots/{name}/dev/ws", self._socket, LOCAL),
         ]
 
     async def _page(self, request: Request) -> Response:
@@ -103,8 +100,6 @@ class Dev:
         watch = self._watches.get(name)
         if watch is None:
             raise HTTPException(404, "No robot of that name is served here.")
-        if not self._is_here(request):
-            raise HTTPException(403, _ONLY_HERE)
         title = watch.service.robot.profile.title or name
         quoted = quote(name, safe="")
         page = DevPage(
@@ -122,8 +117,6 @@ class Dev:
         watch = self._watches.get(websocket.path_params["name"])
         if watch is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
-        elif not self._is_here(websocket):
-            await websocket.close(wire.CLOSE_NO_ROBOT, _ONLY_HERE)
         elif self._open >= CLIENTS:
             await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} developer pages are already open")
         else:

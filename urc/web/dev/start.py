@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from urllib.parse import quote
 
 from starlette.exceptions import HTTPException
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
-from starlette.routing import Route
 
 from urc.problems import UrcError
 from urc.runtime.open_profile import open_document
@@ -22,6 +21,7 @@ from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robots import Robot
 from urc.web.manage.routes import answer, told
 from urc.web.manage.wire import ReloadResult
+from urc.web.serve.rights import LOCAL, SIGNED_IN, ProtectedRoute
 from urc.web.show.menu import Nav, NavigationLinks, SettingRow, setting_row
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
@@ -62,7 +62,6 @@ class DevStart:
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
         ways: NavigationLinks,
-        is_here: Callable[[HTTPConnection], bool],
     ) -> None:
         """Prepare.
 
@@ -71,27 +70,21 @@ class DevStart:
             remake: functions that create a robot from a new version of its profile, by name.
             take: function that switches to the new robot; may raise `UrcError`.
             ways: navigation links of this server.
-            is_here: function that returns whether a request has the start key.
         """
         self._fleet = fleet
         self._remake = remake
         self._take = take
         self._ways = ways
-        self._is_here = is_here
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes of the start page and of its button."""
         return [
-            Route("/dev", self.page),
-            Route("/api/v1/robots/{name}/dev/start", self.start, methods=["POST"]),
+            ProtectedRoute("/dev", self.page, LOCAL),
+            ProtectedRoute("/api/v1/robots/{name}/dev/start", self.start, LOCAL, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
         """Return the page that shows the fixed values."""
-        if not self._is_here(request):
-            raise HTTPException(
-                403, t("The dev interface needs the key in the address that URC printed.")
-            )
         head = PageHead(request.state.nonce, t("Dev interface"))
         robots = tuple(
             _fixed(name, self._fleet.robots[name])
@@ -104,8 +97,6 @@ class DevStart:
     async def start(self, request: Request) -> Response:
         """Reload all documents, and return the URL of the robot."""
         name = request.path_params["name"]
-        if not self._is_here(request):
-            return told(403, "the dev interface needs the key in the address that URC printed")
         if name not in self._remake or name not in self._fleet.robots:
             return told(404, "no robot of that name is served here")
         driver = self._fleet.driven_by(name)
@@ -122,13 +113,13 @@ class DevStart:
         return self._remake[name](open_document(self._fleet.robots[name].profile.file))
 
 
-def no_dev_start() -> list[Route]:
+def no_dev_start() -> list[ProtectedRoute]:
     """Return a route that explains how to enable the page, for a server without ``--dev``."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))
 
-    return [Route("/dev", tell)]
+    return [ProtectedRoute("/dev", tell, SIGNED_IN)]
 
 
 def _fixed(name: str, robot: Robot) -> PinnedRobot:

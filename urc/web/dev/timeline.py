@@ -1,8 +1,8 @@
 """The audit log of one robot as JSON, which shows the causes of its motion on the developer page.
 
-Layer 5. The timeline contains traffic of the robot, so it requires the start key, like the
-developer page. The query parameter ``last`` is the maximum number of entries; the newest entry is
-first. The query parameter ``since`` is the earliest time, in seconds since 1970 (UTC).
+Layer 5. The timeline contains traffic of the robot, so it requires the role ``maintain``. The query
+parameter ``last`` is the maximum number of entries; the newest entry is first. The query parameter
+``since`` is the earliest time, in seconds since 1970 (UTC).
 """
 
 import asyncio
@@ -22,20 +22,14 @@ _HEADERS = {"cache-control": "no-store"}
 _SETTLE_S = 0.5
 
 
-async def timeline(
-    request: Request, log: AuditLog | None, robot: str, *, is_here: bool
-) -> JSONResponse:
+async def timeline(request: Request, log: AuditLog | None, robot: str) -> JSONResponse:
     """Return the audit log entries of a robot, newest first.
 
     Args:
         request: the request; its query limits the entries.
         log: the audit log; None if the server has none.
         robot: name of the robot.
-        is_here: whether the request has the start key.
     """
-    if not is_here:
-        text = "the timeline needs the key in the address that URC printed"
-        return JSONResponse({"error": text}, 403, _HEADERS)
     if log is None:
         text = "there is no audit log: this server has no folder for its data"
         return JSONResponse({"error": text}, 404, _HEADERS)

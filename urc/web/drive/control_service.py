@@ -23,8 +23,9 @@ from urc.runtime.hub import Hub, LogEntry
 from urc.runtime.latch import Latch, LatchStore
 from urc.runtime.loop_watchdog import TOO_LATE_S, LoopWatchdog
 from urc.runtime.motion_controller import MotionBackend, MotionController
-from urc.runtime.one_shot_commands import Drivable, OneShotCommands
+from urc.runtime.one_shot_commands import OUT_OF_SCOPE, Drivable, OneShotCommands, role_refusal
 from urc.web.drive.operator_session import FLOOD, OperatorSession
+from urc.web.feed.client_socket import SocketPeer
 from urc.web.wire import drive as wire
 
 __all__ = ["BEAT_S", "ControlService", "OperatorSession"]
@@ -64,6 +65,7 @@ class ControlService:
             driver, file.load() if file is not None else Latch(LeaseState())
         )
         self._driver = driver
+        self._roles = _roles(driver)
         self._clock = clock
         self._file = file
         self._hub: Hub | None = None
@@ -99,7 +101,7 @@ class ControlService:
             for command in list(operator.alarms):
                 operator.forget(command)
             operator.paces.clear()
-        self._driver, self._file = driver, file
+        self._driver, self._file, self._roles = driver, file, _roles(driver)
         self.once.driver = driver
         self._heed(file)
         self.controller = self._controller(driver, kept)
@@ -145,17 +147,29 @@ class ControlService:
 
     # -- pages
 
-    def add_page(self, place: str, role: Role, wake: Callable[[], None]) -> OperatorSession:
+    def add_page(self, peer: SocketPeer, wake: Callable[[], None]) -> OperatorSession:
         """Add a page; raise `UrcError` when the robot has too many pages.
 
         Args:
-            place: address of the page, shown to other operators; "" for this machine.
-            role: its rights.
+            peer: the person or program at the page.
             wake: callback for new messages to the page.
         """
         self._peers += 1
-        name = f"screen {self._peers}{f' at {place}' if place else ''}"
-        operator = OperatorSession(Operator(f"s{self._peers}", name, role), wake)
+        who = peer.identity
+        name = f"screen {self._peers}{f' at {peer.place}' if peer.place else ''}"
+        if peer.is_known and not peer.is_local:
+            name = who.name
+        client = Operator(
+            f"s{self._peers}",
+            name,
+            peer.rights.role(),
+            who=who.name,
+            principal=who.principal,
+            person=who.person,
+            way=who.way,
+            place=peer.place,
+        )
+        operator = OperatorSession(client, wake, peer.rights)
         self.controller.join(operator.client)
         self._operators[operator.client.id] = operator
         return operator
@@ -168,6 +182,20 @@ class ControlService:
         if operator.spare is not None:
             operator.spare.end()
         self.controller.part(operator.client.id)
+
+    def recheck(self, operator: OperatorSession) -> None:
+        """Look at an operator's rights again; without the right to drive, its motion stops."""
+        role = operator.rights.role()
+        if role == operator.client.role:
+            return
+        operator.client = operator.client._replace(role=role)
+        for command, needed in self._roles.items():
+            if not includes(role, needed):
+                operator.forget(command)
+                self.controller.release(operator.client.id, command)
+        self.controller.change(operator.client)
+        operator.seen = -1  # the lease message tells the page its rights
+        operator.wake()
 
     def operator_of(self, key: str) -> OperatorSession | None:
         """Return the session of the page with the key `key`; None for an unknown key."""
@@ -200,6 +228,8 @@ class ControlService:
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
         """Accept a tick as raw bytes; return its kind.
 
+        The rights are read at each tick that is applied, in `_tick`.
+
         A new tick replaces a pending tick without being decoded. Too many ticks pause the socket,
         so that they cost little time.
         """
@@ -231,6 +261,7 @@ class ControlService:
 
     def handle(self, operator: OperatorSession, said: wire.Driving) -> None:
         """Handle a message from the page."""
+        self.recheck(operator)
         match said:
             case wire.Tick():
                 self._thin(operator, said)
@@ -323,7 +354,12 @@ class ControlService:
             ControlInput, (tick.epoch, tick.number, tick.echo)
         )  # fast: called many times per second
         command = tick.command
-        reason = self.controller.tick(operator.client.id, command, tick.arguments, given, now)
+        self.recheck(operator)
+        reason = role_refusal(operator.client, self._roles.get(command, "drive"))
+        if not reason and not operator.rights.may_give(command):
+            reason = OUT_OF_SCOPE
+        if not reason:
+            reason = self.controller.tick(operator.client.id, command, tick.arguments, given, now)
         if not reason:
             operator.moved_s[command] = operator.moved_at_s = now
         elif now - operator.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(
@@ -419,6 +455,11 @@ class ControlService:
         self._expiring = None
         self.controller.expire(self._clock.now())
         self._set_expiry()
+
+
+def _roles(driver: Driver) -> dict[str, Role]:
+    """Return the role that each held command needs, by name."""
+    return {name: one.role for name, one in driver.commands.items() if one.hold is not None}
 
 
 def _unread(entry: AuditEntry) -> None:

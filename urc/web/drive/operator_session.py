@@ -5,12 +5,13 @@ Layer 5.
 
 import secrets
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
 from urc.motion.freshness import DuplicateElimination
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
 from urc.runtime.clock import Timer
+from urc.web.feed.client_socket import FixedRights, PeerRights
 from urc.web.wire import drive as wire
 
 __all__ = ["FLOOD", "OperatorSession", "RedundantLine"]
@@ -18,6 +19,9 @@ __all__ = ["FLOOD", "OperatorSession", "RedundantLine"]
 FLOOD = 4
 """Maximum number of ticks that are accepted while a tick is pending. Further ticks stay in the
 socket's buffer."""
+
+
+_DRIVES: Final = FixedRights()
 
 
 class RedundantLine(Protocol):
@@ -33,8 +37,12 @@ class RedundantLine(Protocol):
 class OperatorSession:
     """The state of one page that may drive a robot."""
 
-    def __init__(self, client: Operator, wake: Callable[[], None]) -> None:
+    def __init__(
+        self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES
+    ) -> None:
         self.client = client
+        self.rights = rights
+        """The present rights; `client` has the rights of the last look."""
         self.wake = wake
         self.heartbeat: int | None = None
         self.notices: dict[str, str] = {}

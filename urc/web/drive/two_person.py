@@ -1,7 +1,8 @@
 """The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. Users do not sign in, so each page that may drive counts as one person. A page cannot
-approve its own command. The number of pending questions and the wait for an answer are limited.
+Layer 5. All pages and devices of one person count as one, and cannot approve their own command. The
+local user is one person, too. On a server without sign-in, each page of an unknown visitor counts
+as one person. The number of pending questions and the wait for an answer are limited.
 
 A token from the server represents a confirmation. A token is valid only once and for a few seconds,
 on one page, and for one command with unchanged arguments. A replayed, changed or delayed
@@ -164,13 +165,16 @@ class TwoPersonRule:
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or not includes(operator.client.role, "drive"):
             return
-        if not said.yes:
+        is_second = _is_another_person(operator, one.asker)
+        if not said.yes and (is_second or operator is one.asker):
             one.answer.set_result(None)
-        elif operator is not one.asker:
+        elif said.yes and is_second:
             one.answer.set_result(operator)
 
     def _send(self, operator: OperatorSession, one: _Question) -> None:
-        if not includes(operator.client.role, "drive") and operator is not one.asker:
+        may_approve = includes(operator.client.role, "drive")
+        may_approve = may_approve and _is_another_person(operator, one.asker)
+        if not may_approve and operator is not one.asker:
             return
         text = wire.encode_ask(
             one.number,
@@ -182,6 +186,12 @@ class TwoPersonRule:
             max(0.0, one.until_s - self._clock.now()),
         )
         operator.notice(f"ask {one.number}", text)
+
+
+def _is_another_person(one: OperatorSession, other: OperatorSession) -> bool:
+    if one.client.person and other.client.person:
+        return one.client.person != other.client.person
+    return one is not other
 
 
 def _meant(command: str, arguments: Mapping[str, Reading]) -> bytes:

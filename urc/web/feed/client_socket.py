@@ -9,9 +9,18 @@ from typing import NamedTuple, Protocol
 
 from starlette.types import Message
 
+from urc.access.directory import NOBODY, Identity
 from urc.model.role import Role
 
-__all__ = ["TokenBucket", "FlowControl", "SocketPeer", "ClientSocket", "SocketFlow"]
+__all__ = [
+    "ClientSocket",
+    "FixedRights",
+    "FlowControl",
+    "PeerRights",
+    "SocketFlow",
+    "SocketPeer",
+    "TokenBucket",
+]
 
 
 class ClientSocket(Protocol):
@@ -138,14 +147,41 @@ class TokenBucket:
         return True
 
 
+class PeerRights(Protocol):
+    """The present rights of a socket's peer at the socket's robot."""
+
+    def role(self) -> Role | None:
+        """Return the present role; None if the peer has no right any more."""
+
+    def may_give(self, command: str) -> bool:
+        """Return whether the peer's token permits a command."""
+
+
+class FixedRights(NamedTuple):
+    """Rights that never change, for sockets without access control."""
+
+    fixed: Role | None = "drive"
+
+    def role(self) -> Role | None:
+        """Return the role."""
+        return self.fixed
+
+    def may_give(self, command: str) -> bool:
+        """Return True."""
+        return True
+
+
 class SocketPeer(NamedTuple):
     """The person or program at the remote end of a socket."""
 
     place: str = ""
-    """Network address, shown to other pages; "" for this machine."""
-    role: Role = "drive"
+    """Network address."""
     who: str = ""
-    """Browser, program or address by which the sockets of one client are counted and limited; ""
-    for no limit."""
+    """Identifier or address by which the sockets of one client are counted and limited; "" for no
+    limit."""
     is_known: bool = False
-    """Whether the visitor has a key; if false, `who` is an address."""
+    """Whether the visitor has signed in; if false, `who` is an address."""
+    identity: Identity = NOBODY
+    is_local: bool = False
+    """Whether the visitor is the local user."""
+    rights: PeerRights = FixedRights()

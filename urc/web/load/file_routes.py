@@ -9,11 +9,11 @@ from pathlib import Path
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.routing import Route
 
 from urc.web import words
 from urc.web.load.assets import STATIC, Assets, folder_assets, script
 from urc.web.load.files import tile
+from urc.web.serve.rights import ANYONE, SIGNED_IN, ProtectedRoute
 
 __all__ = ["FileRoutes"]
 
@@ -36,17 +36,17 @@ class FileRoutes:
         self._tiles = tiles
         self._widgets = widgets
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes, which must follow the routes of the widget pages."""
         return [
-            Route("/favicon.ico", self._favicon),
-            Route("/app.webmanifest", self._manifest),
-            Route("/sw.js", self._worker),
-            Route("/words/{tag}.js", self._words),
-            Route("/static/{file:path}", self._static_file),
-            Route("/vendor/{file:path}", self._vendor_file),
-            Route("/widgets/{file:path}", self._widget_file),
-            Route("/tiles/{z:int}/{x:int}/{y:int}.{kind}", self._tile),
+            ProtectedRoute("/favicon.ico", self._favicon, ANYONE),
+            ProtectedRoute("/app.webmanifest", self._manifest, ANYONE),
+            ProtectedRoute("/sw.js", self._worker, ANYONE),
+            ProtectedRoute("/words/{tag}.js", self._words, ANYONE),
+            ProtectedRoute("/static/{file:path}", self._static_file, ANYONE),
+            ProtectedRoute("/vendor/{file:path}", self._vendor_file, ANYONE),
+            ProtectedRoute("/widgets/{file:path}", self._widget_file, SIGNED_IN),
+            ProtectedRoute("/tiles/{z:int}/{x:int}/{y:int}.{kind}", self._tile, SIGNED_IN),
         ]
 
     def has_widget(self, name: str) -> bool:

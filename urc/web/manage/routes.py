@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 import msgspec
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
-from starlette.routing import Route
 
 from urc.packages.names import FOLDERS, PackageError, PackageRequirement, parse_requirement
 from urc.problems import UrcError
@@ -33,6 +32,8 @@ from urc.web.manage.wire import (
     ResultLine,
     Url,
 )
+from urc.web.serve.rights import MAINTAIN_SERVER, SIGNED_IN, ProtectedRoute
+from urc.web.serve.visitor import visitor_of
 from urc.web.show.menu import Nav, NavigationLinks
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
@@ -109,8 +110,6 @@ _KINDS: Final = tuple(FOLDERS.values())
 _T = TypeVar("_T")
 _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 
-ONLY_HERE: Final = "this needs the key in the address printed by URC, or the token of --manage"
-
 
 class ApiError(Exception):
     """An error response: a status and one line of text."""
@@ -163,31 +162,20 @@ def _api(handler: _Handler) -> _Handler:
 class ManageRoutes:
     """The routes of a dashboard's manager pages."""
 
-    def __init__(
-        self,
-        manager: Manager,
-        ways: NavigationLinks,
-        is_here: Callable[[HTTPConnection], bool],
-        may_manage: Callable[[HTTPConnection], bool],
-    ) -> None:
+    def __init__(self, manager: Manager, ways: NavigationLinks) -> None:
         """Prepare.
 
         Args:
             manager: the operations.
             ways: navigation links of this server.
-            is_here: function that returns whether a request has the start key.
-            may_manage: function that returns whether a request may change packages and settings.
         """
         self._manager = manager
         self._ways = ways
-        self._is_here = is_here
-        self.may_manage = may_manage
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes of the pages and of their API requests."""
         posts = {
             "repositories": self.connect,
-            "repositories/ask": self.refresh,
             "repositories/remove": self.disconnect,
             "packages/install": self.install,
             "packages/add": self.add,
@@ -199,17 +187,16 @@ class ManageRoutes:
             "job/cancel": self.cancel,
         }
         return [
-            Route("/drivers", self.page),
-            Route("/interfaces", self.page),
-            Route("/widgets/installed", self.page),
-            Route("/api/v1/packages", self.cache),
-            *(Route(f"/api/v1/{path}", one, methods=["POST"]) for path, one in posts.items()),
+            ProtectedRoute("/drivers", self.page, SIGNED_IN),
+            ProtectedRoute("/interfaces", self.page, SIGNED_IN),
+            ProtectedRoute("/widgets/installed", self.page, SIGNED_IN),
+            ProtectedRoute("/api/v1/packages", self.cache, SIGNED_IN),
+            ProtectedRoute("/api/v1/repositories/ask", self.refresh, SIGNED_IN, methods=["POST"]),
+            *(
+                ProtectedRoute(f"/api/v1/{path}", one, MAINTAIN_SERVER, methods=["POST"])
+                for path, one in posts.items()
+            ),
         ]
-
-    def check(self, connection: HTTPConnection) -> None:
-        """Raise `ApiError` if the visitor may not change packages and settings."""
-        if not self.may_manage(connection):
-            raise ApiError(403, ONLY_HERE)
 
     async def page(self, request: Request) -> Response:
         """Show a manager."""
@@ -218,8 +205,8 @@ class ManageRoutes:
             request.state.nonce,
             which,
             self._ways,
-            may_manage=self.may_manage(request),
-            may_name_paths=self._is_here(request),
+            may_manage=_may_manage(request),
+            may_name_paths=visitor_of(request).is_local,
             is_shown=self._manager.factory.robot_options.shows_installed,
         )
         return HTMLResponse(html, headers=_NO_STORE)
@@ -233,7 +220,7 @@ class ManageRoutes:
             self._manager.cache,
             query.get("words", "")[:200],
             kinds,
-            may_manage=self.may_manage(request),
+            may_manage=_may_manage(request),
         )
         return answer(cache)
 
@@ -244,13 +231,12 @@ class ManageRoutes:
         Any visitor may start a refresh, at most once per `FRESH_S` seconds.
         """
         said = await body_of(request, RefreshRequest)
-        self._manager.catalogue.refresh(force=said.force and self.may_manage(request))
+        self._manager.catalogue.refresh(force=said.force and _may_manage(request))
         return answer(ResultLine(t("asking the repositories")), 202)
 
     @_api
     async def connect(self, request: Request) -> Response:
         """Add a repository if it responds."""
-        self.check(request)
         said = await body_of(request, Url)
         text = said.url.strip()
         if "://" not in text:
@@ -261,7 +247,6 @@ class ManageRoutes:
     @_api
     async def disconnect(self, request: Request) -> Response:
         """Remove a repository; the packages installed from this repository stay."""
-        self.check(request)
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
         return answer(ResultLine(t("forgotten; what is installed stays")))
@@ -269,21 +254,18 @@ class ManageRoutes:
     @_api
     async def install(self, request: Request) -> Response:
         """Start a job that downloads a package given by name, and lists its permissions."""
-        self.check(request)
         said = await body_of(request, InstallRequest)
         return self._begun(parse_requirement(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
         """Start a job for a package given by its path in a repository or on this machine."""
-        self.check(request)
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
     @_api
     async def upload(self, request: Request) -> Response:
         """Start a job for the uploaded package, bundle or interface in the request body."""
-        self.check(request)
         if request.headers.get("content-type") != "application/octet-stream":
             raise ApiError(415, "expected a body of type application/octet-stream")
         name = request.query_params.get("name", "")[:200]
@@ -296,14 +278,12 @@ class ManageRoutes:
     @_api
     async def update(self, request: Request) -> Response:
         """Start the update of a package: download the newest version, and list the changes."""
-        self.check(request)
         said = await body_of(request, InstallRequest)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
 
     @_api
     async def back(self, request: Request) -> Response:
         """Restore the version of a package before its last update."""
-        self.check(request)
         said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
         return answer(RemovedPackages((), t("{name} is back", name=old)))
@@ -311,7 +291,6 @@ class ManageRoutes:
     @_api
     async def remove(self, request: Request) -> Response:
         """Remove a package; without ``yes``, only list the packages that would be removed."""
-        self.check(request)
         said = await body_of(request, InstallRequest)
         if not said.yes:
             required = parse_requirement(said.package)
@@ -327,7 +306,6 @@ class ManageRoutes:
     @_api
     async def agree(self, request: Request) -> Response:
         """Install the planned package."""
-        self.check(request)
         said = await body_of(request, JobDecision)
         job = await self._manager.agree(
             said.number, takes_risks=said.takes_risks, unsigned=said.unsigned
@@ -337,7 +315,6 @@ class ManageRoutes:
     @_api
     async def cancel(self, request: Request) -> Response:
         """Cancel the job before it changes anything."""
-        self.check(request)
         said = await body_of(request, JobDecision)
         return answer(self._manager.jobs.cancel(said.number).news())
 
@@ -353,7 +330,7 @@ class ManageRoutes:
                 return parse_requirement(inside)
             except PackageError:
                 pass  # a folder of this machine may have that name
-        if not self._is_here(request):
+        if not visitor_of(request).is_local:
             raise ApiError(
                 403, "a path on this machine needs the key in the address that URC printed"
             )
@@ -364,3 +341,7 @@ class ManageRoutes:
                 " nor a full path on this machine"
             )
         return place
+
+
+def _may_manage(request: Request) -> bool:
+    return visitor_of(request).may(MAINTAIN_SERVER)

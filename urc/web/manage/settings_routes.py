@@ -13,7 +13,6 @@ import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
-from starlette.routing import Route
 
 from urc.model.profile import Profile
 from urc.model.values import Value
@@ -28,6 +27,8 @@ from urc.web.manage.manager import Manager
 from urc.web.manage.routes import ApiError, ManageRoutes, answer, body_of, told
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
+from urc.web.serve.rights import MAINTAIN, WATCH, ProtectedRoute
+from urc.web.serve.visitor import visitor_of
 from urc.web.show.cells import spoken
 from urc.web.show.menu import NavigationLinks
 from urc.web.words import t
@@ -55,11 +56,11 @@ class SettingsRoutes:
         self._ways = ways
         self._trying: set[str] = set()
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes of the settings page and of its form."""
         return [
-            Route("/robots/{name}/settings", self.page),
-            Route("/api/v1/robots/{name}/settings", self.save, methods=["POST"]),
+            ProtectedRoute("/robots/{name}/settings", self.page, WATCH),
+            ProtectedRoute("/api/v1/robots/{name}/settings", self.save, MAINTAIN, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
@@ -94,7 +95,7 @@ class SettingsRoutes:
             ways=self._ways,
             driver=str(lock) if lock is not None else profile.file,
             versions=[one.version for one in reversed(locks)],
-            may_manage=self._manage.may_manage(request),
+            may_manage=visitor_of(request).may(MAINTAIN, name),
             fault=fault,
         )
 
@@ -106,7 +107,6 @@ class SettingsRoutes:
         """Test and store the entered settings."""
         name = request.path_params["name"]
         try:
-            self._manage.check(request)
             said = await body_of(request, SettingsAsked)
             if name in self._trying:
                 raise Busy(f"the settings of {name} are already being tested")

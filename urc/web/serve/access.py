@@ -1,73 +1,82 @@
-"""Identity of visitors. The proof is a secret that changes at each start, never an address.
+"""Access over HTTP: the identity of each request, from its cookie or its token, never its address.
 
-Layer 5. Pure. The address printed by URC contains the start key. A browser sends the key once, and
-gets a session in a cookie that scripts cannot read. A program sends the key with each request. Keys
-and sessions expire when the server stops.
+Layer 5. The address printed by URC contains the start key. A browser sends the key once, and gets a
+sign-in in a cookie that scripts cannot read. Signed-in people and paired devices have a second
+cookie, which is valid after a restart. A program sends its token with each request.
 """
 
+import asyncio
 import secrets
-from collections.abc import Iterable, Iterator
-from hmac import compare_digest
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Final
 from urllib.parse import quote
 
-__all__ = ["PARAMETER", "UNKNOWN_VISITOR", "Access", "Standing", "Visitor"]
+from urc.access.control import LOCAL_USER, AccessControl
+from urc.access.directory import NOBODY, Identity
+from urc.model.role import Role
+from urc.web.serve.visitor import Visitor
 
-PARAMETER = "key"
+__all__ = ["PARAMETER", "Access"]
+
+PARAMETER: Final = "key"
 """Name of the query parameter that carries the start key."""
-PREFIX = "urc-start-"
-SESSIONS = 1000
-"""Maximum number of known browsers; beyond this number, the oldest browser is forgotten."""
-CODES = 16
-OLD_COOKIES = 8
+START: Final = "urc-start-"
+"""Start of the name of the cookie of the local user."""
+SIGN_IN: Final = "urc-sign-in-"
+"""Start of the name of the cookie of people, devices and guests."""
+SECURE: Final = "__Host-"
+"""Start of the names of all cookies over TLS (RFC 6265bis, 4.1.3.2)."""
+OLD_COOKIES: Final = 8
 """Maximum number of cookies from earlier starts in one browser; beyond this number, all such
 cookies are deleted."""
-
-Standing = Literal["here", "manager", "stranger"]
-"""Rights of a visitor: ``here`` has the start key, ``manager`` the token of ``--manage``,
-``stranger`` neither."""
+COOKIE_S: Final = 400 * 24 * 3600
+"""Lifetime of the cookie of a sign-in, in seconds; the server decides when the sign-in ends."""
+RECHECK_S: Final = 1.0
+"""Longest time between two looks of a socket at its rights, in seconds."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
-class Visitor(NamedTuple):
-    """Identity of a visitor."""
-
-    standing: Standing = "stranger"
-    name: str = ""
-    """Identifier of the browser or program; "" for an unknown visitor. No secret."""
-    is_program: bool = False
-    """Whether the request carries the key; a page of another site cannot send such a request."""
-
-
-UNKNOWN_VISITOR = Visitor()
-
-
 class Access:
-    """The keys of one start of the server, and the browsers that these keys have admitted."""
+    """The identities of one server's requests, and the sockets that depend on their rights."""
 
     def __init__(
-        self, *, is_open: bool = False, key: str = "", instance: str = "", token: str = ""
+        self,
+        control: AccessControl | None = None,
+        *,
+        anonymous: Role | None = None,
+        key: str = "",
+        instance: str = "",
     ) -> None:
-        """Make the key.
+        """Prepare.
 
         Args:
-            is_open: whether unknown visitors may watch and drive; if false, they may only press
-                STOP.
-            key: the start key; "" to generate a key.
+            control: identities and rights; None for the local user alone.
+            anonymous: role of visitors without a sign-in; None: they may only press STOP.
+            key: the start key of a server without `control`; "" to generate a key.
             instance: identifier of this start in the cookie's name; "" to generate an identifier.
-            token: the secret of managers; "" for no managers.
         """
-        self.is_open = is_open
-        self.key = key or secrets.token_urlsafe(24)
+        self.control = control or AccessControl(key=key)
+        self.anonymous = anonymous
         self.instance = instance or secrets.token_hex(4)
-        self.cookie = PREFIX + self.instance
+        self.cookie = START + self.instance
+        store = self.control.store
+        self.sign_in_cookie = SIGN_IN + (store.instance() if store else self.instance)
+        """Name of the cookie of people, devices and guests, without the prefix for TLS."""
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
         """Secret path prefix of code for frames; needed because a frame has no origin and therefore
         sends no cookies."""
-        self._token = token
-        self._sessions: dict[str, Visitor] = {}
-        self._codes: dict[str, None] = {}
-        self._count = 0
+        self.tags_of: Callable[[str], Collection[str]] = _untagged
+        """Function that returns the tags of a robot."""
+        self._dependents: set[Callable[[], None]] = set()
+        self.control.on_change.append(self.recheck)
+
+    # Addresses
+
+    @property
+    def key(self) -> str:
+        """The start key."""
+        return self.control.key
 
     def address(self, url: str) -> str:
         """Return `url` with the start key; `url` must not have a query."""
@@ -78,45 +87,9 @@ class Access:
 
         The address may become visible to others, for example in the command line of a browser.
         """
-        code = secrets.token_urlsafe(24)
-        self._codes[code] = None
-        while len(self._codes) > CODES:
-            self._codes.pop(next(iter(self._codes)))
-        return f"{url}?{PARAMETER}={code}"
+        return f"{url}?{PARAMETER}={self.control.code()}"
 
-    def address_of_managers(self, url: str) -> str:
-        """Return the address for remote managers; "" without a manager token."""
-        return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
-
-    def admit(self, word: str) -> str | None:
-        """Return a new session for a browser that has sent the key `word`; None for a wrong key."""
-        standing = self._standing(word)
-        if standing is None and word in self._codes:
-            del self._codes[word]
-            standing = "here"
-        if standing is None:
-            return None
-        self._count += 1
-        session = secrets.token_urlsafe(24)
-        self._sessions[session] = Visitor(standing, f"browser {self._count}")
-        while len(self._sessions) > SESSIONS:
-            self._sessions.pop(next(iter(self._sessions)))
-        return session
-
-    def cookies(self, session: str, headers: _Headers, *, is_secure: bool) -> list[str]:
-        """Return the ``Set-Cookie`` headers that store a session in the browser.
-
-        Args:
-            session: a result of `admit`.
-            headers: headers of the request.
-            is_secure: whether the request came over TLS.
-        """
-        secure = "; Secure" if is_secure else ""
-        kept = [f"{self.cookie}={session}; Path=/; HttpOnly; SameSite=Strict{secure}"]
-        old = {name for name, _ in _cookies(headers) if name.startswith(PREFIX)} - {self.cookie}
-        if len(old) > OLD_COOKIES:
-            kept += (f"{name}=; Path=/; Max-Age=0; HttpOnly; SameSite=Strict" for name in old)
-        return kept
+    # Identities
 
     def visitor(self, headers: _Headers) -> Visitor:
         """Return the visitor of a request from its headers, with names in lower case."""
@@ -124,23 +97,119 @@ class Access:
         for name, value in pairs:
             scheme, _, word = value.decode("latin-1").partition(" ")
             if name == b"authorization" and scheme.lower() == "bearer":
-                standing = self._standing(word.strip())
-                return (
-                    Visitor(standing, f"program {standing}", True) if standing else UNKNOWN_VISITOR
-                )
-        for cookie, session in _cookies(pairs):
-            if cookie == self.cookie and session in self._sessions:
-                return self._sessions[session]
-        return UNKNOWN_VISITOR
+                who = self.control.identify(word.strip())
+                is_token = who.way == "token"  # a cookie's secret is no token
+                return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=is_token)
+        # Programs on other ports of a machine may set cookies of the same name: all are tried.
+        known = list(_cookies(pairs))
+        for cookie in (self.cookie, self.sign_in_cookie):
+            for stored, secret in known:
+                if stored.removeprefix(SECURE) == cookie:
+                    who = self.control.identify(secret)
+                    if who != NOBODY and who.way != "token":
+                        return Visitor(self, self._seen(who))
+        return Visitor(self)
 
-    def _standing(self, word: str) -> Standing | None:
-        if _is_same(word, self.key):
-            return "here"
-        return "manager" if self._token and _is_same(word, self._token) else None
+    def _seen(self, who: Identity) -> Identity:
+        if who != NOBODY and not self._is_own(who):
+            self.control.used(who.sign_in)
+        return who
+
+    def admit(self, word: str, *, place: str = "", agent: str = "") -> str | None:
+        """Return the secret of a new sign-in of the local user for the start key or a code."""
+        return self.control.admit(word, place=place, agent=agent)
+
+    def cookies(
+        self, secret: str, headers: _Headers, *, is_secure: bool, is_kept: bool = False
+    ) -> list[str]:
+        """Return the ``Set-Cookie`` headers that store a sign-in in the browser.
+
+        Args:
+            secret: the secret of the sign-in.
+            headers: headers of the request.
+            is_secure: whether the request came over TLS.
+            is_kept: whether the sign-in remains valid after a restart; it replaces the cookie of
+                the local user.
+        """
+        how = _attributes(is_secure=is_secure)
+        before = SECURE if is_secure else ""
+        known = {name for name, _ in _cookies(headers)}
+        if is_kept:
+            kept = [f"{before}{self.sign_in_cookie}={secret}; Max-Age={COOKIE_S}; {how}"]
+            return kept + _deleted(known & {self.cookie, SECURE + self.cookie})
+        kept = [f"{before}{self.cookie}={secret}; {how}"]
+        old = {one for one in known if one.removeprefix(SECURE).startswith(START)}
+        old -= {self.cookie, SECURE + self.cookie}
+        return kept + (_deleted(old) if len(old) > OLD_COOKIES else [])
+
+    def forgotten(self, headers: _Headers) -> list[str]:
+        """Return the ``Set-Cookie`` headers that delete the sign-ins of a browser."""
+        ours = {self.cookie, self.sign_in_cookie}
+        return _deleted({one for one, _ in _cookies(headers) if one.removeprefix(SECURE) in ours})
+
+    # Rights
+
+    def role(self, who: Identity, robot: str = "") -> Role | None:
+        """Return the present role of `who` at a robot; "" asks for the whole server."""
+        tags = self.tags_of(robot) if robot else ()
+        return self.control.role(who, robot, tags) or self.anonymous
+
+    def best_role(self, who: Identity) -> Role | None:
+        """Return the highest present role of `who` at any robot."""
+        return self.control.best_role(who) or self.anonymous
+
+    def may_give(self, who: Identity, command: str) -> bool:
+        """Return whether the scope of a token contains a command."""
+        return self.control.directory.may_give(who, command)
+
+    def is_local(self, who: Identity) -> bool:
+        """Return whether `who` is the local user, with a sign-in that has not ended."""
+        return self._is_own(who) and self.control.role(who) is not None
+
+    def _is_own(self, who: Identity) -> bool:
+        return who.principal == LOCAL_USER.id
+
+    # Sockets
+
+    async def run(self) -> None:
+        """Follow changes by other processes and sign-ins that end by themselves, until cancelled.
+
+        Even without a change, all sockets look at their rights once a second.
+        """
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self.control.watch())
+            while True:
+                await asyncio.sleep(RECHECK_S)
+                self.recheck()
+
+    @contextmanager
+    def followed(self, recheck: Callable[[], None]) -> Iterator[None]:
+        """Call `recheck` after each change of rights while the context is open."""
+        self._dependents.add(recheck)
+        try:
+            yield
+        finally:
+            self._dependents.discard(recheck)
+
+    def recheck(self) -> None:
+        """Let all sockets and streams look at their rights again."""
+        for recheck in tuple(self._dependents):
+            recheck()
 
 
-def _is_same(said: str, wanted: str) -> bool:
-    return compare_digest(said.encode(), wanted.encode())
+def _attributes(*, is_secure: bool) -> str:
+    return "Path=/; HttpOnly; SameSite=Strict" + ("; Secure" if is_secure else "")
+
+
+def _deleted(names: Iterable[str]) -> list[str]:
+    return [
+        f"{name}=; Max-Age=0; {_attributes(is_secure=name.startswith(SECURE))}"
+        for name in sorted(names)
+    ]
+
+
+def _untagged(_: str) -> Collection[str]:
+    return ()
 
 
 def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:

@@ -1,7 +1,7 @@
 """Limits on the concurrent requests of one visitor, so that other visitors can still connect.
 
-Layer 5. Pure. Each visitor with a key has a separate count; unknown visitors are counted by
-address. STOP requests are not counted, because they are always accepted.
+Layer 5. Pure. Each person, device and program has a separate count; unknown visitors are
+counted by address. STOP requests are not counted, because they are always accepted.
 """
 
 import re
@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from urc.web.serve.access import Visitor
+from urc.web.serve.visitor import Visitor
 
 __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
@@ -18,8 +18,8 @@ PLACES = 32
 sockets and six requests. The limit therefore permits several pages, and a few people behind one
 address."""
 KNOWN_PLACES = 256
-"""Maximum number of concurrent requests and sockets of a known browser or program, which may watch
-many robots."""
+"""Maximum number of concurrent requests and sockets of a known person, device or program, which may
+watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 
@@ -42,9 +42,8 @@ class ConnectionQuota:
 
         `address` identifies an unknown visitor.
         """
-        is_known = visitor.standing != "stranger"
-        who = f"{visitor.standing} {visitor.name}" if is_known else f"at {address}"
-        if self._taken[who] >= (KNOWN_PLACES if is_known else PLACES):
+        who = visitor.client or f"at {address}"
+        if self._taken[who] >= (KNOWN_PLACES if visitor.is_known else PLACES):
             yield False
             return
         self._taken[who] += 1

@@ -236,7 +236,7 @@ class Policy:
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
             if not origins and scope["state"]["visitor"].is_program:
-                pass  # a page of another site cannot send the key
+                pass  # a page of another site cannot send a token
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")

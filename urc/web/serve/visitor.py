@@ -1,45 +1,153 @@
-"""Rights of a visitor. The start key adds rights, and a page may choose only to watch.
+"""Visitors: the identity of each request, and its present rights.
 
 Layer 5. Pure.
 """
 
 from ipaddress import ip_address
+from typing import Protocol
 
 from starlette.requests import HTTPConnection
 
-from urc.web.page_socket import SocketPeer
-from urc.web.serve.access import UNKNOWN_VISITOR, Visitor
+from urc.access.directory import NOBODY, Identity
+from urc.model.role import Role, includes
+from urc.web.feed.client_socket import SocketPeer
+from urc.web.serve.rights import Right
 
-__all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
+__all__ = ["Visitor", "VisitorRights", "peer_of", "stopper_of", "visitor_of"]
+
+
+class VisitorRights(Protocol):
+    """The part of `urc.web.serve.access.Access` that visitors use."""
+
+    def role(self, who: Identity, robot: str = "") -> Role | None:
+        """Return the present role of `who` at a robot; "" asks for the whole server."""
+
+    def best_role(self, who: Identity) -> Role | None:
+        """Return the highest present role of `who` at any robot."""
+
+    def may_give(self, who: Identity, command: str) -> bool:
+        """Return whether the scope of a token contains a command."""
+
+    def is_local(self, who: Identity) -> bool:
+        """Return whether `who` is the local user, with a sign-in that has not ended."""
+
+
+class Visitor:
+    """The sender of a request."""
+
+    __slots__ = ("_rights", "identity", "is_program")
+
+    def __init__(
+        self, rights: VisitorRights, identity: Identity = NOBODY, *, is_program: bool = False
+    ) -> None:
+        """Keep the identity.
+
+        Args:
+            rights: source of the present rights.
+            identity: the proven identity; `NOBODY` for an unknown visitor.
+            is_program: whether the request carries a token; a page of another site cannot send
+                such a request.
+        """
+        self._rights = rights
+        self.identity = identity
+        self.is_program = is_program
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the visitor has signed in, or has a token."""
+        return self.identity != NOBODY
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the visitor is the local user now."""
+        return self._rights.is_local(self.identity)
+
+    @property
+    def client(self) -> str:
+        """Identifier by which the visitor's requests are counted; "" for an unknown visitor.
+
+        The browsers of the local user are counted one by one, because several people may use the
+        start key.
+        """
+        who = self.identity
+        return who.sign_in if self.is_local else who.principal
+
+    def role(self, robot: str = "") -> Role | None:
+        """Return the present role at a robot; "" asks for the whole server."""
+        return self._rights.role(self.identity, robot)
+
+    def best_role(self) -> Role | None:
+        """Return the highest present role at any robot."""
+        return self._rights.best_role(self.identity)
+
+    def may_give(self, command: str) -> bool:
+        """Return whether the visitor's token permits a command."""
+        return self._rights.may_give(self.identity, command)
+
+    def may(self, right: Right, robot: str = "") -> bool:
+        """Return whether the visitor has a right now, at `robot` if the right is for one robot."""
+        if right.role is None:
+            return True
+        if right.is_local:
+            return self.is_local
+        if right.scope == "anywhere":
+            return includes(self.best_role(), right.role)
+        return includes(self.role(robot if right.scope == "robot" else ""), right.role)
+
+
+class _RobotRights:
+    """The present rights of a visitor at one robot; see `urc.web.feed.client_socket.PeerRights`."""
+
+    def __init__(self, visitor: Visitor, robot: str, *, only_watches: bool) -> None:
+        self._visitor = visitor
+        self._robot = robot
+        self._only_watches = only_watches
+
+    def role(self) -> Role | None:
+        """Return the present role."""
+        role = self._visitor.role(self._robot)
+        return "watch" if self._only_watches and role is not None else role
+
+    def may_give(self, command: str) -> bool:
+        """Return whether the visitor's token permits a command."""
+        return self._visitor.may_give(command)
+
+
+def stopper_of(connection: HTTPConnection) -> str:
+    """Return the name of a visitor who presses STOP, as it is shown to other people."""
+    visitor = visitor_of(connection)
+    if visitor.is_known and not visitor.is_local:
+        return visitor.identity.name
+    host = connection.client.host if connection.client else ""
+    is_near = visitor.is_local and _is_loopback(host)
+    return "a screen of this machine" if is_near or not host else host
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:
     """Return the visitor that the page policy has identified for a request."""
-    found: Visitor = getattr(connection.state, "visitor", UNKNOWN_VISITOR)
+    found: Visitor = connection.state.visitor
     return found
 
 
-def guest_of(connection: HTTPConnection) -> SocketPeer:
-    """Return the visitor's identity as other pages of the robot see it."""
-    host = connection.client.host if connection.client else ""
-    has_key = is_here(connection)
-    place = "" if has_key and _is_loopback(host) else host
+def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = False) -> SocketPeer:
+    """Return the visitor of a robot's socket, with its present rights at the robot.
+
+    Args:
+        connection: the handshake.
+        robot: name of the robot.
+        only_watches: whether the page gives no commands, as a page with ``?watch``.
+    """
     visitor = visitor_of(connection)
-    is_known = visitor.standing != "stranger"
-    who = f"{visitor.standing} {visitor.name}" if is_known else f"at {host}"
-    if "watch" in connection.query_params:
-        return SocketPeer(place, "watch", who, is_known)
-    return SocketPeer(place, "administer" if has_key else "drive", who, is_known)
-
-
-def is_here(connection: HTTPConnection) -> bool:
-    """Return whether the visitor has the start key, regardless of the visitor's address."""
-    return visitor_of(connection).standing == "here"
-
-
-def may_manage(connection: HTTPConnection) -> bool:
-    """Return whether the visitor may install packages and change settings."""
-    return visitor_of(connection).standing in ("here", "manager")
+    host = connection.client.host if connection.client else ""
+    only_watches = only_watches or "watch" in connection.query_params
+    return SocketPeer(
+        place="" if visitor.is_local and _is_loopback(host) else host,
+        who=visitor.client or f"at {host}",
+        is_known=visitor.is_known,
+        identity=visitor.identity,
+        is_local=visitor.is_local,
+        rights=_RobotRights(visitor, robot, only_watches=only_watches),
+    )
 
 
 def _is_loopback(host: str) -> bool:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
 
 from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Reading, Signal
 from urc.web.fleet.robots import RobotService
+from urc.web.serve.rights import WATCH, ProtectedRoute
 from urc.web.show.cells import spoken
 from urc.web.words import t
 
@@ -36,9 +36,9 @@ class Cards:
     def __init__(self, stations: Callable[[], Mapping[str, RobotService]]) -> None:
         self._stations = stations
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the route for the content of cards."""
-        return [Route("/robots/{name}/card", self.card)]
+        return [ProtectedRoute("/robots/{name}/card", self.card, WATCH)]
 
     async def card(self, request: Request) -> Response:
         """Return an image, or values as JSON ``[[title, text], …]``; status 204 without data."""

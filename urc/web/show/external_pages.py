@@ -16,13 +16,13 @@ from markupsafe import Markup
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
-from starlette.routing import Route
 
 from urc.model.profile import Profile
 from urc.web import words
 from urc.web.fleet.robots import Robot
 from urc.web.load.files import page_key, robot_file, uses_of
 from urc.web.serve.policy import is_origin_ours, parse_host
+from urc.web.serve.rights import WATCH, ProtectedRoute
 from urc.web.show.pages import render
 
 __all__ = ["FramedPage", "ExternalPages", "framed_page"]
@@ -62,11 +62,11 @@ class ExternalPages:
     def __init__(self, robots: Callable[[], Mapping[str, Robot]]) -> None:
         self._robots = robots
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes of files and third-party pages."""
         return [
-            Route("/robots/{name}/files/{file:path}", self._file),
-            Route("/robots/{name}/framed/{page}", self._page),
+            ProtectedRoute("/robots/{name}/files/{file:path}", self._file, WATCH),
+            ProtectedRoute("/robots/{name}/framed/{page}", self._page, WATCH),
         ]
 
     async def _file(self, request: Request) -> Response:

@@ -16,7 +16,6 @@ from urllib.parse import quote
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Route
 
 from urc.config.parse.widget import WidgetFolder
 from urc.model.profile import Profile
@@ -27,6 +26,7 @@ from urc.runtime.widget_registry import widget_folder_of
 from urc.shipped import shipped
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.widget_trust import WidgetTrust
+from urc.web.serve.rights import SIGNED_IN, ProtectedRoute
 from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.demos import WidgetState, demo_states
 from urc.web.show.menu import Nav, NavigationLinks
@@ -211,14 +211,14 @@ class Gallery:
         self.assets = Assets()
         """Files of the shown widgets, including widgets that no robot uses."""
 
-    def routes(self) -> list[Route]:
+    def routes(self) -> list[ProtectedRoute]:
         """Return the routes of the gallery, which must precede the route of the widget files."""
         return [
-            Route("/widgets", self.index),
-            Route("/widgets/", self.index),
-            Route("/widgets/{names}/", self.demo),
-            Route("/widgets/{names}", with_slash),
-            Route("/widgets/{names}/stamp", self.stamp),
+            ProtectedRoute("/widgets", self.index, SIGNED_IN),
+            ProtectedRoute("/widgets/", self.index, SIGNED_IN),
+            ProtectedRoute("/widgets/{names}/", self.demo, SIGNED_IN),
+            ProtectedRoute("/widgets/{names}", with_slash, SIGNED_IN),
+            ProtectedRoute("/widgets/{names}/stamp", self.stamp, SIGNED_IN),
         ]
 
     async def index(self, request: Request) -> Response:

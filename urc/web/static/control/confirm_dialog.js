@@ -216,8 +216,7 @@ export class ConfirmDialog {
     const end = new AbortController();
     if (level === "hazardous") slide(yes, { label: t("Slide to agree"), done: agree, signal: end.signal });
     else yes.addEventListener("click", agree);
-    const note = element("small", "urc-quiet", t("Two screens of one machine count as two people: agree only if you are another person."));
-    box.append(words, no, yes, note);
+    box.append(words, no, yes);
     this.heading.append(box);
     this.others.set(n, box);
   }

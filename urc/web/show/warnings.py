@@ -1,0 +1,12 @@
+"""Warnings that every page of a server shows at its top, in red.
+
+Layer 5. The access middleware sets the warnings for each request; the base template shows them.
+"""
+
+from contextvars import ContextVar
+from typing import Final
+
+__all__ = ["current_warnings"]
+
+current_warnings: Final[ContextVar[tuple[str, ...]]] = ContextVar("urc_warnings", default=())
+"""Warnings of the current request, in the user's language."""
