@@ -38,6 +38,8 @@ VERBS: dict[str, str] = {
     "devices": "pair phones, tablets and computers, and manage them",
     "tokens": "manage the tokens of programs",
     "sign-ins": "list and end the sign-ins of browsers, devices and programs",
+    "backup": "save people, keys, settings and logs to one file",
+    "restore": "restore a backup of people, keys, settings and logs",
     "discover": "find robots on the network, serial ports and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",
