@@ -7,6 +7,7 @@ of this user.
 import asyncio
 import json
 import os
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
@@ -31,7 +32,7 @@ _MOST_BYTES = 4096
 class MotionInterlock:
     """Interlocks of a robot: the stored latch, and the servers with the same data folder."""
 
-    def __init__(self, data: Path, robot: str, clock: Callable[[], float]) -> None:
+    def __init__(self, data: Path, robot: str, clock: Callable[[], float] = time.monotonic) -> None:
         """Prepare the interlocks of one robot without reading files.
 
         Args:

@@ -17,7 +17,7 @@ from urc.runtime.held_commands import MotionBackend, is_lossy
 from urc.runtime.motion_controller import MotionController
 from urc.runtime.session import CommandFailed, Session
 
-__all__ = ["LONGEST_HOLD_S", "hold"]
+__all__ = ["LONGEST_HOLD_S", "hold", "stop_is_out", "until_ready"]
 
 LONGEST_HOLD_S: Final = 60.0
 """Maximum duration of a scripted hold, in seconds; longer motion requires an operator at a
@@ -53,7 +53,7 @@ async def hold(
     backend = session.backend
     if backend is None:
         raise CommandFailed("unknown-command", f"{name} is not a held command")
-    await _until_ready(session, backend, name)
+    await until_ready(session, backend, name)
     controller = MotionController(session.profile.driver)
     controller.join(_US)
     controller.attach(session)
@@ -65,7 +65,7 @@ async def hold(
         finally:
             controller.release(_US.id, name)
         if has_moved:
-            await _stop_is_out(session, controller, backend, name)
+            await stop_is_out(session, controller, backend, name)
         if why:
             raise CommandFailed("stopped" if has_moved else "refused", why)
     finally:
@@ -77,7 +77,7 @@ def _now() -> float:
     return asyncio.get_running_loop().time()
 
 
-async def _until_ready(session: Session, backend: MotionBackend, name: str) -> None:
+async def until_ready(session: Session, backend: MotionBackend, name: str) -> None:
     """Wait until the transport is connected and its connection steps are done or failed."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
@@ -112,7 +112,7 @@ async def _ticks(
     return number > 0, ""
 
 
-async def _stop_is_out(
+async def stop_is_out(
     session: Session, controller: MotionController, backend: MotionBackend, name: str
 ) -> None:
     """Wait until the transport has accepted the stop, including repeats on a lossy transport.

@@ -23,6 +23,7 @@ from urc.protocol.sequences.sequence_control import PAUSE_S, Pull
 from urc.protocol.values.time_and_nonce import TimeAndNonce
 from urc.registry import Table
 from urc.runtime.clock import Clock, LoopClock, within
+from urc.runtime.command_failed import CommandFailed
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.held_commands import is_lossy
 from urc.runtime.hub import Hub
@@ -72,19 +73,6 @@ new = tuple.__new__
 several named tuples."""
 _GRACE_S = 2.0
 """Tolerance added to the sum of a command's declared waits, in seconds."""
-
-
-class CommandFailed(UrcError):
-    """The failure of a command.
-
-    `code` is ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full`` or
-    ``unknown-command``; `message` is for display.
-    """
-
-    def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
 
 
 def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:

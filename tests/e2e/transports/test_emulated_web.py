@@ -10,7 +10,7 @@ import pytest
 from scripts.node import node_executable
 from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
-from urc.runtime.scripting import CommandFailed, ConnectedRobot, connect, load
+from urc.client.local import CommandFailed, ConnectedRobot, connect, load
 from urc.simulator.server import serve
 
 pytestmark = [pytest.mark.anyio]

@@ -12,7 +12,7 @@ import pytest
 
 from tests.e2e.ports import free_port
 from tests.e2e.transports.programs import listens, program
-from urc.runtime.scripting import connect
+from urc.client.local import connect
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("gpsd")]
 

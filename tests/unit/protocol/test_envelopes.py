@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from urc.client.local import load
 from urc.model.payload import Envelope
 from urc.model.profile import Profile
 from urc.protocol.engine import Engine
 from urc.protocol.events import Event, Failed, Replied, Request, Samples, Send, Violation
 from urc.protocol.forms.topics import listened, matches
-from urc.runtime.scripting import load
 
 DOCUMENT = """
 urc: 1

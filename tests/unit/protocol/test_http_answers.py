@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from urc.client.local import load
 from urc.model.payload import Envelope
 from urc.protocol.engine import Engine
 from urc.protocol.events import Event, Failed, Replied, Request, Samples, Send
-from urc.runtime.scripting import load
 
 DOCUMENT = """
 urc: 1

@@ -3,8 +3,8 @@
 import pytest
 
 import urc
+from urc.client.local import ConnectedRobot, connect
 from urc.problems import UrcError
-from urc.runtime.scripting import ConnectedRobot, connect
 from urc.runtime.session import Session
 from urc.testing.clock import FakeClock, settle
 from urc.testing.profile import line_profile

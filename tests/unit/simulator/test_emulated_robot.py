@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from urc.client.local import load
 from urc.model.payload import Envelope
 from urc.model.profile import Profile, Reaction, SimulatorRule
 from urc.patterns import compile_pattern
-from urc.runtime.scripting import load
 from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 from urc.testing.profile import line_profile, text
 

@@ -1,0 +1,138 @@
+"""Readings of a robot from a hub: latest values, waits, streams and the log.
+
+Layer 5. Both openings of a robot keep a `urc.runtime.hub.Hub`: the hub of a session, or a hub that
+a server's messages fill. So both openings share this code.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+
+from urc.model.values import Reading, Sample, Signal
+from urc.problems import UrcError
+from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry
+
+__all__ = ["HubReadings"]
+
+
+class HubReadings:
+    """The reading half of `urc.client.robot.RobotInterface`."""
+
+    def __init__(self, hub: Hub) -> None:
+        """Store the hub."""
+        self.hub = hub
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """All signals, by name."""
+        return self.hub.signals
+
+    @property
+    def links(self) -> Mapping[str, LinkStatus]:
+        """State of every transport, by name."""
+        return self.hub.links
+
+    def latest(self, name: str, /) -> Sample | None:
+        """Return the newest reading of a signal, or None.
+
+        Raises:
+            UrcError: the robot has no signal of this name.
+        """
+        self._check(name)
+        return self.hub.latest(name)
+
+    def state(self, transport: str, /) -> LinkState:
+        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+
+        Raises:
+            UrcError: the robot has no transport of this name.
+        """
+        if transport not in self.hub.links:
+            known = ", ".join(self.hub.links)
+            raise UrcError(f"unknown transport {transport!r}; expected one of: {known}")
+        return self.hub.links[transport].state
+
+    async def wait_for(
+        self,
+        name: str,
+        /,
+        is_met: Callable[[Reading], bool] | None = None,
+        *,
+        timeout: float | None = None,
+    ) -> Sample:
+        """Return the first reading that meets the condition; the present reading counts.
+
+        Raises:
+            TimeoutError: the time is over.
+            UrcError: the robot has no signal of this name, or the connection has ended for good.
+        """
+        self._check(name)
+        async with asyncio.timeout(timeout):
+            with self._shown((name,)), self.hub.subscribe() as subscription:
+                while True:
+                    found = self.hub.latest(name)
+                    if found is not None and (is_met is None or is_met(found.value)):
+                        return found
+                    self._check_open()
+                    subscription.seen = self.hub.revision
+                    await subscription.changed()
+
+    async def watch(self, *names: str) -> AsyncIterator[Sample]:
+        """Yield the readings of the named signals, or of all signals, until the caller stops.
+
+        The first readings are the present ones. Only the newest reading is kept, so a slow program
+        skips readings and never falls behind.
+
+        Raises:
+            UrcError: the robot has no signal of this name, or the connection has ended for good.
+        """
+        for name in names:
+            self._check(name)
+        with self._shown(names or self.hub.names), self.hub.subscribe() as subscription:
+            while True:
+                for sample in subscription.changes():
+                    if not names or sample.signal in names:
+                        yield sample
+                self._check_open()
+                await subscription.changed()
+
+    def log(self) -> AsyncIterator[LogEntry]:
+        """Yield the lines of the robot's log that follow this call, until the caller stops.
+
+        A warning takes the place of lines that were lost, with their number.
+
+        Raises:
+            UrcError: the connection has ended for good.
+        """
+        return self._lines(self.hub.notes_count)
+
+    async def _lines(self, count: int) -> AsyncIterator[LogEntry]:
+        hub = self.hub
+        with hub.subscribe() as subscription:
+            while True:
+                new = hub.notes_count - count
+                lines = list(hub.notes)[-new:] if new else []
+                count = hub.notes_count
+                if lost := new - len(lines):
+                    text = f"{lost} lines of the log were lost, because this program is too slow"
+                    yield LogEntry(lines[0].time_s, "warning", "urc", text)
+                for line in lines:
+                    yield line
+                if hub.notes_count == count:
+                    self._check_open()
+                    subscription.seen = hub.revision
+                    await subscription.changed()
+
+    # -- for the openings
+
+    def _check_open(self) -> None:
+        """Raise `ConnectionLost` if no further reading can arrive."""
+
+    def _shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
+        """Request the images among `names` while the context is open."""
+        return nullcontext()
+
+    def _check(self, name: str) -> None:
+        if name not in self.hub.signals:
+            known = ", ".join(self.hub.signals) or "none"
+            raise UrcError(f"unknown signal {name!r}; expected one of: {known}")

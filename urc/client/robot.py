@@ -1,0 +1,155 @@
+"""The interface of a robot for Python programs, with the same meaning in every opening.
+
+Layer 5. `urc.connect` connects a robot in this process, and `urc.client.open` uses a robot of a
+server. Both return this interface, so a program changes from one to the other in one line. The test
+`tests/e2e/test_robot_interface.py` runs the same dialogues against both.
+"""
+
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import AbstractAsyncContextManager
+from typing import Protocol
+
+from urc.client.stick import VALID_S, Stick
+from urc.model.values import Reading, Sample, Signal
+from urc.problems import UrcError
+from urc.runtime.hub import LinkState, LinkStatus, LogEntry
+
+__all__ = ["AccessDenied", "ConnectionLost", "RobotInterface"]
+
+
+class ConnectionLost(UrcError):
+    """The server is unreachable, or has ended the connection for good."""
+
+    is_final = False
+    """Whether another attempt is useless."""
+
+
+class AccessDenied(ConnectionLost):
+    """The server does not accept the token, or the token has no right to this robot."""
+
+
+class RobotInterface(Protocol):
+    """A robot for Python programs. Times are in seconds, on this process's monotonic clock."""
+
+    @property
+    def name(self) -> str:
+        """Name of the robot's profile."""
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """All signals, by name."""
+
+    @property
+    def links(self) -> Mapping[str, LinkStatus]:
+        """State of every transport, by name."""
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """Names of the held commands, which `drive` accepts."""
+
+    @property
+    def operator(self) -> str:
+        """Name of the page or program that has the controls; "" for none."""
+
+    @property
+    def latched_by(self) -> str:
+        """Name of the operator who pressed STOP; "" while STOP is not latched."""
+
+    def latest(self, name: str, /) -> Sample | None:
+        """Return the newest reading of a signal, or None without a reading.
+
+        Raises:
+            UrcError: the robot has no signal of this name.
+        """
+
+    def state(self, transport: str, /) -> LinkState:
+        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+
+        Raises:
+            UrcError: the robot has no transport of this name.
+        """
+
+    async def wait_for(
+        self,
+        name: str,
+        /,
+        is_met: Callable[[Reading], bool] | None = None,
+        *,
+        timeout: float | None = None,
+    ) -> Sample:
+        """Return the first reading that meets the condition; the present reading counts.
+
+        Args:
+            name: name of the signal.
+            is_met: the condition; None for any reading.
+            timeout: longest wait, in seconds; None for no limit.
+
+        Raises:
+            TimeoutError: the time is over.
+            UrcError: the robot has no signal of this name.
+            ConnectionLost: the server has ended the connection for good.
+        """
+
+    def watch(self, *names: str) -> AsyncIterator[Sample]:
+        """Yield the readings of the named signals, or of all signals, until the caller stops.
+
+        The first readings are the present ones. Only the newest reading is kept, so a slow program
+        skips readings and never falls behind.
+
+        Raises:
+            UrcError: the robot has no signal of this name.
+            ConnectionLost: the server has ended the connection for good.
+        """
+
+    def log(self) -> AsyncIterator[LogEntry]:
+        """Yield the lines of the robot's log that follow this call, until the caller stops.
+
+        A warning takes the place of lines that were lost, with their number.
+
+        Raises:
+            ConnectionLost: the server has ended the connection for good.
+        """
+
+    async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
+        """Run a command and return the values of its reply.
+
+        The call is the confirmation of a command with ``confirm``. A two-person command waits for
+        the approval of a person at a dashboard.
+
+        Raises:
+            CommandFailed: the command failed; the exception has a `code` and a message.
+        """
+
+    def drive(
+        self, command: str = "", /, *, valid_s: float = VALID_S
+    ) -> AbstractAsyncContextManager[Stick]:
+        """Take the controls while the context is open, and return the stick of a held command.
+
+        The robot stops when the context ends, for any reason. See `Stick`.
+
+        Args:
+            command: name of a held command; "" for the only held command of the robot.
+            valid_s: time for which one call of the stick moves the robot, 0.05 to 1 second.
+
+        Raises:
+            UrcError: the robot has no such held command, or several and `command` is "".
+            MotionEnded: the controls were refused, or motion ended before the context did.
+        """
+
+    async def stop(self) -> bool:
+        """Stop the robot, and latch STOP. STOP needs no controls and is never refused.
+
+        Returns:
+            Whether all connections of the robot accepted the stop within two seconds.
+
+        Raises:
+            UrcError: the robot has no motion.
+            ConnectionLost: the server could not be reached.
+        """
+
+    async def reset(self) -> None:
+        """Reset a latched STOP; nothing moves before new input.
+
+        Raises:
+            CommandFailed: the reset was refused.
+        """

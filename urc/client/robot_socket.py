@@ -1,0 +1,218 @@
+"""The WebSocket of one robot of a server: reopened after each loss, with one writer.
+
+Layer 5. Theory of operation. `run` reopens the socket after increasing delays with jitter, so that
+many programs do not return at the same moment. Pings find a dead connection within 4 s; motion does
+not rely on them. The writer sends a message only after the kernel has accepted the previous one.
+Meanwhile, a newer tick of the same command replaces the waiting tick.
+"""
+
+import asyncio
+import random
+import ssl
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Final
+
+import msgspec
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import (
+    ConnectionClosed,
+    InvalidHandshake,
+    InvalidStatus,
+    WebSocketException,
+)
+
+from urc import __version__
+from urc.client.address import ServerAddress
+from urc.client.robot import AccessDenied, ConnectionLost
+from urc.problems import printable
+from urc.wire.server_messages import CLOSE_BAD_MESSAGES, CLOSE_NO_ROBOT, CLOSE_NOT_LET_IN
+
+__all__ = ["RobotSocket"]
+
+_FIRST_WAIT_S: Final = 0.25
+_LONGEST_WAIT_S: Final = 5.0
+_JITTER: Final = (0.8, 1.2)
+_PING_S: Final = 1.0
+_SILENT_S: Final = 3.0
+_MOST_BYTES: Final = 16 * 1024 * 1024
+"""Longest accepted message: an image."""
+_GOODBYE_S: Final = 1.0
+_FOR_GOOD: Final = (CLOSE_BAD_MESSAGES, CLOSE_NO_ROBOT, CLOSE_NOT_LET_IN)
+_DENIED: Final = (401, 403)
+_encode = msgspec.json.Encoder().encode
+
+
+class RobotSocket:
+    """The socket of one robot of a server."""
+
+    def __init__(
+        self,
+        address: ServerAddress,
+        robot: str,
+        token: str,
+        context: ssl.SSLContext | None,
+        *,
+        timeout_s: float,
+    ) -> None:
+        """Prepare the socket.
+
+        Args:
+            address: the server.
+            robot: name of the robot; "" for the only robot of the server.
+            token: token of the program; "" for none.
+            context: rules for certificates; None without encryption.
+            timeout_s: longest duration of one attempt to connect, in seconds.
+        """
+        self.address = address
+        self.take: Callable[[str | bytes], None] = _unheard
+        """Callback for each message, in order."""
+        self.lost: Callable[[str], None] = _unheard
+        """Callback for the loss of the connection, with the reason."""
+        self.is_up = False
+        """Whether the server has sent its first message on this connection; set by the owner."""
+        self._robot = robot
+        self._headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self._context = context
+        self._timeout_s = timeout_s
+        self._line: ClientConnection | None = None
+        self._outbox: deque[bytes] = deque()
+        self._ticks: dict[str, bytes] = {}
+        self._final = ""
+        self._filled = asyncio.Event()
+
+    # -- sending
+
+    def send(self, message: msgspec.Struct) -> bool:
+        """Send a message; return whether the connection was up."""
+        if self.is_up:
+            self._outbox.append(_encode(message))
+            self._filled.set()
+        return self.is_up
+
+    def offer_tick(self, command: str, message: msgspec.Struct) -> None:
+        """Send a tick as soon as possible; replace a tick of `command` that still waits."""
+        if self.is_up:
+            self._ticks[command] = _encode(message)
+            self._filled.set()
+
+    def drop_tick(self, command: str) -> None:
+        """Forget a tick of `command` that still waits."""
+        self._ticks.pop(command, None)
+
+    async def _write(self, line: ClientConnection) -> None:
+        with suppress(ConnectionClosed):
+            while True:
+                await self._filled.wait()
+                self._filled.clear()
+                while self._outbox or self._ticks:
+                    data = (
+                        self._outbox.popleft()
+                        if self._outbox
+                        else self._ticks.pop(next(iter(self._ticks)))
+                    )
+                    await line.send(data, text=True)
+
+    # -- the connection
+
+    async def run(self) -> None:
+        """Keep the connection open until cancelled.
+
+        Raises:
+            ConnectionLost: the first attempt failed, or the server ended the connection for good.
+        """
+        wait_s, was_up = _FIRST_WAIT_S, False
+        while True:
+            fault = await self._converse()
+            was_up = was_up or self.is_up
+            if self.is_up:
+                wait_s = _FIRST_WAIT_S
+            self.is_up = False
+            self._outbox.clear()
+            self._ticks.clear()
+            self.lost(str(fault))
+            if isinstance(fault, AccessDenied) or fault.is_final or not was_up:
+                raise fault
+            await asyncio.sleep(wait_s * random.uniform(*_JITTER))  # noqa: S311 - no secret
+            wait_s = min(wait_s * 2, _LONGEST_WAIT_S)
+
+    async def _converse(self) -> ConnectionLost:
+        """Connect, and pass messages on until the connection is lost; return the reason."""
+        try:
+            async with self._connected() as line:
+                self._line = line
+                writing = asyncio.create_task(self._write(line))
+                try:
+                    async for message in line:
+                        self.take(message)
+                finally:
+                    writing.cancel()
+                    self._line = None
+                return self._closed(line)
+        except (OSError, TimeoutError, WebSocketException) as error:
+            return self._explained(error)
+
+    def _connected(self) -> connect:
+        address = self.address
+        # An empty buffer before each tick keeps the newest tick first.
+        more: dict[str, Any] = {"ssl": self._context} if self._context is not None else {}
+        return connect(
+            address.socket(self._robot),
+            additional_headers=self._headers,
+            user_agent_header=f"urc/{__version__}",
+            compression=None,
+            proxy=None if address.is_loopback else True,
+            open_timeout=self._timeout_s,
+            close_timeout=_GOODBYE_S,
+            ping_interval=_PING_S,
+            ping_timeout=_SILENT_S,
+            max_size=_MOST_BYTES,
+            write_limit=0,
+            **more,
+        )
+
+    def _explained(self, error: Exception) -> ConnectionLost:
+        where = self.address.url
+        if isinstance(error, InvalidStatus):
+            status = error.response.status_code
+            if status in _DENIED:
+                return AccessDenied(f"{where} does not accept the token (HTTP {status})")
+            return ConnectionLost(f"{where} answered with HTTP {status}")
+        if isinstance(error, ssl.SSLCertVerificationError):
+            return ConnectionLost(
+                f"the certificate of {where} is not trusted: {error.verify_message}"
+            )
+        if isinstance(error, TimeoutError):
+            return ConnectionLost(f"{where} did not answer within {self._timeout_s:g} s")
+        if isinstance(error, InvalidHandshake):
+            return ConnectionLost(f"{where} is not a server of URC: {printable(str(error))}")
+        why = getattr(error, "strerror", None) or error
+        return ConnectionLost(f"cannot reach {where}: {printable(str(why))}")
+
+    def _closed(self, line: ClientConnection) -> ConnectionLost:
+        code, reason = line.close_code, printable(line.close_reason or "")
+        if code == CLOSE_NOT_LET_IN:
+            return AccessDenied(reason or "the server does not accept the token")
+        fault = ConnectionLost(self._final or reason or "the server closed the connection")
+        fault.is_final = bool(self._final) or code in _FOR_GOOD
+        return fault
+
+    def fail(self, reason: str) -> None:
+        """End the connection for good."""
+        self._final = reason
+        self.abort()
+
+    async def close(self) -> None:
+        """Close the connection; `run` must be cancelled afterwards."""
+        if self._line is not None:
+            await self._line.close()
+
+    def abort(self) -> None:
+        """Cut the connection at once, so that the server stops the robot; `run` reopens it."""
+        if self._line is not None:
+            self._line.transport.abort()
+
+
+def _unheard(_: object) -> None:
+    """Ignore an event before the owner has set its callback."""

@@ -1,0 +1,192 @@
+"""The stick of a program: sampled input of one held command, which keeps the motion contract.
+
+Layer 5. Theory of operation. A call of the stick sets the input and the time of the input. A
+sampler sends one tick every 50 ms, while the input is younger than `valid_s`. A program that hangs,
+sleeps too long, raises an exception or dies renews no input, so the robot stops. No timer sends
+ticks for a program that does not renew its input.
+
+After any end except `release` and the end of the context, the stick stays without effect. New
+motion then requires a new context, as a person must let go and press again.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Final, Protocol
+
+from urc.model.values import Reading
+from urc.problems import UrcError
+
+__all__ = [
+    "TICK_S",
+    "VALID_S",
+    "MotionEnded",
+    "MotionLine",
+    "Stick",
+    "checked_validity",
+    "sample_stick",
+]
+
+VALID_S: Final = 0.25
+"""Default time for which one call of the stick moves the robot, in seconds."""
+SHORTEST_VALID_S: Final = 0.05
+LONGEST_VALID_S: Final = 1.0
+TICK_S: Final = 0.05
+"""Interval between two ticks of unchanged input, in seconds."""
+_SOONEST_S: Final = 0.01
+"""Shortest interval between two ticks, in seconds; later input waits for its tick."""
+HELD_UP_S: Final = 0.25
+"""Gap in the sampling after which motion ends, in seconds: this process was stopped or blocked."""
+
+
+class MotionEnded(UrcError):
+    """The end of motion before its context: a stop, a refusal, a lost connection or late input."""
+
+
+class MotionLine(Protocol):
+    """The way of ticks to the robot; one for each opening of a robot."""
+
+    def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
+        """Send one tick; return the reason why motion must end, or ""."""
+
+    def release(self, command: str) -> None:
+        """Stop the command, because its stick was released."""
+
+
+class Stick:
+    """The input of one held command, valid while the context of `drive` is open.
+
+    ``stick(speed=0.5)`` moves the robot for at most `valid_s` seconds; call the stick again before
+    that time is over. Calls are cheap and may come from any thread.
+    """
+
+    def __init__(self, command: str, valid_s: float = VALID_S) -> None:
+        """Create a stick without input; programs call `drive` instead of this constructor."""
+        self.command = command
+        """Name of the held command."""
+        self.valid_s = valid_s
+        self.ended = ""
+        """Reason for the end of motion; "" while the stick works."""
+        self._input: tuple[Mapping[str, Reading], float] | None = None
+        self._changed = asyncio.Event()
+
+    def __call__(self, /, **arguments: Reading) -> None:
+        """Set the arguments of the held command; missing arguments use their defaults.
+
+        Raises:
+            MotionEnded: motion has ended; the message has the reason.
+        """
+        self.put(arguments)
+        self.wake()
+
+    async def hold(self, seconds: float, /, **arguments: Reading) -> None:
+        """Keep the same arguments for a time, while this call is awaited.
+
+        Args:
+            seconds: the duration; the robot keeps its motion for `valid_s` seconds more, unless
+                the stick is called or released.
+            arguments: as in a call of the stick.
+
+        Raises:
+            MotionEnded: motion has ended before the time was over.
+        """
+        ends_s = time.monotonic() + seconds
+        while (left_s := ends_s - time.monotonic()) > 0:
+            self(**arguments)
+            await asyncio.sleep(min(TICK_S, left_s))
+        if self.ended:
+            raise MotionEnded(self.ended)
+
+    def release(self) -> None:
+        """Stop the robot and keep the controls; the next call of the stick moves the robot again.
+
+        Raises:
+            MotionEnded: motion has ended already.
+        """
+        if self.ended:
+            raise MotionEnded(self.ended)
+        self.clear()
+        self.wake()
+
+    # -- the owner of the context
+
+    def put(self, arguments: Mapping[str, Reading]) -> None:
+        """Set the input from any thread, without waking the sampler."""
+        if self.ended:
+            raise MotionEnded(self.ended)
+        self._input = (dict(arguments), time.monotonic())
+
+    def clear(self) -> None:
+        """Remove the input from any thread, without waking the sampler."""
+        self._input = None
+
+    def wake(self) -> None:
+        """Let the sampler see the input now; call this on the event loop."""
+        self._changed.set()
+
+    def end(self, reason: str) -> None:
+        """End all motion of this stick; the first reason stays."""
+        self.ended = self.ended or reason
+        self._input = None
+        self.wake()
+
+    def sample(self) -> tuple[Mapping[str, Reading], float] | None:
+        """Return the arguments and the time of the last call; None without input."""
+        self._changed.clear()
+        return self._input
+
+    async def changed(self, timeout_s: float) -> None:
+        """Return after input that follows the last `sample`, or after `timeout_s` seconds."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(timeout_s):
+                await self._changed.wait()
+
+
+async def sample_stick(
+    stick: Stick, line: MotionLine, now: Callable[[], float] = time.monotonic
+) -> None:
+    """Send the input of `stick` as ticks until the stick ends or this task is cancelled."""
+    is_moving, sampled_s = False, now()
+    while not stick.ended:
+        at_s = now()
+        held_up_s, sampled_s = at_s - sampled_s, at_s
+        if is_moving and held_up_s > HELD_UP_S:
+            stick.end(f"this program was held up for {held_up_s * 1000:.0f} ms")
+            break
+        given = stick.sample()
+        if given is None:
+            if is_moving:
+                line.release(stick.command)
+            is_moving = False
+            await stick.changed(TICK_S)
+            continue
+        arguments, given_s = given
+        if at_s - given_s >= stick.valid_s:
+            stick.end(_late(stick))
+            break
+        is_moving = True
+        if reason := line.tick(stick.command, arguments):
+            stick.end(reason)
+            break
+        await asyncio.sleep(_SOONEST_S)
+        due_s = min(at_s + TICK_S, given_s + stick.valid_s)
+        await stick.changed(max(0.0, due_s - now()))
+    line.release(stick.command)
+
+
+def _late(stick: Stick) -> str:
+    return (
+        f"no call of the stick for {stick.valid_s * 1000:.0f} ms: call the stick more often, or"
+        " await stick.hold(SECONDS, …)"
+    )
+
+
+def checked_validity(valid_s: float) -> float:
+    """Return `valid_s`; raise `UrcError` if the time is outside its range."""
+    if not SHORTEST_VALID_S <= valid_s <= LONGEST_VALID_S:
+        raise UrcError(
+            f"valid_s: expected {SHORTEST_VALID_S:g} to {LONGEST_VALID_S:g} seconds,"
+            f" found {valid_s:g}"
+        )
+    return valid_s

@@ -1,0 +1,311 @@
+"""The same robots without ``async``: for scripts, notebooks and consoles.
+
+    from urc.client import sync
+
+    with sync.open("https://robots.lab:8080", "cart", token_file="token") as robot:
+        print(robot.wait_for("battery").value)
+        with robot.drive() as stick:
+            stick.hold(2.0, speed=0.3)
+
+Layer 5. One daemon thread runs the event loop of each robot. Every call has a time limit. Leaving
+the context, an exception or Ctrl-C releases the stick first, so the robot stops. A blocked program
+renews no input, so the robot stops as well.
+"""
+
+import asyncio
+import time
+from collections.abc import (
+    AsyncGenerator,
+    AsyncIterator,
+    Callable,
+    Iterator,
+    Mapping,
+)
+from contextlib import (
+    AbstractAsyncContextManager,
+    AbstractContextManager,
+    contextmanager,
+)
+from functools import partial
+from os import PathLike
+from typing import Any, Final, TypeVar
+
+from urc.client.loop_thread import LoopThread
+from urc.client.robot import RobotInterface
+from urc.client.stick import TICK_S, VALID_S, MotionEnded, Stick
+from urc.model.profile import Profile
+from urc.model.values import Reading, Sample, Signal, Value
+from urc.runtime.hub import LinkState, LinkStatus, LogEntry
+
+__all__ = ["CALL_S", "SyncRobot", "SyncStick", "connect", "open"]
+
+CALL_S: Final = 30.0
+"""Default time limit of one call, in seconds."""
+_Result = TypeVar("_Result")
+
+
+def connect(
+    profile: Profile | str | PathLike[str], **settings: Value
+) -> "AbstractContextManager[SyncRobot]":
+    """Connect a robot in this process while the context is open; see `urc.connect`."""
+    from urc.client import local
+
+    return _opened(lambda: local.connect(profile, **settings), CALL_S)
+
+
+def open(
+    server: str,
+    robot: str = "",
+    *,
+    token: str = "",
+    token_file: str | PathLike[str] | None = None,
+    authority: str | PathLike[str] | None = None,
+    allow_unencrypted: bool = False,
+    timeout: float = CALL_S,
+) -> "AbstractContextManager[SyncRobot]":
+    """Open a robot of a server while the context is active; see `urc.client.open`.
+
+    `timeout` is the time limit of every call, in seconds.
+    """
+    from urc.client import remote
+
+    return _opened(
+        lambda: remote.open(
+            server,
+            robot,
+            token=token,
+            token_file=token_file,
+            authority=authority,
+            allow_unencrypted=allow_unencrypted,
+            timeout=timeout,
+        ),
+        timeout,
+    )
+
+
+@contextmanager
+def _opened(
+    opening: Callable[[], AbstractAsyncContextManager[RobotInterface]], timeout_s: float
+) -> "Iterator[SyncRobot]":
+    thread = LoopThread(timeout_s)
+    try:
+        with thread.entered(opening) as robot:
+            yield SyncRobot(robot, thread)
+    finally:
+        thread.close()
+
+
+class SyncRobot:
+    """A robot without ``async``; the members of `urc.client.robot.RobotInterface`."""
+
+    def __init__(self, robot: RobotInterface, thread: LoopThread) -> None:
+        """Store the robot and its thread; programs call `open` or `connect` instead."""
+        self._robot = robot
+        self._thread = thread
+
+    @property
+    def name(self) -> str:
+        """Name of the robot's profile."""
+        return self._robot.name
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """All signals, by name."""
+        return self._robot.signals
+
+    @property
+    def links(self) -> Mapping[str, LinkStatus]:
+        """State of every transport, by name."""
+        return self._here(lambda: dict(self._robot.links))
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """Names of the held commands, which `drive` accepts."""
+        return self._robot.controls
+
+    @property
+    def operator(self) -> str:
+        """Name of the page or program that has the controls; "" for none."""
+        return self._robot.operator
+
+    @property
+    def latched_by(self) -> str:
+        """Name of the operator who pressed STOP; "" while STOP is not latched."""
+        return self._robot.latched_by
+
+    def latest(self, name: str, /) -> Sample | None:
+        """Return the newest reading of a signal, or None without a reading.
+
+        Raises:
+            UrcError: the robot has no signal of this name.
+        """
+        return self._here(lambda: self._robot.latest(name))
+
+    def state(self, transport: str, /) -> LinkState:
+        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+
+        Raises:
+            UrcError: the robot has no transport of this name.
+        """
+        return self._here(lambda: self._robot.state(transport))
+
+    def wait_for(
+        self,
+        name: str,
+        /,
+        is_met: Callable[[Reading], bool] | None = None,
+        *,
+        timeout: float | None = None,
+    ) -> Sample:
+        """Return the first reading that meets the condition; the present reading counts.
+
+        Args:
+            name: name of the signal.
+            is_met: the condition, which runs in the thread of the robot; None for any reading.
+            timeout: longest wait, in seconds; None for the time limit of every call.
+
+        Raises:
+            TimeoutError: the time is over.
+            UrcError: the robot has no signal of this name, or the connection has ended for good.
+        """
+        return self._thread.call(self._robot.wait_for(name, is_met), timeout)
+
+    def watch(self, *names: str, timeout: float | None = None) -> Iterator[Sample]:
+        """Yield the readings of the named signals, or of all signals, until the caller stops.
+
+        `timeout` is the longest wait for the next reading, in seconds; None for the time limit of
+        every call.
+
+        Raises:
+            TimeoutError: no reading arrived in time.
+            UrcError: the robot has no signal of this name, or the connection has ended for good.
+        """
+        return self._steps(self._robot.watch(*names), timeout)
+
+    def log(self, *, timeout: float | None = None) -> Iterator[LogEntry]:
+        """Yield the lines of the robot's log that follow this call, until the caller stops.
+
+        Raises:
+            TimeoutError: no line arrived in time.
+            UrcError: the connection has ended for good.
+        """
+        return self._steps(self._here(self._robot.log), timeout)
+
+    def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
+        """Run a command and return the values of its reply.
+
+        Raises:
+            CommandFailed: the command failed; the exception has a `code` and a message.
+            TimeoutError: the time limit of every call is over; the outcome is unknown.
+        """
+        return self._thread.call(self._robot.command(name, **arguments))
+
+    @contextmanager
+    def drive(self, command: str = "", /, *, valid_s: float = VALID_S) -> "Iterator[SyncStick]":
+        """Take the controls while the context is open, and return the stick of a held command.
+
+        The robot stops when the context ends, for any reason.
+
+        Raises:
+            UrcError: the robot has no such held command, or several and `command` is "".
+            MotionEnded: the controls were refused, or motion ended before the context did.
+        """
+        driving = partial(self._robot.drive, command, valid_s=valid_s)
+        with self._thread.entered(driving) as stick:
+            yield SyncStick(stick, self._thread.loop)
+
+    def stop(self) -> bool:
+        """Stop the robot, and latch STOP.
+
+        Returns:
+            Whether all connections of the robot accepted the stop within two seconds.
+
+        Raises:
+            UrcError: the robot has no motion, or the server could not be reached.
+        """
+        return self._thread.call(self._robot.stop())
+
+    def reset(self) -> None:
+        """Reset a latched STOP; nothing moves before new input.
+
+        Raises:
+            CommandFailed: the reset was refused.
+        """
+        self._thread.call(self._robot.reset())
+
+    def _here(self, read: Callable[[], _Result]) -> _Result:
+        """Return the result of `read`, called on the event loop."""
+
+        async def call() -> _Result:
+            return read()
+
+        return self._thread.call(call())
+
+    def _steps(self, found: AsyncIterator[_Result], timeout_s: float | None) -> Iterator[_Result]:
+        async def step() -> tuple[_Result, ...]:
+            async for one in found:
+                return (one,)
+            return ()
+
+        try:
+            while one := self._thread.call(step(), timeout_s):
+                yield one[0]
+        finally:
+            if isinstance(found, AsyncGenerator):
+                self._thread.call(_closed(found))
+
+
+async def _closed(found: AsyncGenerator[Any, None]) -> None:
+    await found.aclose()
+
+
+class SyncStick:
+    """The input of one held command, as `urc.client.stick.Stick`, for any thread."""
+
+    def __init__(self, stick: Stick, loop: asyncio.AbstractEventLoop) -> None:
+        """Store the stick; programs call `SyncRobot.drive` instead."""
+        self._stick = stick
+        self._loop = loop
+
+    @property
+    def command(self) -> str:
+        """Name of the held command."""
+        return self._stick.command
+
+    @property
+    def ended(self) -> str:
+        """Reason for the end of motion; "" while the stick works."""
+        return self._stick.ended
+
+    def __call__(self, /, **arguments: Reading) -> None:
+        """Set the arguments of the held command; missing arguments use their defaults.
+
+        Raises:
+            MotionEnded: motion has ended; the message has the reason.
+        """
+        self._stick.put(arguments)
+        self._loop.call_soon_threadsafe(self._stick.wake)
+
+    def hold(self, seconds: float, /, **arguments: Reading) -> None:
+        """Keep the same arguments for a time, while this call lasts.
+
+        Raises:
+            MotionEnded: motion has ended before the time was over.
+        """
+        ends_s = time.monotonic() + seconds
+        while (left_s := ends_s - time.monotonic()) > 0:
+            self(**arguments)
+            time.sleep(min(TICK_S, left_s))
+        if self.ended:
+            raise MotionEnded(self.ended)
+
+    def release(self) -> None:
+        """Stop the robot and keep the controls; the next call of the stick moves the robot again.
+
+        Raises:
+            MotionEnded: motion has ended already.
+        """
+        if self.ended:
+            raise MotionEnded(self.ended)
+        self._stick.clear()
+        self._loop.call_soon_threadsafe(self._stick.wake)
