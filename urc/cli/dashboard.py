@@ -18,6 +18,7 @@ from urc.cli.start_addresses import ReadyDashboard, access_for, announce
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
+from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
@@ -112,6 +113,8 @@ async def _serve(
         robot_options = workshop_of(place, given, faulty)
         if warning := await asyncio.to_thread(clock_warning, robot_options.data):
             complain(f"urc: {warning}")
+        if is_interrupted(robot_options.data):
+            complain("urc: 'urc restore' was interrupted; run it again with --replace")
         access = access_for(robot_options.data, is_open=place.is_open)
 
         def ready(url: str) -> None:

@@ -37,13 +37,14 @@ PARTS: Final = re.compile(
     r"(?:access\.sqlite|audit\.sqlite|known_hosts|publisher\.pem"
     r"|tls/\w[\w.-]{0,100}|robots/[\w%~-][\w.%~-]{0,250}\.json"
     r"|latches/(?:emulated/)?\w[\w.-]{0,100}\.latch\.json"
-    r"|packages/state\.json|packages/blobs/[0-9a-f]{64}\.zip"
+    r"|packages/(?:state|blocks)\.json|packages/blobs/[0-9a-f]{64}\.zip"
     r"|packages/signatures/[0-9a-f]{64}\.json|packages/repositories/\w[\w.-]{0,100}\.json)",
     re.ASCII,
 )
 """Files of a backup, relative to the data folder."""
 LEFT_OUT: Final = re.compile(
-    r"(?:servers|packages/(?:ecosystems|work)|restoring-\w+|replaced-\w+)/.*|packages/changing"
+    r"(?:servers|packages/(?:ecosystems|work|blocking-work)|restoring-\w+|replaced-\w+)/.*"
+    r"|packages/(?:changing|blocking|repositories/changing)"
     r"|simulator_host_key|audit-before-\w+\.sqlite|.*\.(?:new|broken)|.*\.sqlite-(?:wal|shm|journal)",
     re.ASCII,
 )

@@ -3,8 +3,8 @@
 Layer 4. The files are extracted and checked in a folder of their own, ``restoring-…``. Then the old
 files move to ``replaced-…``, and the new ones take their place. An error moves the old files back.
 
-Two things are never lost: a latched STOP stays latched, and a replaced audit log stays in the data
-folder under another name.
+A latched STOP stays latched. A newer list of blocked packages stays in force. A replaced audit log
+stays in the data folder under another name.
 """
 
 import json
@@ -18,17 +18,22 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
+from urc.packages.block_store import BlockStore
+from urc.packages.names import PackageError
 from urc.private_files import make_private, put_private
 from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.backup_archive import BackupError, BackupReader, parts_in
 from urc.runtime.running_servers import servers
 
-__all__ = ["check_target", "restore"]
+__all__ = ["check_target", "is_interrupted", "restore"]
 
 _LATCHES: Final = "latches"
+_PACKAGES: Final = "packages"
 _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
 """Endings of the files that SQLite keeps next to a file."""
 _LATCH_BYTES: Final = 4096
+_OLD: Final = "replaced-????????"
+"""Pattern of the folder of replaced files."""
 
 
 def check_target(data: Path, *, replaces: bool) -> None:
@@ -54,6 +59,11 @@ def check_target(data: Path, *, replaces: bool) -> None:
         )
 
 
+def is_interrupted(data: Path) -> bool:
+    """Return whether a power failure ended the restoring of a backup in the middle."""
+    return any(data.glob(_OLD))
+
+
 def restore(reader: BackupReader, data: Path, adjust: Callable[[Path], None]) -> None:
     """Replace the content of a data folder by a backup.
 
@@ -75,6 +85,7 @@ def restore(reader: BackupReader, data: Path, adjust: Callable[[Path], None]) ->
                 _check_base(file)
             adjust(new)
             _merge_latches(new / _LATCHES, data / _LATCHES)
+            _merge_blocks(new / _PACKAGES, data / _PACKAGES)
             with _folder(data, "replaced") as old:
                 _swap(new, old, data)
                 _keep_audit(old, data)
@@ -94,7 +105,7 @@ def _folder(data: Path, purpose: str) -> Iterator[Path]:
 
 def _tidy(data: Path) -> None:
     """Remove the folders of a restoring that a power failure ended; keep its audit log."""
-    for folder in data.glob("replaced-????????"):
+    for folder in data.glob(_OLD):
         _keep_audit(folder, data)
         shutil.rmtree(folder, ignore_errors=True)
     for folder in data.glob("restoring-????????"):
@@ -122,6 +133,19 @@ def _merge_latches(new: Path, old: Path) -> None:
         else:
             merged = {**then, "epoch": max(now["epoch"], then["epoch"])}
             put_private(restored, json.dumps(merged).encode())
+
+
+def _merge_blocks(new: Path, old: Path) -> None:
+    """Keep the newer one of each two lists of blocked packages."""
+    try:
+        known = BlockStore(old).all()
+    except PackageError:
+        known = ()  # damaged, so the list of the backup is better
+    if known:
+        make_private(new)
+    for one in known:
+        with suppress(PackageError):  # the list of the backup is newer
+            BlockStore(new).keep(one, one.number, one.listed, one.place)
 
 
 def _latch(file: Path) -> dict[str, Any] | None:

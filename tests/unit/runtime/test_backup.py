@@ -1,16 +1,23 @@
 """Backup and restore of a data folder, and archives that attack it."""
 
+import base64
 import json
+import multiprocessing
 import os
+import shutil
 import sqlite3
 import stat
 import zipfile
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
+from urc.packages.block_store import BlockStore, KnownBlocks
+from urc.packages.blocks import BlockList
+from urc.packages.signature import fingerprint
 from urc.runtime import backup_archive, data_restore
 from urc.runtime.backup_archive import (
     BackupError,
@@ -19,7 +26,7 @@ from urc.runtime.backup_archive import (
     parts_in,
     write_backup,
 )
-from urc.runtime.data_restore import check_target, restore
+from urc.runtime.data_restore import check_target, is_interrupted, restore
 from urc.runtime.running_servers import RunningServer, announced
 
 MADE = Manifest(1, "0.1.0", 1_000_000.0)
@@ -231,6 +238,79 @@ def test_an_error_in_the_middle_leaves_the_folder_unchanged(
     with pytest.raises(BackupError, match="refused"):
         restored(file, data, replaces=True, adjust=refused)
     assert (content(data), sorted(data.rglob("*"))) == (before, names)
+
+
+def test_a_newer_list_of_blocked_packages_stays_in_force(data: Path, tmp_path: Path) -> None:
+    """Lists of two maintainers: one is newer in the backup, the other in the present data."""
+    file = tmp_path / "backup.zip"
+    keys = [base64.b64encode(bytes([number] * 32)).decode() for number in (1, 2)]
+    holders = [KnownBlocks("Ann", key, 0, BlockList("0a" * 16), "") for key in keys]
+    kept, listed = BlockStore(data / "packages"), BlockList("0a" * 16)
+    kept.keep(holders[0], 5, listed, "http://one/")
+    kept.keep(holders[1], 1, listed, "http://two/")
+    written, unknown = write_backup(data, file, MADE)
+    assert "packages/blocks.json" in written
+    assert unknown == []
+    kept.forget(fingerprint(keys[0]))
+    kept.keep(holders[0], 3, listed, "http://one/")
+    kept.keep(holders[1], 9, listed, "http://two/")
+    restored(file, data, replaces=True)
+    found = BlockStore(data / "packages").all()
+    assert sorted((one.place, one.number) for one in found) == [
+        ("http://one/", 5), ("http://two/", 9),
+    ]  # fmt: skip
+    (data / "packages" / "blocks.json").write_text("damaged")
+    restored(file, data, replaces=True)
+    assert len(BlockStore(data / "packages").all()) == 2
+
+
+def die_at(step: int, file: Path, folder: Path) -> NoReturn:
+    """Restore in this process, and end the process instead of one renaming."""
+    rename, done = os.rename, 0
+
+    def dying(source: Path, target: Path) -> None:
+        nonlocal done
+        done += 1
+        if done == step:
+            os._exit(9)
+        rename(source, target)
+
+    os.rename = dying  # type: ignore[assignment]
+    restored(file, folder, replaces=True)
+    os._exit(0)
+
+
+def test_a_power_failure_at_any_step_loses_no_stop_and_no_audit_log(
+    data: Path, tmp_path: Path
+) -> None:
+    """The process ends at every third renaming; the next restoring completes the work."""
+    file = tmp_path / "backup.zip"
+    write_backup(data, file, MADE)
+    wanted = content(data)
+    base_name = "audit.sqlite"
+    for step in range(1, 200, 3):
+        folder = tmp_path / f"at-{step}"
+        shutil.copytree(data, folder)
+        (folder / "latches" / "cart.latch.json").write_text(latch("Zoe"))
+        child = multiprocessing.get_context("spawn").Process(
+            target=die_at, args=(step, file, folder)
+        )
+        child.start()
+        child.join(60)
+        assert child.exitcode in (0, 9)
+        is_complete = child.exitcode == 0
+        assert is_interrupted(folder) is not is_complete
+        now = json.loads((folder / "latches" / "cart.latch.json").read_text())
+        assert now["latched_by"] == "Zoe"
+        if is_complete:
+            break
+        restored(file, folder, replaces=True)
+        assert not is_interrupted(folder)
+        assert content(folder).keys() == wanted.keys()
+        bases = [folder / base_name, *folder.glob("audit-before-*.sqlite")]
+        assert len(bases) >= 2, "the old audit log is kept"
+        assert {word_in(one) for one in bases} == {"entries"}
+    assert step > 15
 
 
 def test_the_remains_of_an_interrupted_restoring_are_removed(data: Path, tmp_path: Path) -> None:
