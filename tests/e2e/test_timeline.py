@@ -70,7 +70,7 @@ async def test_the_dev_page_says_who_moved_the_robot_and_who_was_refused(
     moved = entries.and_(dev.locator("[data-what='moved']"))
     await expect(moved).to_have_count(1)
     await expect(moved).to_contain_text("administer")
-    await expect(moved).to_contain_text('drive {"')
+    await expect(moved).to_contain_text("drive · ")
     await expect(moved.locator(".dev-hex")).to_contain_text("5620")  # "V "
     stopped = entries.and_(dev.locator("[data-what='stopped']"))
     await expect(stopped).to_contain_text("released")

@@ -41,6 +41,8 @@ class Operator(NamedTuple):
     """How the sign-in began, such as ``passkey``."""
     place: str = ""
     """Network address; "" for this machine."""
+    kind: str = ""
+    """Kind of the principal: ``person``, ``device``, ``program`` or ``guest``."""
 
 
 class LeaseState(NamedTuple):

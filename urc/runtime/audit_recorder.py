@@ -9,7 +9,8 @@ with every tick.
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import Concatenate, Final, ParamSpec
@@ -95,6 +96,7 @@ class AuditRecorder:
         self._motions: dict[str, _Motion] = {}
         self._refusals = RepeatLimiter[tuple[str, str, str]]()
         self._lease = LeaseState()
+        self._cause: Operator | None = None
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
         """Also report entries to the taps of a session's hub.
@@ -164,14 +166,24 @@ class AuditRecorder:
             outcome = self._hidden(message)
             self._record("refused", client, command=about, outcome=outcome, times=count)
 
+    @contextmanager
+    def caused_by(self, operator: Operator | None) -> Iterator[None]:
+        """Name `operator` in the entries about STOP and its reset while the context is open."""
+        before, self._cause = self._cause, operator
+        try:
+            yield
+        finally:
+            self._cause = before
+
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
         """Record a change of the lease: a new holder, a latched STOP or a reset."""
         before, self._lease = self._lease, state
+        cause = self._cause or _NOBODY
         if state.latched_by and not before.latched_by:
-            self._record("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
+            self._record("STOP", cause, epoch=state.epoch, outcome=f"by {state.latched_by}")
         elif before.latched_by and not state.latched_by:
-            self._record("reset", _NOBODY, epoch=state.epoch, outcome="may be driven again")
+            self._record("reset", cause, epoch=state.epoch, outcome="may be driven again")
         if state.holder != before.holder:
             who = state.holder or before.holder or _NOBODY
             outcome = "has the controls" if state.holder else "gave the controls back"
@@ -230,6 +242,10 @@ class AuditRecorder:
             outcome=outcome,
             times=times,
             lasted_s=lasted_s,
+            principal=who.principal,
+            kind=who.kind,
+            way=who.way,
+            place=who.place,
         )
         self._note(entry)
         if self._hub is not None:

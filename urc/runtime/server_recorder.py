@@ -194,6 +194,10 @@ class ServerRecorder:
         """Record an event of a recording; `file` is its name without a folder."""
         self._record("recording", actor, step, robot, {"file": file}, outcome)
 
+    def audit_exported(self, actor: Actor) -> None:
+        """Record the download of the audit log."""
+        self._record("audit", actor, "exported")
+
     # The server
 
     def server(self, step: Literal["started", "ended"], version: str, **about: object) -> None:
@@ -213,7 +217,7 @@ class ServerRecorder:
         jump_s, self._ahead_s = ahead_s - self._ahead_s, ahead_s
         if abs(jump_s) >= CLOCK_JUMP_S:
             way = "ahead" if jump_s > 0 else "back"
-            text = f"the clock was set {way} by {abs(jump_s):.0f} s"
+            text = f"the clock went {way} by {abs(jump_s):.0f} s: it was set, or the machine slept"
             self._record("clock", NO_ACTOR, outcome=text, lasted_s=round(jump_s, 1))
 
     def flush(self, *, is_last: bool = False) -> None:

@@ -15,9 +15,10 @@ from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from urc.web.serve.access import PARAMETER, Access
-from urc.web.serve.rights import ANYONE, ProtectedRoute, turn_away
+from urc.web.serve.rights import ANYONE, MAINTAIN_ANYWHERE, ProtectedRoute, turn_away
 from urc.web.serve.visitor import Visitor
 from urc.web.show.pages import PageHead, render
+from urc.web.show.visitor_links import sees_audit
 from urc.web.show.warnings import current_warnings
 from urc.web.words import t
 
@@ -101,6 +102,7 @@ class AccessMiddleware:
         visitor: Visitor = scope["state"]["visitor"]
         query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         word = next((value for name, value in query if name == PARAMETER), None)
+        sees_audit.set(visitor.may(MAINTAIN_ANYWHERE))
         is_let_in = visitor.best_role() is not None
         if word is not None and scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
             answer = self._answer_to(word, query, scope)

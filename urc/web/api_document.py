@@ -12,8 +12,10 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc import __version__
+from urc.web.audit.query import PARAMETERS
 from urc.web.manage.wire import (
     Add,
+    AuditResult,
     ControlState,
     Failure,
     HealthStatus,
@@ -30,7 +32,6 @@ from urc.web.manage.wire import (
     SettingsAnswer,
     SettingsAsked,
     StopResult,
-    Timeline,
     Url,
 )
 
@@ -43,6 +44,7 @@ class _Call(NamedTuple):
     path: str
     summary: str
     answer: type
+    """Type of the response; `bytes` for JSON lines."""
     body: type | None = None
     """Type of the request body; None for a GET request, or for a POST request without a body."""
     is_post: bool = True
@@ -127,11 +129,24 @@ _CALLS: Final = (
         is_post=False,
     ),
     _Call(
-        "/api/v1/robots/{name}/timeline",
-        "Audit log of a robot's motion, newest first; needs the start key.",
-        Timeline,
+        "/api/v1/audit",
+        "Search the audit log, newest entry first.",
+        AuditResult,
         is_post=False,
-        query=("last", "since"),
+        query=PARAMETERS,
+    ),
+    _Call(
+        "/api/v1/audit/export",
+        "All visible entries of the audit log as JSON lines, oldest entry first.",
+        bytes,
+        is_post=False,
+    ),
+    _Call(
+        "/api/v1/robots/{name}/timeline",
+        "Search the audit log for entries of one robot, newest entry first.",
+        AuditResult,
+        is_post=False,
+        query=tuple(one for one in PARAMETERS if one != "robot"),
     ),
     _Call(
         "/api/v1/robots/{name}/recording",
@@ -162,7 +177,7 @@ async def document(_: Request) -> Response:
 @cache
 def api_document() -> bytes:
     """Return the document as JSON."""
-    kinds = [call.answer for call in _CALLS]
+    kinds = [call.answer for call in _CALLS if call.answer is not bytes]
     kinds += [call.body for call in _CALLS if call.body not in (None, bytes)]
     kinds.append(Failure)
     _, components = msgspec.json.schema_components(
@@ -191,10 +206,11 @@ def _operation(call: _Call) -> dict[str, Any]:
         {"name": one, "in": "query", "required": False, "schema": text} for one in call.query
     ]
     failure = {"description": "Reason for the failure, in one line.", "content": _json(Failure)}
+    content = {"application/jsonl": {}} if call.answer is bytes else _json(call.answer)
     found: dict[str, Any] = {
         "summary": call.summary,
         "responses": {
-            str(call.status): {"description": "Done.", "content": _json(call.answer)},
+            str(call.status): {"description": "Done.", "content": content},
             "4XX": failure,
         },
     }

@@ -21,18 +21,21 @@ from starlette.websockets import WebSocket
 
 from urc import __version__
 from urc.model.profile import Profile
+from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
+from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
 from urc.web.access_page import AccessMiddleware, Stoppable
 from urc.web.api_document import DOCUMENT, document
+from urc.web.audit.routes import AuditRoutes
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
-from urc.web.dev.timeline import timeline
 from urc.web.dev.watch import Remake
 from urc.web.drive.redundant_socket import RedundantSocket
 from urc.web.fleet.fleet import Fleet
@@ -47,12 +50,12 @@ from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
 from urc.web.serve.access import Access
+from urc.web.serve.actors import stopper_of
 from urc.web.serve.policy import Policy
 from urc.web.serve.rights import (
     ANYONE,
     DRIVE,
     LOCAL,
-    MAINTAIN,
     MAINTAIN_SERVER,
     SIGNED_IN,
     WATCH,
@@ -60,7 +63,7 @@ from urc.web.serve.rights import (
     ProtectedSocket,
 )
 from urc.web.serve.server import serve
-from urc.web.serve.visitor import peer_of, stopper_of, visitor_of
+from urc.web.serve.visitor import peer_of, visitor_of
 from urc.web.show.card import Cards
 from urc.web.show.external_pages import ExternalPages
 from urc.web.show.frame_document import FrameDocuments
@@ -73,6 +76,8 @@ from urc.web.wire import messages as wire
 __all__ = ["Robot", "build_app", "serve"]
 
 _PAGE = {"cache-control": "no-store"}
+_LATE_S = 2.0
+"""Interval for entries about repeated events, in seconds."""
 
 
 def build_app(
@@ -107,14 +112,20 @@ def build_app(
         UrcError: two robots use different widgets of the same name.
     """
     access = access or Access()
-    audit = AuditLog(data / "audit.sqlite") if data else None
+    audit = AuditLog(data / AUDIT_FILE) if data else None
+    recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     fleet = _fleet(robots, data, audit, linger_s)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
-        ways=NavigationLinks(has_managers=robot_options is not None, has_dev=remake is not None),
+        ways=NavigationLinks(
+            has_managers=robot_options is not None,
+            has_dev=remake is not None,
+            has_audit=audit is not None,
+        ),
         access=access,
         audit=audit,
+        recorder=recorder,
         trust=WidgetTrust.of(trusted),
     )
     access.tags_of = routes.tags_of
@@ -130,6 +141,10 @@ def build_app(
         routes.dev_start = DevStart(fleet, remake, renew, routes.ways)
     files = FileRoutes(vendored(), tiles, routes.widget_files)
     return _Dashboard(routes, files, frozenset(allowed_hosts), dev)
+
+
+def _unread(entry: AuditEntry) -> None:
+    """Ignore the entry, because this server has no audit log."""
 
 
 def _fleet(
@@ -193,7 +208,7 @@ class _Dashboard(Starlette):
                 ProtectedRoute(DOCUMENT, document, SIGNED_IN),
                 ProtectedRoute("/api/v1/robots/{name}/stop", routes.stop, ANYONE, methods=["POST"]),
                 ProtectedRoute("/api/v1/robots/{name}/controls", routes.controls, WATCH),
-                ProtectedRoute("/api/v1/robots/{name}/timeline", routes.timeline, MAINTAIN),
+                *routes.audit_routes(),
                 ProtectedRoute("/api/v1/robots/{name}/recording", routes.recording, WATCH),
                 ProtectedRoute(
                     "/api/v1/robots/{name}/recording/move", routes.move, DRIVE, methods=["POST"]
@@ -227,6 +242,7 @@ class _Routes:
     modules: Mapping[str, object]
     ways: NavigationLinks
     access: Access
+    recorder: ServerRecorder
     audit: AuditLog | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
@@ -244,12 +260,17 @@ class _Routes:
         """The stations of the robots, by the name in their URL."""
         return self.fleet.stations
 
+    def audit_routes(self) -> list[ProtectedRoute]:
+        """Return the routes of the audit log."""
+        return AuditRoutes(self.audit, self.recorder, lambda: self.stations, self.ways).routes()
+
     def manage_routes(self) -> list[ProtectedRoute]:
         """Return the routes of the managers; empty without managers."""
         if self.manager is None:
             return []
-        manage = ManageRoutes(self.manager, self.ways)
-        return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
+        manage = ManageRoutes(self.manager, self.ways, self.recorder)
+        settings = SettingsRoutes(self.manager, self.ways, self.recorder)
+        return [*manage.routes(), *settings.routes()]
 
     def stoppable(self) -> list[Stoppable]:
         """Return all robots that STOP can stop."""
@@ -286,7 +307,11 @@ class _Routes:
             async with self.fleet.running() as group:
                 if self.manager is not None:
                     await self.manager.changed()
-                tasks = [group.create_task(self.access.run())]
+                self.recorder.server("started", __version__)
+                tasks = [
+                    group.create_task(self.access.run()),
+                    group.create_task(self._record_late()),
+                ]
                 if self.dev:
                     tasks.append(group.create_task(self.dev.run()))
                 if self.manager is not None:
@@ -297,8 +322,16 @@ class _Routes:
                 if self.manager is not None:
                     await self.manager.close()
         finally:
+            self.recorder.server("ended", __version__)
             if self.audit:  # closed last: it records the stops at the end
                 await asyncio.to_thread(self.audit.close)
+
+    async def _record_late(self) -> None:
+        """Record counts of repeated events, and jumps of the clock, until cancelled."""
+        while True:
+            await asyncio.sleep(_LATE_S)
+            self.recorder.flush()
+            self.recorder.check_clock()
 
     async def menu(self, request: Request) -> Response:
         head = PageHead(request.state.nonce, "URC")
@@ -358,7 +391,12 @@ class _Routes:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         if not service.controls.controller.can_move or service.robot.playback is not None:
             return JSONResponse({"error": "this robot has no motion to stop"}, 409, _PAGE)
-        service.controls.stop(stopper_of(request))
+        name = request.path_params["name"]
+        who = stopper_of(request, name)
+        was_latched = bool(service.controls.controller.lease.latched)
+        service.controls.stop(who.name, who)
+        if was_latched and not who.principal:
+            self.recorder.stopped_by_unknown(name, who.place)
         is_confirmed = await service.deliver_stop()
         by = service.controls.controller.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
@@ -369,13 +407,6 @@ class _Routes:
         if service is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         return JSONResponse(service.who(), headers=_PAGE)
-
-    async def timeline(self, request: Request) -> Response:
-        """Return the audit log of a robot's motion."""
-        name = request.path_params["name"]
-        if name not in self.stations:
-            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        return await timeline(request, self.audit, name)
 
     async def recording(self, request: Request) -> Response:
         """Return the state of a playback."""

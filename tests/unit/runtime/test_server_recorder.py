@@ -140,8 +140,8 @@ def test_jump_of_the_clock_is_told_once() -> None:
     book.utc_s -= 60
     book.recorder.check_clock()
     assert book.lines == [
-        "clock x1 the clock was set ahead by 31536000 s",
-        "clock x1 the clock was set back by 60 s",
+        "clock x1 the clock went ahead by 31536000 s: it was set, or the machine slept",
+        "clock x1 the clock went back by 60 s: it was set, or the machine slept",
     ]
 
 

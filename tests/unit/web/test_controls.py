@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tests.unit.runtime.desks import DRIVER
+from urc.access.directory import Identity
 from urc.model.role import Role
 from urc.protocol.events import MotionEvent, MotionRefused
 from urc.runtime.audit_entry import AuditEntry
@@ -406,3 +407,23 @@ async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control
             assert (told["command"], told["message"]) == ("drive", "the guard is open")
         assert it.backend.texts[-1] == "drive stop"
         assert [one.outcome for one in it.audit if one.what == "stopped"] == ["the guard is open"]
+
+
+async def test_audit_names_person_right_and_place_of_each_event() -> None:
+    it = Scene()
+    ann = Identity("p1", "k1", "Ann", "person", "passkey", "p1")
+    peer = SocketPeer("192.0.2.7", "p1", True, ann, rights=FixedRights("drive"))
+    page = it.controls.add_page(peer, lambda: None)
+    it.controls.handle(page, wire.Drive("take"))
+    it.controls.handle(page, wire.Stop())
+    it.controls.handle(page, wire.Drive("reset"))
+    it.controls.stop("URC: a blocked package")
+    told = [(one.what, one.who, one.principal, one.kind, one.way, one.place) for one in it.audit]
+    named = ("Ann", "p1", "person", "passkey", "192.0.2.7")
+    assert told == [
+        ("lease", *named),
+        ("STOP", *named),
+        ("lease", *named),
+        ("reset", *named),
+        ("STOP", "", "", "", "", ""),
+    ]

@@ -166,8 +166,9 @@ class ControlService:
             who=who.name,
             principal=who.principal,
             person=who.person,
-            way=who.way,
+            way="key" if peer.is_local else who.way,
             place=peer.place,
+            kind=who.kind,
         )
         operator = OperatorSession(client, wake, peer.rights)
         self.controller.join(operator.client)
@@ -276,16 +277,22 @@ class ControlService:
             case wire.Stop():
                 if not operator.is_first("", said.number):
                     return
-                self.stop(operator.client.name)
+                self.stop(operator.client.name, operator.client)
             case wire.Drive():
                 self._drive(operator, said)
 
-    def stop(self, by: str) -> None:
-        """Stop and latch. Never refused."""
+    def stop(self, by: str, who: Operator | None = None) -> None:
+        """Stop and latch. Never refused.
+
+        Args:
+            by: name of the person or page, shown to all pages.
+            who: the person or page, for the audit log; None for a stop by URC itself.
+        """
         for operator in self._operators.values():
             for command in list(operator.alarms):
                 operator.forget(command)
-        self.controller.stop(by)
+        with self.recorder.caused_by(who):
+            self.controller.stop(by)
         self.once.stopped()
 
     async def settle(self) -> None:
@@ -295,7 +302,8 @@ class ControlService:
 
     def _drive(self, operator: OperatorSession, said: wire.Drive) -> None:
         now = self._clock.now()
-        reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
+        with self.recorder.caused_by(operator.client):
+            reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
         if reason:
             operator.notice(said.verb, wire.encode_refused(said.verb, "", reason))
             self.recorder.refused(operator.client, said.verb, reason, now)

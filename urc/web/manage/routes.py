@@ -6,7 +6,7 @@ Layer 5. Each change is a POST request with a JSON body from this server's own p
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -18,6 +18,7 @@ from starlette.responses import HTMLResponse, Response
 
 from urc.packages.names import FOLDERS, PackageError, PackageRequirement, parse_requirement
 from urc.problems import UrcError
+from urc.runtime.server_recorder import ServerRecorder
 from urc.web.manage.jobs import Busy, Wanted
 from urc.web.manage.manager import Manager
 from urc.web.manage.upload_source import given_source
@@ -32,6 +33,7 @@ from urc.web.manage.wire import (
     ResultLine,
     Url,
 )
+from urc.web.serve.actors import actor_of
 from urc.web.serve.rights import MAINTAIN_SERVER, SIGNED_IN, ProtectedRoute
 from urc.web.serve.visitor import visitor_of
 from urc.web.show.menu import Nav, NavigationLinks
@@ -162,15 +164,17 @@ def _api(handler: _Handler) -> _Handler:
 class ManageRoutes:
     """The routes of a dashboard's manager pages."""
 
-    def __init__(self, manager: Manager, ways: NavigationLinks) -> None:
+    def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
         """Prepare.
 
         Args:
             manager: the operations.
             ways: navigation links of this server.
+            recorder: receives an entry for each change.
         """
         self._manager = manager
         self._ways = ways
+        self._recorder = recorder
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes of the pages and of their API requests."""
@@ -242,6 +246,7 @@ class ManageRoutes:
         if "://" not in text:
             text = f"http://{text}"
         await self._manager.connect(text)
+        self._record(request, "repository add", [text])
         return answer(ResultLine(t("connected")))
 
     @_api
@@ -249,6 +254,7 @@ class ManageRoutes:
         """Remove a repository; the packages installed from this repository stay."""
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
+        self._record(request, "repository remove", [said.url])
         return answer(ResultLine(t("forgotten; what is installed stays")))
 
     @_api
@@ -286,6 +292,7 @@ class ManageRoutes:
         """Restore the version of a package before its last update."""
         said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
+        self._record(request, "restore", [str(old)])
         return answer(RemovedPackages((), t("{name} is back", name=old)))
 
     @_api
@@ -298,6 +305,7 @@ class ManageRoutes:
             filled = await asyncio.to_thread(self._manager.forgettable, required)
             return answer(RemovedPackages(tuple(gone), "", has_settings=bool(filled)))
         gone = await self._manager.remove(said.package, forgets=said.forget)
+        self._record(request, "remove", gone or [said.package])
         line = t("removed {names}", names=", ".join(gone))
         if not gone:
             line = t("removed; another package needs its files")
@@ -310,6 +318,9 @@ class ManageRoutes:
         job = await self._manager.agree(
             said.number, takes_risks=said.takes_risks, unsigned=said.unsigned
         )
+        if job.planned is not None:
+            command = "install" if job.planned.old is None else "update"
+            self._record(request, command, [str(job.planned.plan.lock)], job.state)
         return answer(job.news())
 
     @_api
@@ -317,6 +328,12 @@ class ManageRoutes:
         """Cancel the job before it changes anything."""
         said = await body_of(request, JobDecision)
         return answer(self._manager.jobs.cancel(said.number).news())
+
+    def _record(
+        self, request: Request, command: str, packages: Iterable[str], outcome: str = "done"
+    ) -> None:
+        """Write a change of packages or repositories into the audit log."""
+        self._recorder.package_changed(actor_of(request), command, packages, outcome)
 
     def _begun(self, what: Wanted) -> Response:
         news: JobNews = self._manager.jobs.begin(what).news()

@@ -5,7 +5,7 @@ robot is switched off.
 """
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from typing import Final
 
@@ -18,15 +18,19 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError, printable
 from urc.runtime.probe import ProbeResult, probe
+from urc.runtime.redaction import secret_texts
 from urc.runtime.registries import built_in_catalog
+from urc.runtime.secret_forms import SecretForms
+from urc.runtime.server_recorder import Actor, ServerRecorder
 from urc.runtime.settings import parse_setting
 from urc.runtime.settings_store import StoredSettings
 from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
-from urc.web.manage.routes import ApiError, ManageRoutes, answer, body_of, told
+from urc.web.manage.routes import ApiError, answer, body_of, told
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
+from urc.web.serve.actors import actor_of
 from urc.web.serve.rights import MAINTAIN, WATCH, ProtectedRoute
 from urc.web.serve.visitor import visitor_of
 from urc.web.show.cells import spoken
@@ -43,17 +47,17 @@ _END_S: Final = 5.0
 class SettingsRoutes:
     """The routes of the settings pages of all robots."""
 
-    def __init__(self, manager: Manager, manage: ManageRoutes, ways: NavigationLinks) -> None:
+    def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
         """Prepare.
 
         Args:
             manager: the operations on packages and robots.
-            manage: the routes of the managers, which check permissions.
             ways: the pages of this server, for the navigation links.
+            recorder: receives an entry for each change.
         """
         self._manager = manager
-        self._manage = manage
         self._ways = ways
+        self._recorder = recorder
         self._trying: set[str] = set()
 
     def routes(self) -> list[ProtectedRoute]:
@@ -112,7 +116,7 @@ class SettingsRoutes:
                 raise Busy(f"the settings of {name} are already being tested")
             self._trying.add(name)
             try:
-                return answer(await self._save(name, said))
+                return answer(await self._save(name, said, actor_of(request, name)))
             finally:
                 self._trying.discard(name)
         except ApiError as refusal:
@@ -122,7 +126,7 @@ class SettingsRoutes:
         except UrcError as error:
             return told(422, str(error).strip().partition("\n")[0])
 
-    async def _save(self, name: str, said: SettingsAsked) -> SettingsAnswer:
+    async def _save(self, name: str, said: SettingsAsked, actor: Actor) -> SettingsAnswer:
         manager, factory = self._manager, self._manager.factory
         if name not in manager.fleet.robots and name not in manager.fleet.broken:
             raise ApiError(404, "no robot of that name is served here")
@@ -143,6 +147,9 @@ class SettingsRoutes:
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
         manager.check_idle(name)  # again: the test takes a while
         await asyncio.to_thread(factory.kept(name).save, kept)
+        changes = _changes(before, kept, bare, secret_texts(bare, robot.settings))
+        if changes:
+            self._recorder.settings_changed(actor, name, changes)
         await manager.apply_settings(name, robot, said.version)
         text = t("saved, and used from now on")
         if missing:
@@ -213,6 +220,25 @@ class SettingsRoutes:
                 trying.cancel()
                 await asyncio.wait((trying,), timeout=_END_S)
             return tuple(map(_line, trying.result()))
+
+
+def _changes(
+    before: StoredSettings, after: StoredSettings, profile: Profile, secrets: Iterable[str]
+) -> dict[str, str | None]:
+    """Return the new text of each changed setting for the audit log; None for a secret."""
+    hidden = SecretForms(secrets)
+    changes: dict[str, str | None] = {
+        name: hidden.hide(getattr(after, name))
+        for name in ("version", "interface")
+        if getattr(before, name) != getattr(after, name)
+    }
+    for name in sorted(before.settings.keys() | after.settings.keys()):
+        text = after.settings.get(name, "")
+        if text != before.settings.get(name, ""):
+            setting = profile.settings.get(name)
+            is_secret = setting is None or setting.is_secret
+            changes[name] = None if is_secret else hidden.hide(text)
+    return changes
 
 
 def _epoch(service: RobotService | None) -> int:

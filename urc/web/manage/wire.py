@@ -13,6 +13,7 @@ __all__ = [
     "Add",
     "JobDecision",
     "RefreshRequest",
+    "AuditResult",
     "Available",
     "Failure",
     "RemovedPackages",
@@ -31,7 +32,6 @@ __all__ = [
     "StopResult",
     "PlaybackRequest",
     "PlaybackState",
-    "Timeline",
     "ProbedTransport",
     "Url",
 ]
@@ -269,12 +269,15 @@ class PlaybackState(ManageMessage, frozen=True):
     """Playback speed; 1 is real time."""
 
 
-class Timeline(ManageMessage, frozen=True):
-    """The audit log of a robot's motion."""
+class AuditResult(ManageMessage, frozen=True):
+    """Entries of the audit log, newest first."""
 
     entries: list[dict[str, Any]]
+    """The columns of each entry, with its number ``id``."""
     fault: str
     """Reason why the audit log is no longer written; "" if the log is written."""
+    has_more: bool
+    """Whether older entries may exist; request them with the parameter ``before``."""
 
 
 class ReloadResult(ManageMessage, frozen=True):

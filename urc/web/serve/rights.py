@@ -21,6 +21,7 @@ __all__ = [
     "DRIVE",
     "LOCAL",
     "MAINTAIN",
+    "MAINTAIN_ANYWHERE",
     "MAINTAIN_SERVER",
     "SIGNED_IN",
     "WATCH",
@@ -58,6 +59,7 @@ SIGNED_IN: Final = Right("watch", "anywhere")
 WATCH: Final = Right("watch")
 DRIVE: Final = Right("drive")
 MAINTAIN: Final = Right("maintain")
+MAINTAIN_ANYWHERE: Final = Right("maintain", "anywhere")
 MAINTAIN_SERVER: Final = Right("maintain", "server")
 ADMINISTER: Final = Right("administer", "server")
 LOCAL: Final = Right("administer", "server", is_local=True)

@@ -13,7 +13,7 @@ from urc.model.role import Role, includes
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.serve.rights import Right
 
-__all__ = ["Visitor", "VisitorRights", "peer_of", "stopper_of", "visitor_of"]
+__all__ = ["Visitor", "VisitorRights", "is_loopback", "peer_of", "visitor_of"]
 
 
 class VisitorRights(Protocol):
@@ -113,16 +113,6 @@ class _RobotRights:
         return self._visitor.may_give(command)
 
 
-def stopper_of(connection: HTTPConnection) -> str:
-    """Return the name of a visitor who presses STOP, as it is shown to other people."""
-    visitor = visitor_of(connection)
-    if visitor.is_known and not visitor.is_local:
-        return visitor.identity.name
-    host = connection.client.host if connection.client else ""
-    is_near = visitor.is_local and _is_loopback(host)
-    return "a screen of this machine" if is_near or not host else host
-
-
 def visitor_of(connection: HTTPConnection) -> Visitor:
     """Return the visitor that the page policy has identified for a request."""
     found: Visitor = connection.state.visitor
@@ -141,7 +131,7 @@ def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = Fals
     host = connection.client.host if connection.client else ""
     only_watches = only_watches or "watch" in connection.query_params
     return SocketPeer(
-        place="" if visitor.is_local and _is_loopback(host) else host,
+        place="" if visitor.is_local and is_loopback(host) else host,
         who=visitor.client or f"at {host}",
         is_known=visitor.is_known,
         identity=visitor.identity,
@@ -150,7 +140,8 @@ def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = Fals
     )
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Return whether an address belongs to this machine itself."""
     try:
         return ip_address(host.partition("%")[0]).is_loopback
     except ValueError:

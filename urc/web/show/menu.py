@@ -28,6 +28,8 @@ class NavigationLinks:
     has_managers: bool = False
     """Whether the pages for drivers, interfaces, widgets and settings exist."""
     has_dev: bool = False
+    has_audit: bool = False
+    """Whether the server has an audit log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +37,8 @@ class Nav:
     """Context of ``nav.html.j2``: the navigation bar of the pages around the dashboard."""
 
     current: str
-    """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or ""
-    for any other page."""
+    """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
+    ``audit``, or "" for any other page."""
     ways: NavigationLinks
 
 

@@ -1,0 +1,50 @@
+"""The sender of a request, as other people and the audit log name it.
+
+Layer 5. Pure.
+"""
+
+from starlette.requests import HTTPConnection
+
+from urc.motion.lease import Operator
+from urc.runtime.server_recorder import Actor
+from urc.web.serve.visitor import is_loopback, peer_of, visitor_of
+
+__all__ = ["actor_of", "stopper_of"]
+
+
+def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
+    """Return the visitor of a request with its present role.
+
+    Args:
+        connection: the request.
+        robot: name of the robot that the request concerns; "" for the server.
+    """
+    visitor = visitor_of(connection)
+    who = visitor.identity
+    role = visitor.role(robot) if robot else visitor.best_role()
+    place = peer_of(connection, robot).place
+    way = "key" if visitor.is_local else who.way  # programs send the start key like a token
+    return Actor(who.name, who.principal, who.kind, role or "", way, place, who.sign_in)
+
+
+def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
+    """Return the visitor who presses STOP at a robot, with the name that other people see."""
+    visitor = visitor_of(connection)
+    who = visitor.identity
+    host = connection.client.host if connection.client else ""
+    is_near = visitor.is_local and is_loopback(host)
+    if visitor.is_known and not visitor.is_local:
+        name = who.name
+    else:
+        name = "a screen of this machine" if is_near or not host else host
+    return Operator(
+        "",
+        name,
+        visitor.role(robot),
+        who=who.name,
+        principal=who.principal,
+        person=who.person,
+        way="key" if visitor.is_local else who.way,
+        place="" if is_near else host,
+        kind=who.kind,
+    )

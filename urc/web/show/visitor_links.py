@@ -1,0 +1,12 @@
+"""Links of the navigation bar that only some visitors see.
+
+Layer 5. The access middleware sets the links for each request; ``nav.html.j2`` shows them.
+"""
+
+from contextvars import ContextVar
+from typing import Final
+
+__all__ = ["sees_audit"]
+
+sees_audit: Final[ContextVar[bool]] = ContextVar("urc_sees_audit", default=False)
+"""Whether the visitor of the current request may open the audit log."""
