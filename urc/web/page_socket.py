@@ -9,16 +9,13 @@ import asyncio
 import logging
 import math
 from collections import deque
-from collections.abc import Mapping
 from time import time
 
 from starlette.types import Message
 from starlette.websockets import WebSocketDisconnect
 
-from urc.model.payload import Payload
-from urc.model.values import NOTHING, Reading
-from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused
-from urc.runtime.session import CommandFailed
+from urc.runtime.one_shot_commands import OUT_OF_SCOPE
+from urc.web.drive.command_runner import CommandOutcome
 from urc.web.drive.control_service import OperatorSession
 from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
 from urc.web.feed.fanout import Place
@@ -38,7 +35,6 @@ TICK = b'{"t":"tick",'
 """First bytes of a page's tick; ticks in any other form are decoded more slowly."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
-COMMAND_TIMEOUT_S = 30.0
 STALL_S = 15.0
 GOODBYE_S = 2.0
 
@@ -318,8 +314,10 @@ class BrowserClient:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
             # The refusal closes and queues nothing: it is the page's only reply.
             text = f"{COMMANDS_AT_ONCE} commands are still running"
-            if len(self._answers) < 2 * COMMANDS_AT_ONCE:
-                self._reply(asked, code="busy", message=text)
+            if len(self._answers) < 2 * COMMANDS_AT_ONCE and self._operator is not None:
+                self._reply(
+                    asked, self._service.commands.refuse(self._operator, asked, "busy", text)
+                )
             else:
                 self._close(wire.CLOSE_TOO_FAST, text)
             return
@@ -328,83 +326,11 @@ class BrowserClient:
         task.add_done_callback(self._commands.discard)
 
     async def _run(self, asked: wire.CommandRequest, live: LiveSession) -> None:
-        sent: deque[Payload] = deque(maxlen=1)  # the last frame that was sent
-        try:
-            people = await self._confirmed(asked)
-            async with asyncio.timeout(self._limit_s(asked.command)):
-                replied = await live.session.command(
-                    asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
-                )
-        except asyncio.CancelledError:
-            if self._operator is not None:
-                text = "nobody waited for the answer"
-                recorder = self._service.controls.recorder
-                recorder.ran(
-                    self._operator.client, asked.command, asked.arguments, text, _last(sent)
-                )
-            raise
-        except TimeoutError:
-            text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
-            self._reply(asked, code="timed-out", message=text, sent=_last(sent))
-        except CommandRefused as refused:
-            self._reply(asked, code=refused.code, message=refused.message, is_ours=True)
-        except CommandFailed as failed:
-            self._reply(asked, code=failed.code, message=failed.message, sent=_last(sent))
-        else:
-            self._reply(asked, values=replied.values, people=people, sent=_last(sent))
+        if self._operator is not None:
+            outcome = await self._service.commands.run(self._operator, asked, live.session)
+            self._reply(asked, outcome)
 
-    def _limit_s(self, command: str) -> float | None:
-        """Return a command's time limit in seconds; None for a sequence, which has no limit."""
-        known = self._service.robot.profile.driver.commands.get(command)
-        return None if known is not None and known.steps else COMMAND_TIMEOUT_S
-
-    async def _confirmed(self, asked: wire.CommandRequest) -> tuple[str, ...]:
-        """Return the people who confirmed a command; raise `CommandFailed` if it is refused."""
-        if self._operator is None:
-            return ()
-        known = self._service.robot.profile.driver.commands.get(asked.command)
-        self._admit(self._operator, asked)
-        if known is None:
-            return ()
-        people = await self._service.consent.people(
-            self._operator, asked.id, known, asked.arguments, asked.token
-        )
-        self._admit(self._operator, asked)  # again: a confirmation takes time
-        return people
-
-    def _admit(self, operator: OperatorSession, asked: wire.CommandRequest) -> None:
-        """Raise `CommandRefused` if the page may not run a command now."""
-        self._service.controls.recheck(operator)
-        if not operator.rights.may_give(asked.command):
-            raise CommandRefused("refused", OUT_OF_SCOPE)
-        self._service.controls.once.admit(
-            operator.client, asked.command, asked.arguments, asked.stops
-        )
-
-    def _reply(
-        self,
-        asked: wire.CommandRequest,
-        *,
-        values: Mapping[str, Reading] = NOTHING,
-        code: str = "",
-        message: str = "",
-        people: tuple[str, ...] = (),
-        sent: Payload = b"",
-        is_ours: bool = False,
-    ) -> None:
-        """Send the reply to a command, and write the outcome to the audit log."""
+    def _reply(self, asked: wire.CommandRequest, outcome: CommandOutcome) -> None:
+        """Send the reply to a command."""
+        values, code, message = outcome.values, outcome.code, outcome.message
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
-        if self._operator is None:
-            return
-        recorder, who = self._service.controls.recorder, self._operator.client
-        if code == "busy" or is_ours:
-            recorder.refused(who, asked.command, message, self._service.clock.now())
-        else:
-            outcome = f"{code}: {message}" if code else "done"
-            if people:
-                outcome += f"; confirmed by {', '.join(people)}"
-            recorder.ran(who, asked.command, asked.arguments, outcome, sent, answer=values)
-
-
-def _last(sent: deque[Payload]) -> Payload:
-    return sent[-1] if sent else b""

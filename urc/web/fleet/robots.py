@@ -30,6 +30,7 @@ from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchStore
+from urc.web.drive.command_runner import CommandRunner
 from urc.web.drive.control_service import ControlService
 from urc.web.drive.two_person import TwoPersonRule
 from urc.web.feed.client_socket import SocketPeer
@@ -213,6 +214,7 @@ class RobotService:
         self.controls = ControlService(robot.profile.driver, self.clock, latch, recorder)
         self.consent = TwoPersonRule(lambda: self.controls.operators, self.clock)
         self.controls.once.on_stopped = self.consent.stop
+        self.commands = CommandRunner(self.controls, self.consent, self.clock)
         self._linger_s = linger_s
         self._turn = turn or asyncio.Lock()
         self._visitors = 0
@@ -256,14 +258,22 @@ class RobotService:
         except TimeoutError:
             raise SessionFailed("the robot's session did not open in time") from None
 
+    @property
+    def open_session(self) -> LiveSession | None:
+        """The open session, without opening one; None if no session is open."""
+        coming = self._next
+        if coming is None or not coming.done() or coming.cancelled() or coming.exception():
+            return None
+        return coming.result()
+
     def glimpse(self) -> Glimpse:
         """Return a view of the robot, without opening a connection."""
         if self.robot.glimpse is not None:
             return self.robot.glimpse()
-        coming = self._next
-        if coming is None or not coming.done() or coming.cancelled() or coming.exception():
+        live = self.open_session
+        if live is None:
             return None
-        hub = coming.result().session.hub
+        hub = live.session.hub
         samples = {name: hub.latest(name) for name in hub.signals}
         values = {name: one.value for name, one in samples.items() if one is not None}
         pictures = (value for value in values.values() if isinstance(value, bytes))

@@ -1,0 +1,149 @@
+"""The path of a command from a page or a program: rights, interlock, confirmation, reply, audit.
+
+Layer 5. Pages and the HTTP API share this path, so both check the same. Each command gets exactly
+one outcome and one entry in the audit log.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple, Protocol
+
+from urc.model.payload import Payload
+from urc.model.values import NOTHING, Reading
+from urc.protocol.events import Replied
+from urc.runtime.clock import Clock
+from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused
+from urc.runtime.session import CommandFailed
+from urc.web.drive.control_service import ControlService, OperatorSession
+from urc.web.drive.two_person import TwoPersonRule
+from urc.wire.client_messages import CommandRequest
+
+__all__ = ["COMMAND_TIMEOUT_S", "CommandOutcome", "CommandRunner", "CommandTarget"]
+
+COMMAND_TIMEOUT_S: Final = 30.0
+"""Longest wait for the reply to a command, in seconds; a sequence has no limit."""
+
+
+class CommandTarget(Protocol):
+    """The part of a robot's session that runs commands."""
+
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        confirmed_by: tuple[str, ...] = (),
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Run a command and return its reply; raise `CommandFailed` if the command fails."""
+
+
+class CommandOutcome(NamedTuple):
+    """The end of a command."""
+
+    values: Mapping[str, Reading] = NOTHING
+    """Values of the reply."""
+    code: str = ""
+    """Code of the failure; "" after success."""
+    message: str = ""
+    is_ours: bool = False
+    """Whether the server refused the command before it sent anything."""
+
+
+class CommandRunner:
+    """Runs the commands of one robot."""
+
+    def __init__(self, controls: ControlService, consent: TwoPersonRule, clock: Clock) -> None:
+        self._controls = controls
+        self._consent = consent
+        self._clock = clock
+
+    async def run(
+        self,
+        operator: OperatorSession,
+        asked: CommandRequest,
+        target: CommandTarget,
+        *,
+        timeout_s: float | None = None,
+    ) -> CommandOutcome:
+        """Run a command and return its end.
+
+        Args:
+            operator: the page or program that gives the command.
+            asked: the command with its arguments.
+            target: the open session of the robot.
+            timeout_s: longest wait for the reply, in seconds; None: `COMMAND_TIMEOUT_S` for a
+                command, and no limit for a sequence.
+        """
+        sent: deque[Payload] = deque(maxlen=1)  # the last frame that was sent
+        people: tuple[str, ...] = ()
+        limit_s = self._limit_s(asked.command) if timeout_s is None else timeout_s
+        try:
+            people = await self._confirmed(operator, asked)
+            async with asyncio.timeout(limit_s):
+                replied = await target.command(
+                    asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
+                )
+        except asyncio.CancelledError:
+            recorder = self._controls.recorder
+            text = "nobody waited for the answer"
+            recorder.ran(operator.client, asked.command, asked.arguments, text, _last(sent))
+            raise
+        except TimeoutError:
+            outcome = CommandOutcome(code="timed-out", message=f"no answer within {limit_s:g} s")
+        except CommandRefused as refused:
+            return self.refuse(operator, asked, refused.code, refused.message)
+        except CommandFailed as failed:
+            outcome = CommandOutcome(code=failed.code, message=failed.message)
+        else:
+            outcome = CommandOutcome(replied.values)
+        self._record(operator, asked, outcome, people, _last(sent))
+        return outcome
+
+    def refuse(
+        self, operator: OperatorSession, asked: CommandRequest, code: str, message: str
+    ) -> CommandOutcome:
+        """Record the refusal of a command before anything is sent, and return it."""
+        self._controls.recorder.refused(operator.client, asked.command, message, self._clock.now())
+        return CommandOutcome(code=code, message=message, is_ours=True)
+
+    def _limit_s(self, command: str) -> float | None:
+        known = self._controls.once.driver.commands.get(command)
+        return None if known is not None and known.steps else COMMAND_TIMEOUT_S
+
+    async def _confirmed(self, operator: OperatorSession, asked: CommandRequest) -> tuple[str, ...]:
+        """Return the people who confirmed a command; raise `CommandFailed` if it is refused."""
+        self._admit(operator, asked)
+        known = self._controls.once.driver.commands.get(asked.command)
+        if known is None:
+            return ()
+        people = await self._consent.people(operator, asked.id, known, asked.arguments, asked.token)
+        self._admit(operator, asked)  # again: a confirmation takes time
+        return people
+
+    def _admit(self, operator: OperatorSession, asked: CommandRequest) -> None:
+        """Raise `CommandRefused` if the page or program may not run a command now."""
+        self._controls.recheck(operator)
+        if not operator.rights.may_give(asked.command):
+            raise CommandRefused("refused", OUT_OF_SCOPE)
+        self._controls.once.admit(operator.client, asked.command, asked.arguments, asked.stops)
+
+    def _record(
+        self,
+        operator: OperatorSession,
+        asked: CommandRequest,
+        outcome: CommandOutcome,
+        people: tuple[str, ...],
+        sent: Payload,
+    ) -> None:
+        text = f"{outcome.code}: {outcome.message}" if outcome.code else "done"
+        if people and not outcome.code:
+            text += f"; confirmed by {', '.join(people)}"
+        self._controls.recorder.ran(
+            operator.client, asked.command, asked.arguments, text, sent, answer=outcome.values
+        )
+
+
+def _last(sent: deque[Payload]) -> Payload:
+    return sent[-1] if sent else b""
