@@ -149,6 +149,7 @@ async def _serve(
             remake=remade,
             robot_options=robot_options,
             trusted=place.trusted,
+            recordings=place.recordings,
         )
         gc.collect()
         gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 from urllib.parse import parse_qsl, quote, unquote, urlencode
 
-from starlette.responses import HTMLResponse, JSONResponse
+from starlette.responses import HTMLResponse
 from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from urc.web.serve.access import PARAMETER, Access
+from urc.web.serve.replies import told
 from urc.web.serve.rights import ANYONE, MAINTAIN_ANYWHERE, ProtectedRoute, turn_away
 from urc.web.serve.visitor import Visitor
 from urc.web.show.pages import PageHead, render
@@ -139,7 +140,9 @@ class AccessMiddleware:
 
     def _refusal(self, scope: Scope) -> ASGIApp:
         if scope["path"].startswith("/api/") or scope["method"] not in ("GET", "HEAD"):
-            return JSONResponse({"error": SAID}, 401, _REFUSED)
+            refused = told(401, SAID)
+            refused.headers.update(_REFUSED)
+            return refused
         return self._page(scope)
 
     def _page(self, scope: Scope, *, url: str = "", is_old: bool = False) -> HTMLResponse:

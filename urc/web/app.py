@@ -32,6 +32,9 @@ from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
 from urc.web.access_page import AccessMiddleware, Stoppable
+from urc.web.api.calls import api_routes
+from urc.web.api.recordings import RecordingCalls
+from urc.web.api.robots import RobotCalls
 from urc.web.api_document import DOCUMENT, document
 from urc.web.audit.routes import AuditRoutes
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
@@ -52,9 +55,8 @@ from urc.web.page_socket import BrowserClient
 from urc.web.serve.access import Access
 from urc.web.serve.actors import stopper_of
 from urc.web.serve.policy import Policy
+from urc.web.serve.replies import API, Endpoint, told
 from urc.web.serve.rights import (
-    ANYONE,
-    DRIVE,
     LOCAL,
     MAINTAIN_SERVER,
     SIGNED_IN,
@@ -78,6 +80,7 @@ __all__ = ["Robot", "build_app", "serve"]
 _PAGE = {"cache-control": "no-store"}
 _LATE_S = 2.0
 """Interval for entries about repeated events, in seconds."""
+_NO_ROBOT = "no robot of that name is served here"
 
 
 def build_app(
@@ -91,6 +94,7 @@ def build_app(
     remake: Mapping[str, Remake] | None = None,
     robot_options: RobotOptions | None = None,
     trusted: Iterable[str] = (),
+    recordings: Path | None = None,
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -107,6 +111,7 @@ def build_app(
         robot_options: options of the robot factory; None for a server without managers and
             settings.
         trusted: names of third-party widgets that run in the page instead of a frame.
+        recordings: folder of the recordings; None for a server that records nothing.
 
     Raises:
         UrcError: two robots use different widgets of the same name.
@@ -124,6 +129,8 @@ def build_app(
             has_audit=audit is not None,
         ),
         access=access,
+        recording_calls=RecordingCalls(lambda: fleet.stations, recordings),
+        robot_calls=RobotCalls(lambda: fleet.stations, access.followed),
         audit=audit,
         recorder=recorder,
         trust=WidgetTrust.of(trusted),
@@ -199,21 +206,18 @@ class _Dashboard(Starlette):
             ways=routes.ways,
         )
         frames = FrameDocuments(routes.modules, files.has_widget, access.frame_code)
+        parts = routes.with_calls()
+        endpoints = routes.endpoints()
+        for part in parts:
+            endpoints |= part.endpoints()
         super().__init__(
             routes=[
                 ProtectedRoute("/", routes.menu, SIGNED_IN),
                 ProtectedRoute("/robots/{name}/", routes.robot, WATCH),
                 *Cards(lambda: routes.stations).routes(),
-                ProtectedRoute("/healthz", routes.health, ANYONE),
                 ProtectedRoute(DOCUMENT, document, SIGNED_IN),
-                ProtectedRoute("/api/v1/robots/{name}/stop", routes.stop, ANYONE, methods=["POST"]),
-                ProtectedRoute("/api/v1/robots/{name}/controls", routes.controls, WATCH),
-                *routes.audit_routes(),
-                ProtectedRoute("/api/v1/robots/{name}/recording", routes.recording, WATCH),
-                ProtectedRoute(
-                    "/api/v1/robots/{name}/recording/move", routes.move, DRIVE, methods=["POST"]
-                ),
-                *routes.manage_routes(),
+                *api_routes(endpoints),
+                *(route for one in parts for route in one.routes()),
                 *gallery.routes(),
                 *files.routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
@@ -221,7 +225,7 @@ class _Dashboard(Starlette):
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
                 ProtectedSocket("/ws/spare", routes.spare, SIGNED_IN),
                 *(dev.routes() if dev else no_dev_routes()),
-                *(routes.dev_start.routes() if routes.dev_start else no_dev_start()),
+                *(() if routes.dev_start else no_dev_start()),
             ],
             exception_handlers={HTTPException: _told, 404: _told, 405: _told, Exception: _broken},
             lifespan=routes.lifespan,
@@ -243,6 +247,8 @@ class _Routes:
     ways: NavigationLinks
     access: Access
     recorder: ServerRecorder
+    recording_calls: RecordingCalls
+    robot_calls: RobotCalls
     audit: AuditLog | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
@@ -260,17 +266,29 @@ class _Routes:
         """The stations of the robots, by the name in their URL."""
         return self.fleet.stations
 
-    def audit_routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the audit log."""
-        return AuditRoutes(self.audit, self.recorder, lambda: self.stations, self.ways).routes()
+    def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
+        """Return the providers of pages with calls of the API."""
+        found: list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart] = [
+            AuditRoutes(self.audit, self.recorder, lambda: self.stations, self.ways)
+        ]
+        if self.manager is not None:
+            found.append(ManageRoutes(self.manager, self.ways, self.recorder))
+            found.append(SettingsRoutes(self.manager, self.ways, self.recorder))
+        if self.dev_start is not None:
+            found.append(self.dev_start)
+        return found
 
-    def manage_routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the managers; empty without managers."""
-        if self.manager is None:
-            return []
-        manage = ManageRoutes(self.manager, self.ways, self.recorder)
-        settings = SettingsRoutes(self.manager, self.ways, self.recorder)
-        return [*manage.routes(), *settings.routes()]
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoints of the API that every server has, by the name of their call."""
+        return {
+            "health": self.health,
+            "stop": self.stop,
+            "controls": self.controls,
+            "playback": self.recording,
+            "playback_move": self.move,
+            **self.robot_calls.endpoints(),
+            **self.recording_calls.endpoints(),
+        }
 
     def stoppable(self) -> list[Stoppable]:
         """Return all robots that STOP can stop."""
@@ -317,6 +335,8 @@ class _Routes:
                 if self.manager is not None:
                     tasks.append(group.create_task(self.manager.watch_blocks()))
                 yield
+                self.robot_calls.sessions.close()
+                await self.recording_calls.close()
                 for task in tasks:
                     task.cancel()
                 if self.manager is not None:
@@ -388,9 +408,9 @@ class _Routes:
         """Stop a robot and latch the stop; pages without a working socket use this request."""
         service = self.stations.get(request.path_params["name"])
         if service is None:
-            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
+            return told(404, _NO_ROBOT, "unknown-robot")
         if not service.controls.controller.can_move or service.robot.playback is not None:
-            return JSONResponse({"error": "this robot has no motion to stop"}, 409, _PAGE)
+            return told(409, "this robot has no motion to stop", "no-motion")
         name = request.path_params["name"]
         who = stopper_of(request, name)
         was_latched = bool(service.controls.controller.lease.latched)
@@ -405,7 +425,7 @@ class _Routes:
         """Return the lease of a robot and the state of its STOP."""
         service = self.stations.get(request.path_params["name"])
         if service is None:
-            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
+            return told(404, _NO_ROBOT, "unknown-robot")
         return JSONResponse(service.who(), headers=_PAGE)
 
     async def recording(self, request: Request) -> Response:
@@ -458,8 +478,8 @@ def _playback_url(name: str) -> str:
 async def _told(request: Request, error: Exception) -> Response:
     if not isinstance(error, HTTPException):
         raise error
-    if request.url.path.startswith("/api/"):
-        return JSONResponse({"error": error.detail}, error.status_code, _PAGE)
+    if request.url.path.startswith(API):
+        return told(error.status_code, error.detail)
     standard = HTTPStatus(error.status_code).phrase
     text = (
         words.t("There is no such page.")
@@ -473,4 +493,6 @@ async def _told(request: Request, error: Exception) -> Response:
 
 async def _broken(request: Request, _: Exception) -> Response:
     text = words.t("Something broke inside URC. The server's log says what.")
+    if request.url.path.startswith(API):
+        return told(500, text)
     return HTMLResponse(error_page(request.state.nonce, 500, text), 500, headers=_PAGE)

@@ -66,7 +66,7 @@ def test_a_program_without_the_key_gets_one_line(path: str) -> None:
     with at(ACCESS) as browser:
         answer = browser.get(path)
         assert answer.status_code == 401
-        assert answer.json() == {"error": SAID}
+        assert answer.json() == {"code": "unauthorized", "message": SAID, "error": SAID}
         assert answer.headers["www-authenticate"].startswith("Bearer")
         assert browser.get(path, headers=BEARER).status_code in (200, 404)
 

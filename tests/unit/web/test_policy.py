@@ -246,7 +246,9 @@ OURS = ("origin", "http://127.0.0.1:8080")
         ([HOST, WITH_KEY], "http", "POST", 200),
         ([HOST, WITH_KEY], "websocket", "GET", 200),
         ([HOST, WITH_KEY, ("origin", "http://evil.example")], "http", "POST", 403),
-        ([HOST, ("authorization", "Bearer guessed")], "http", "POST", 403),
+        # No page of another site can send it; the sign-in refuses the token, or lets STOP pass.
+        ([HOST, ("authorization", "Bearer guessed")], "http", "POST", 200),
+        ([HOST, ("authorization", "Basic guessed")], "http", "POST", 403),
         ([HOST, ("origin", "http://evil.example")], "http", "GET", 200),
         ([], "http", "GET", 421),
         ([HOST, HOST], "http", "GET", 421),

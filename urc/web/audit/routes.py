@@ -21,9 +21,9 @@ from urc.runtime.audit_search import AuditQuery, SearchTimeout, search
 from urc.runtime.audit_table import AuditRow
 from urc.runtime.server_recorder import ServerRecorder
 from urc.web.audit.query import BadQuery, query_of
-from urc.web.manage.routes import answer, told
 from urc.web.manage.wire import AuditResult
 from urc.web.serve.actors import actor_of
+from urc.web.serve.replies import Endpoint, answer, told
 from urc.web.serve.rights import (
     MAINTAIN,
     MAINTAIN_ANYWHERE,
@@ -84,13 +84,12 @@ class AuditRoutes:
         self._exports = 0
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes."""
-        return [
-            ProtectedRoute("/audit", self.page, MAINTAIN_ANYWHERE),
-            ProtectedRoute("/api/v1/audit", self.entries, MAINTAIN_ANYWHERE),
-            ProtectedRoute("/api/v1/audit/export", self.export, MAINTAIN_ANYWHERE),
-            ProtectedRoute("/api/v1/robots/{name}/timeline", self.timeline, MAINTAIN),
-        ]
+        """Return the route of the page."""
+        return [ProtectedRoute("/audit", self.page, MAINTAIN_ANYWHERE)]
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoints of the API requests, by the name of their call."""
+        return {"audit": self.entries, "audit_export": self.export, "timeline": self.timeline}
 
     async def page(self, request: Request) -> Response:
         """Show the page."""
@@ -122,7 +121,7 @@ class AuditRoutes:
         if self._log is None:
             return told(404, _NO_LOG)
         if self._exports >= _EXPORTS:
-            return told(503, f"{_EXPORTS} exports are under way: try again in a minute")
+            return told(429, f"{_EXPORTS} exports are under way: try again in a minute")
         robots = self._scope(request)
         self._recorder.audit_exported(actor_of(request))
         await asyncio.to_thread(self._log.settle, _SETTLE_S)

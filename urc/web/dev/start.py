@@ -19,8 +19,8 @@ from urc.runtime.open_profile import open_document
 from urc.web.dev.watch import Remake
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robots import Robot
-from urc.web.manage.routes import answer, told
 from urc.web.manage.wire import ReloadResult
+from urc.web.serve.replies import Endpoint, answer, told
 from urc.web.serve.rights import LOCAL, SIGNED_IN, ProtectedRoute
 from urc.web.show.menu import Nav, NavigationLinks, SettingRow, setting_row
 from urc.web.show.pages import PageHead, render
@@ -77,11 +77,12 @@ class DevStart:
         self._ways = ways
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the start page and of its button."""
-        return [
-            ProtectedRoute("/dev", self.page, LOCAL),
-            ProtectedRoute("/api/v1/robots/{name}/dev/start", self.start, LOCAL, methods=["POST"]),
-        ]
+        """Return the route of the start page."""
+        return [ProtectedRoute("/dev", self.page, LOCAL)]
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoint of the page's button, by the name of its call."""
+        return {"dev_start": self.start}
 
     async def page(self, request: Request) -> Response:
         """Return the page that shows the fixed values."""

@@ -10,8 +10,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc.web.fleet.robots import Playback
-from urc.web.manage.routes import ApiError, answer, body_of, told
 from urc.web.manage.wire import PlaybackRequest, PlaybackState
+from urc.web.serve.replies import ApiError, answer, body_of, told
 
 __all__ = ["move_playback", "playback_state"]
 
@@ -38,7 +38,7 @@ async def move_playback(request: Request, playback: Playback | None) -> Response
     try:
         asked = await body_of(request, PlaybackRequest)
     except ApiError as refusal:
-        return told(refusal.status, refusal.line)
+        return told(refusal.status, refusal.line, refusal.code)
     if asked.position_s is not None and math.isfinite(asked.position_s):
         playback.seek(asked.position_s)
     if asked.is_playing is not None and asked.is_playing != playback.is_playing:

@@ -10,9 +10,8 @@ from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
-import msgspec
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
@@ -24,7 +23,6 @@ from urc.web.manage.manager import Manager
 from urc.web.manage.upload_source import given_source
 from urc.web.manage.wire import (
     Add,
-    Failure,
     InstallRequest,
     JobDecision,
     JobNews,
@@ -34,13 +32,14 @@ from urc.web.manage.wire import (
     Url,
 )
 from urc.web.serve.actors import actor_of
+from urc.web.serve.replies import ApiError, Endpoint, answer, body_of, told
 from urc.web.serve.rights import MAINTAIN_SERVER, SIGNED_IN, ProtectedRoute
 from urc.web.serve.visitor import visitor_of
 from urc.web.show.menu import Nav, NavigationLinks
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["ManageRoutes", "ApiError", "answer", "body_of", "told"]
+__all__ = ["ManageRoutes"]
 
 
 KINDS = {
@@ -109,37 +108,7 @@ def manage_page(
 
 _NO_STORE: Final = {"cache-control": "no-store"}
 _KINDS: Final = tuple(FOLDERS.values())
-_T = TypeVar("_T")
 _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
-
-
-class ApiError(Exception):
-    """An error response: a status and one line of text."""
-
-    def __init__(self, status: int, line: str) -> None:
-        super().__init__(line)
-        self.status = status
-        self.line = line
-
-
-def answer(value: object, status: int = 200) -> Response:
-    """Return a JSON response that is not cached."""
-    return Response(msgspec.json.encode(value), status, _NO_STORE, media_type="application/json")
-
-
-async def body_of(request: Request, kind: type[_T]) -> _T:
-    """Return the JSON body of a request, decoded as `kind`, or raise `ApiError`."""
-    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        raise ApiError(415, "expected a body of type application/json")
-    try:
-        return msgspec.json.decode(await request.body(), type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ApiError(400, f"the request body does not match the schema: {error}") from None
-
-
-def told(status: int, line: str) -> Response:
-    """Return an error response with one line of text."""
-    return answer(Failure(line), status)
 
 
 def _api(handler: _Handler) -> _Handler:
@@ -150,7 +119,7 @@ def _api(handler: _Handler) -> _Handler:
         try:
             return await handler(self, request)
         except ApiError as refusal:
-            return told(refusal.status, refusal.line)
+            return told(refusal.status, refusal.line, refusal.code)
         except Busy as error:
             return told(409, str(error))
         except UrcError as error:
@@ -177,30 +146,29 @@ class ManageRoutes:
         self._recorder = recorder
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the pages and of their API requests."""
-        posts = {
-            "repositories": self.connect,
-            "repositories/remove": self.disconnect,
-            "packages/install": self.install,
-            "packages/add": self.add,
-            "packages/upload": self.upload,
-            "packages/update": self.update,
-            "packages/back": self.back,
-            "packages/remove": self.remove,
-            "job/agree": self.agree,
-            "job/cancel": self.cancel,
-        }
+        """Return the routes of the pages."""
         return [
             ProtectedRoute("/drivers", self.page, SIGNED_IN),
             ProtectedRoute("/interfaces", self.page, SIGNED_IN),
             ProtectedRoute("/widgets/installed", self.page, SIGNED_IN),
-            ProtectedRoute("/api/v1/packages", self.cache, SIGNED_IN),
-            ProtectedRoute("/api/v1/repositories/ask", self.refresh, SIGNED_IN, methods=["POST"]),
-            *(
-                ProtectedRoute(f"/api/v1/{path}", one, MAINTAIN_SERVER, methods=["POST"])
-                for path, one in posts.items()
-            ),
         ]
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoints of the API requests, by the name of their call."""
+        return {
+            "packages": self.cache,
+            "repositories_ask": self.refresh,
+            "repositories_add": self.connect,
+            "repositories_remove": self.disconnect,
+            "packages_install": self.install,
+            "packages_add": self.add,
+            "packages_upload": self.upload,
+            "packages_update": self.update,
+            "packages_back": self.back,
+            "packages_remove": self.remove,
+            "job_agree": self.agree,
+            "job_cancel": self.cancel,
+        }
 
     async def page(self, request: Request) -> Response:
         """Show a manager."""

@@ -27,10 +27,10 @@ from urc.runtime.settings_store import StoredSettings
 from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
-from urc.web.manage.routes import ApiError, answer, body_of, told
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
 from urc.web.serve.actors import actor_of
+from urc.web.serve.replies import ApiError, Endpoint, answer, body_of, told
 from urc.web.serve.rights import MAINTAIN, WATCH, ProtectedRoute
 from urc.web.serve.visitor import visitor_of
 from urc.web.show.cells import spoken
@@ -61,11 +61,12 @@ class SettingsRoutes:
         self._trying: set[str] = set()
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the settings page and of its form."""
-        return [
-            ProtectedRoute("/robots/{name}/settings", self.page, WATCH),
-            ProtectedRoute("/api/v1/robots/{name}/settings", self.save, MAINTAIN, methods=["POST"]),
-        ]
+        """Return the route of the settings page."""
+        return [ProtectedRoute("/robots/{name}/settings", self.page, WATCH)]
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoint of the form, by the name of its call."""
+        return {"settings": self.save}
 
     async def page(self, request: Request) -> Response:
         """Show the settings page of a robot."""
@@ -120,7 +121,7 @@ class SettingsRoutes:
             finally:
                 self._trying.discard(name)
         except ApiError as refusal:
-            return told(refusal.status, refusal.line)
+            return told(refusal.status, refusal.line, refusal.code)
         except Busy as error:
             return told(409, str(error))
         except UrcError as error:

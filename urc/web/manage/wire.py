@@ -15,7 +15,6 @@ __all__ = [
     "RefreshRequest",
     "AuditResult",
     "Available",
-    "Failure",
     "RemovedPackages",
     "HealthStatus",
     "Installed",
@@ -214,13 +213,6 @@ class RemovedPackages(ManageMessage, frozen=True):
     line: str
     has_settings: bool = False
     """Whether the robot has settings, which the removal may delete."""
-
-
-class Failure(ManageMessage, frozen=True):
-    """Error response with the reason for a failed request."""
-
-    error: str
-    """The reason, as one line of text."""
 
 
 class HealthStatus(ManageMessage, frozen=True):

@@ -99,7 +99,7 @@ class Access:
             if name == b"authorization" and scheme.lower() == "bearer":
                 who = self.control.identify(word.strip())
                 is_token = who.way == "token"  # a cookie's secret is no token
-                return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=is_token)
+                return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=True)
         # Programs on other ports of a machine may set cookies of the same name: all are tried.
         known = list(_cookies(pairs))
         for cookie in (self.cookie, self.sign_in_cookie):

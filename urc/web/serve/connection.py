@@ -53,6 +53,9 @@ def _stops(data: bytes) -> bool:
 class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
+    A response that never ends finds a function that closes its connection in
+    ``scope["state"]["abort"]``.
+
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
         class uses the constructor's arguments, the method `send_400_response`, and the attributes
         `conn`, `connections`, `loop` and `transport` of its base class. The tests in
@@ -69,7 +72,7 @@ class HttpConnection(H11Protocol):
         request_s: float = REQUEST_S,
         most: int = CONNECTIONS,
     ) -> None:
-        super().__init__(config, server_state, app_state, _loop)
+        super().__init__(config, server_state, {**app_state, "abort": self._abort}, _loop)
         self._request_s = request_s
         self._most = most
         self._alarm: asyncio.TimerHandle | None = None
@@ -107,6 +110,10 @@ class HttpConnection(H11Protocol):
     def send_400_response(self, msg: str) -> None:
         """Refuse invalid HTTP; the base class calls this method."""
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
+
+    def _abort(self) -> None:
+        """Close the connection without waiting for a reader that reads nothing."""
+        self.transport.abort()
 
     def _make_room(self) -> bool:
         """Close an idle connection; return False if no connection is idle."""

@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from urc._addresses import unmapped
 from urc.web.serve.access import Access
 from urc.web.serve.connection_quota import ConnectionQuota, is_stop
+from urc.web.serve.replies import API, told
 
 __all__ = [
     "BODY_BYTES",
@@ -257,6 +258,7 @@ class _Answer:
         self._send = send
         self._state = scope["state"]
         self._is_upgrade = scope["type"] == "websocket"
+        self._is_call = not self._is_upgrade and scope["path"].startswith(API)
         self._can_explain = "websocket.http.response" in (scope.get("extensions") or {})
         self._has_begun = False
         self._policy = _CONTENT_POLICY.format(nonce=nonce)
@@ -288,15 +290,17 @@ class _Answer:
         await self._send(message)
 
     async def refuse(self, status: int, text: str) -> None:
-        """Respond with one line of plain text."""
+        """Respond with one line: as JSON to a call of the API, otherwise as plain text."""
         if self._is_upgrade and not self._can_explain:
             self._has_begun = True
             await self._send({"type": "websocket.close", "code": 1008, "reason": text})
             return
         prefix = "websocket.http.response" if self._is_upgrade else "http.response"
-        body = text.encode() + b"\n"
+        body, media = text.encode() + b"\n", b"text/plain; charset=utf-8"
+        if self._is_call:
+            body, media = bytes(told(status, text).body), b"application/json"
         headers = [
-            (b"content-type", b"text/plain; charset=utf-8"),
+            (b"content-type", media),
             (b"content-length", str(len(body)).encode()),
             (b"cache-control", b"no-store"),
         ]

@@ -45,8 +45,8 @@ class Visitor:
         Args:
             rights: source of the present rights.
             identity: the proven identity; `NOBODY` for an unknown visitor.
-            is_program: whether the request carries a token; a page of another site cannot send
-                such a request.
+            is_program: whether the request carries a token, valid or not; a page of another site
+                cannot send such a request.
         """
         self._rights = rights
         self.identity = identity

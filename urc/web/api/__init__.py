@@ -1,0 +1,1 @@
+"""The HTTP API for programs: robots, signals, commands, motion under a lease, and recordings."""

@@ -1,0 +1,457 @@
+"""The table of all calls of the HTTP API: path, right, body, answer and errors.
+
+Layer 5. The table is the source of the routes and of the OpenAPI document, so the two can't differ.
+A route of the API is made only here, and each call names its right.
+"""
+
+from collections.abc import Mapping
+from typing import Final, Literal, NamedTuple
+
+from urc.web.api.wire import (
+    CommandAnswer,
+    CommandAsked,
+    LeaseAnswer,
+    LeaseAsked,
+    MotionAnswer,
+    MotionAsked,
+    RecordingList,
+    RecordingState,
+    RobotInfo,
+    RobotList,
+    SignalValue,
+    SignalValues,
+)
+from urc.web.manage.wire import (
+    Add,
+    AuditResult,
+    ControlState,
+    HealthStatus,
+    InstallRequest,
+    JobDecision,
+    JobNews,
+    PackageList,
+    PlaybackRequest,
+    PlaybackState,
+    RefreshRequest,
+    ReloadResult,
+    RemovedPackages,
+    ResultLine,
+    SettingsAnswer,
+    SettingsAsked,
+    StopResult,
+    Url,
+)
+from urc.web.serve.replies import Endpoint
+from urc.web.serve.rights import (
+    ANYONE,
+    DRIVE,
+    LOCAL,
+    MAINTAIN,
+    MAINTAIN_ANYWHERE,
+    MAINTAIN_SERVER,
+    SIGNED_IN,
+    WATCH,
+    ProtectedRoute,
+    Right,
+)
+
+__all__ = ["CALLS", "JSON", "Call", "Query", "api_routes"]
+
+JSON: Final = "application/json"
+_ROBOT: Final = "/api/v1/robots/{name}"
+
+
+class Query(NamedTuple):
+    """An optional parameter of a query."""
+
+    name: str
+    summary: str
+    type: Literal["string", "integer", "number"] = "string"
+
+
+class Call(NamedTuple):
+    """One call."""
+
+    name: str
+    """Unique name, and key of its endpoint."""
+    path: str
+    right: Right
+    summary: str
+    answer: type | None
+    """Type of the JSON answer; None: the answer is a file or a stream."""
+    body: type | None = None
+    """Type of the request body: bytes, or a type of JSON; None for a request without a body."""
+    method: Literal["GET", "POST"] = "GET"
+    status: int = 200
+    query: tuple[Query, ...] = ()
+    errors: tuple[int, ...] = ()
+    """Statuses of failures, besides the failures of the right, path and body."""
+    media: tuple[str, ...] = (JSON,)
+    """Media types of the answer."""
+    is_body_needed: bool = True
+
+
+_NAMES: Final = Query("signals", "Names of signals, separated by commas; default: all.")
+_FILTERS: Final = (
+    Query("robot", "Name of a robot."),
+    Query("who", "Name of a person, device or program."),
+    Query("what", "Kinds of entries, separated by commas."),
+    Query("text", "Text in an entry."),
+    Query("since", "Earliest time, in seconds since 1970.", "number"),
+    Query("until", "Latest time, in seconds since 1970.", "number"),
+    Query("before", "Number of an entry; only older entries are returned.", "integer"),
+    Query("last", "Largest number of entries, up to 1000.", "integer"),
+)
+_NO_ROBOT: Final = (409, 429)
+"""The robot cannot be connected, or too many clients use it."""
+
+CALLS: Final[tuple[Call, ...]] = (
+    Call("health", "/healthz", ANYONE, "The health of the server, and its version.", HealthStatus),
+    # Robots
+    Call("robots", "/api/v1/robots", SIGNED_IN, "The robots that you may watch.", RobotList),
+    Call("robot", _ROBOT, WATCH, "A robot with its signals and commands.", RobotInfo),
+    Call(
+        "document",
+        f"{_ROBOT}/document",
+        MAINTAIN,
+        "The document of a robot as one YAML text, without values of settings.",
+        None,
+        errors=(409,),
+        media=("application/yaml",),
+    ),
+    Call(
+        "signals",
+        f"{_ROBOT}/signals",
+        WATCH,
+        "The latest values of signals. The call connects the robot if necessary.",
+        SignalValues,
+        query=(_NAMES,),
+        errors=_NO_ROBOT,
+    ),
+    Call(
+        "signal",
+        f"{_ROBOT}/signals/{{signal}}",
+        WATCH,
+        "The latest value of one signal. An image is sent as a file; the header x-urc-age-ms has"
+        " its age.",
+        SignalValue,
+        errors=_NO_ROBOT,
+        media=(
+            *(JSON, "image/jpeg", "image/png", "image/gif", "image/bmp", "image/webp"),
+            *("image/avif", "application/octet-stream"),
+        ),
+    ),
+    Call(
+        "stream",
+        f"{_ROBOT}/stream",
+        WATCH,
+        "Server-Sent Events: “values” has changed signals, “connections” the states of the"
+        " connections, and “end” the reason for the end. A slow reader skips values.",
+        None,
+        query=(_NAMES,),
+        errors=_NO_ROBOT,
+        media=("text/event-stream",),
+    ),
+    Call(
+        "command",
+        f"{_ROBOT}/commands/{{command}}",
+        DRIVE,
+        "Run a command or sequence, and return its reply. The command may need a higher role.",
+        CommandAnswer,
+        CommandAsked,
+        "POST",
+        errors=(409, 422, 424, 428, 429),
+        is_body_needed=False,
+    ),
+    Call(
+        "lease",
+        f"{_ROBOT}/lease",
+        DRIVE,
+        "Take, ask for, hand over or leave the controls of a robot, or reset STOP. A session ends"
+        " 10 s after its last request.",
+        LeaseAnswer,
+        LeaseAsked,
+        "POST",
+        errors=(409, 429),
+    ),
+    Call(
+        "motion",
+        f"{_ROBOT}/motion",
+        DRIVE,
+        "Pass on the newest input of a held command. Silence longer than its lease stops the"
+        " robot. For motion, the WebSocket is the better way.",
+        MotionAnswer,
+        MotionAsked,
+        "POST",
+        errors=(409, 429),
+    ),
+    Call(
+        "stop",
+        f"{_ROBOT}/stop",
+        ANYONE,
+        "Stop a robot and latch its STOP. Resetting STOP needs the role drive.",
+        StopResult,
+        method="POST",
+        errors=(409, 429),
+    ),
+    Call(
+        "controls",
+        f"{_ROBOT}/controls",
+        WATCH,
+        "The operator who drives a robot, and the state of its STOP latch.",
+        ControlState,
+    ),
+    Call(
+        "timeline",
+        f"{_ROBOT}/timeline",
+        MAINTAIN,
+        "Search the audit log for entries of one robot, newest entry first.",
+        AuditResult,
+        query=tuple(one for one in _FILTERS if one.name != "robot"),
+        errors=(400,),
+    ),
+    Call(
+        "audit",
+        "/api/v1/audit",
+        MAINTAIN_ANYWHERE,
+        "Search the audit log, newest entry first. You see the entries of the robots that you"
+        " maintain.",
+        AuditResult,
+        query=_FILTERS,
+        errors=(400, 404),
+    ),
+    Call(
+        "audit_export",
+        "/api/v1/audit/export",
+        MAINTAIN_ANYWHERE,
+        "All visible entries of the audit log as JSON lines, oldest entry first.",
+        None,
+        errors=(404,),
+        media=("application/jsonl",),
+    ),
+    # Recordings
+    Call(
+        "recordings",
+        "/api/v1/recordings",
+        MAINTAIN_ANYWHERE,
+        "The recordings of the robots that you maintain, newest first.",
+        RecordingList,
+        errors=(409,),
+    ),
+    Call(
+        "recording_file",
+        "/api/v1/recordings/{file}",
+        MAINTAIN_ANYWHERE,
+        "A recording as an MCAP file.",
+        None,
+        media=("application/octet-stream",),
+    ),
+    Call(
+        "recording_state",
+        f"{_ROBOT}/recordings",
+        MAINTAIN,
+        "The state of the recording that a program has started.",
+        RecordingState,
+    ),
+    Call(
+        "recording_start",
+        f"{_ROBOT}/recordings/start",
+        MAINTAIN,
+        "Start a recording of a robot; the server needs a folder for recordings (--record).",
+        RecordingState,
+        method="POST",
+        errors=_NO_ROBOT,
+    ),
+    Call(
+        "recording_stop",
+        f"{_ROBOT}/recordings/stop",
+        MAINTAIN,
+        "End the recording that a program has started.",
+        RecordingState,
+        method="POST",
+        errors=(409,),
+    ),
+    Call(
+        "playback",
+        f"{_ROBOT}/recording",
+        WATCH,
+        "State of the playback of a recording.",
+        PlaybackState,
+    ),
+    Call(
+        "playback_move",
+        f"{_ROBOT}/recording/move",
+        DRIVE,
+        "Play, pause or seek the playback of a recording.",
+        PlaybackState,
+        PlaybackRequest,
+        "POST",
+    ),
+    # Settings and packages
+    Call(
+        "settings",
+        f"{_ROBOT}/settings",
+        MAINTAIN,
+        "Test the settings with the robot, then store and use them immediately.",
+        SettingsAnswer,
+        SettingsAsked,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "dev_start",
+        f"{_ROBOT}/dev/start",
+        LOCAL,
+        "Reload the documents of a robot; needs --dev.",
+        ReloadResult,
+        method="POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "packages",
+        "/api/v1/packages",
+        SIGNED_IN,
+        "Installed packages, packages available from repositories, and the current job.",
+        PackageList,
+        query=(
+            Query("kinds", "Kinds of packages, separated by commas."),
+            Query("words", "Words to search for."),
+        ),
+    ),
+    Call(
+        "repositories_ask",
+        "/api/v1/repositories/ask",
+        SIGNED_IN,
+        "Start a refresh of the package lists.",
+        ResultLine,
+        RefreshRequest,
+        "POST",
+        202,
+        errors=(409, 422),
+    ),
+    Call(
+        "repositories_add",
+        "/api/v1/repositories",
+        MAINTAIN_SERVER,
+        "Add a repository, which must respond.",
+        ResultLine,
+        Url,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "repositories_remove",
+        "/api/v1/repositories/remove",
+        MAINTAIN_SERVER,
+        "Forget a repository.",
+        ResultLine,
+        Url,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_install",
+        "/api/v1/packages/install",
+        MAINTAIN_SERVER,
+        "Start a job that downloads a package with its dependencies and lists its permissions.",
+        JobNews,
+        InstallRequest,
+        "POST",
+        202,
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_add",
+        "/api/v1/packages/add",
+        MAINTAIN_SERVER,
+        "Start a job for a package given by its path in a repository or on this machine.",
+        JobNews,
+        Add,
+        "POST",
+        202,
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_upload",
+        "/api/v1/packages/upload",
+        MAINTAIN_SERVER,
+        "Start a job for an uploaded package, bundle or interface.yaml in the request body.",
+        JobNews,
+        bytes,
+        "POST",
+        202,
+        query=(Query("name", "Name of the uploaded file."),),
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_update",
+        "/api/v1/packages/update",
+        MAINTAIN_SERVER,
+        "Start a job that downloads a newer version of a package and lists the changes.",
+        JobNews,
+        InstallRequest,
+        "POST",
+        202,
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_back",
+        "/api/v1/packages/back",
+        MAINTAIN_SERVER,
+        "Restore the version of a package before its last update.",
+        RemovedPackages,
+        InstallRequest,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "packages_remove",
+        "/api/v1/packages/remove",
+        MAINTAIN_SERVER,
+        "Remove a package; without yes, only list the packages that would be removed.",
+        RemovedPackages,
+        InstallRequest,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "job_agree",
+        "/api/v1/job/agree",
+        MAINTAIN_SERVER,
+        "Install the planned package after its approval.",
+        JobNews,
+        JobDecision,
+        "POST",
+        errors=(409, 422),
+    ),
+    Call(
+        "job_cancel",
+        "/api/v1/job/cancel",
+        MAINTAIN_SERVER,
+        "Cancel the job before it changes anything.",
+        JobNews,
+        JobDecision,
+        "POST",
+        errors=(409, 422),
+    ),
+)
+
+
+def api_routes(endpoints: Mapping[str, Endpoint]) -> list[ProtectedRoute]:
+    """Return the routes of all calls with an endpoint.
+
+    Args:
+        endpoints: endpoints by the name of their call; a server without managers has none of their
+            calls.
+
+    Raises:
+        ValueError: an endpoint belongs to no call of the table.
+    """
+    unknown = endpoints.keys() - {call.name for call in CALLS}
+    if unknown:
+        raise ValueError(f"endpoints without a call: {', '.join(sorted(unknown))}")
+    return [
+        ProtectedRoute(call.path, endpoints[call.name], call.right, methods=[call.method])
+        for call in CALLS
+        if call.name in endpoints
+    ]

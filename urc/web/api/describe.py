@@ -1,0 +1,157 @@
+"""Descriptions of robots for programs, from their profiles and their present state.
+
+Layer 5. Pure.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from urc.model.driver import Argument, Command
+from urc.model.exchange import Confirm
+from urc.model.role import Role, includes
+from urc.model.values import Signal
+from urc.runtime.hub import LinkState, LinkStatus
+from urc.web.api.readings import plain
+from urc.web.api.wire import (
+    ArgumentInfo,
+    CommandInfo,
+    ConfirmInfo,
+    ConnectionInfo,
+    HoldInfo,
+    RobotInfo,
+    RobotSummary,
+    SignalInfo,
+)
+from urc.web.fleet.robots import RobotService, missing_settings
+
+__all__ = ["may_run", "robot_info", "summary"]
+
+_WORST_FIRST: Final[tuple[LinkState, ...]] = ("lost", "silent", "connecting", "live", "idle")
+_LIMITS: Final = ("lolo", "low", "high", "hihi")
+
+
+def summary(name: str, service: RobotService, role: Role) -> RobotSummary:
+    """Return a robot as an entry of a list; `role` is the visitor's role at the robot."""
+    profile = service.robot.profile
+    states = {one.state for one in _links(service).values()}
+    controls = service.who()
+    return RobotSummary(
+        name=name,
+        title=profile.title,
+        summary=profile.summary,
+        tags=profile.tags,
+        state=next((one for one in _WORST_FIRST if one in states), "idle"),
+        holder=str(controls["holder"]),
+        latched=str(controls["latched"]),
+        emulated=bool(controls["emulated"]),
+        role=role,
+    )
+
+
+def robot_info(
+    name: str, service: RobotService, role: Role, may_give: Callable[[str], bool]
+) -> RobotInfo:
+    """Return a robot with its signals and commands.
+
+    Args:
+        name: name of the robot in paths.
+        service: the robot.
+        role: role of the visitor at the robot.
+        may_give: whether the scope of the visitor's token contains a command.
+    """
+    profile = service.robot.profile
+    controller, links = service.controls.controller, _links(service)
+    return RobotInfo(
+        robot=summary(name, service, role),
+        missing=tuple(one.name for one in missing_settings(service.robot)),
+        connections=tuple(
+            _connection(transport, links.get(transport)) for transport in profile.driver.transports
+        ),
+        confirmed=controller.is_confirmed,
+        stops=controller.lease.state.stops,
+        signals=tuple(_signal(one) for one in profile.driver.signals.values()),
+        commands=tuple(
+            _command(one, is_allowed=may_run(one, role) and may_give(one.name))
+            for one in profile.driver.commands.values()
+        ),
+    )
+
+
+def may_run(command: Command, role: Role | None) -> bool:
+    """Return whether a role permits a command."""
+    return includes(role, command.role)
+
+
+def _links(service: RobotService) -> Mapping[str, LinkStatus]:
+    live = service.open_session
+    return live.session.hub.links if live is not None else {}
+
+
+def _connection(transport: str, link: LinkStatus | None) -> ConnectionInfo:
+    if link is None:
+        return ConnectionInfo(transport, "idle")
+    return ConnectionInfo(transport, link.state, link.address, link.detail)
+
+
+def _signal(signal: Signal) -> SignalInfo:
+    limits = {name: getattr(signal.limits, name) for name in _LIMITS}
+    return SignalInfo(
+        name=signal.name,
+        type=signal.type,
+        title=signal.title,
+        description=signal.description,
+        unit=signal.unit,
+        min=signal.min,
+        max=signal.max,
+        precision=signal.precision,
+        states=dict(signal.states),
+        limits={name: value for name, value in limits.items() if value is not None},
+        stale_after_s=signal.stale_after_s,
+        axes=signal.axes,
+        items=signal.items if signal.type == "array" else "",
+    )
+
+
+def _command(command: Command, *, is_allowed: bool) -> CommandInfo:
+    hold = command.hold
+    return CommandInfo(
+        name=command.name,
+        title=command.title,
+        description=command.description,
+        role=command.role,
+        allowed=is_allowed,
+        moves=command.moves,
+        stops=command.stops,
+        sequence=bool(command.steps),
+        hold=None
+        if hold is None
+        else HoldInfo(
+            hold.repeat_s,
+            hold.lease_s,
+            {name: plain(value) for name, value in hold.release.items()},
+        ),
+        confirm=_confirm(command.confirm) if command.confirm is not None else None,
+        arguments=tuple(_argument(one) for one in command.arguments.values()),
+    )
+
+
+def _argument(argument: Argument) -> ArgumentInfo:
+    return ArgumentInfo(
+        name=argument.name,
+        type=argument.type,
+        title=argument.title,
+        description=argument.description,
+        unit=argument.unit,
+        min=argument.min,
+        max=argument.max,
+        choices=argument.choices,
+        default=plain(argument.default),
+        required=argument.is_required and argument.default is None,
+        items=argument.items if argument.type == "array" else "",
+        size=argument.size,
+        confirm={value: _confirm(one) for value, one in argument.confirm.items()},
+    )
+
+
+def _confirm(confirm: Confirm) -> ConfirmInfo:
+    return ConfirmInfo(confirm.text, confirm.level, confirm.is_two_person)

@@ -1,0 +1,39 @@
+"""The document of a robot as one YAML text, without paths of this machine.
+
+Layer 5. A document contains no values of settings, so it contains no secrets of settings. Reading
+the sources blocks, so callers use a thread.
+"""
+
+from pathlib import PurePath
+
+from urc.config.resolve import resolve
+from urc.model.profile import Profile
+from urc.problems import has_errors
+from urc.runtime.widget_registry import widget_folder_of
+from urc.web.serve.replies import ApiError
+
+__all__ = ["document_of"]
+
+
+def document_of(profile: Profile) -> bytes:
+    """Return the profile, merged with all documents that it uses.
+
+    The comments name the file and line of each key, without the folders.
+
+    Raises:
+        ApiError: the document can no longer be read.
+    """
+    found = resolve(profile.file, widget_folder_of(profile.file), profile)
+    if not found.text or has_errors(found.problems):
+        raise ApiError(409, "the document of this robot can no longer be read", "not-readable")
+    head, *lines = found.text.splitlines()
+    head = f"# {PurePath(profile.file).name}, merged by 'urc resolve'."
+    return "\n".join((head, *map(_without_folder, lines), "")).encode()
+
+
+def _without_folder(line: str) -> str:
+    """Return a line of the resolved document whose comment names only a file."""
+    before, mark, origin = line.rpartition("  # ")
+    if not mark or not origin.rpartition(":")[2].isdecimal():
+        return line
+    return f"{before}{mark}{PurePath(origin).name}"

@@ -1,0 +1,166 @@
+"""Server-Sent Events of one robot: changed signals, newest wins.
+
+Layer 5. A reader has no queue. When its connection is free, it gets the newest values that changed
+since its last event. A slow reader skips values, and delays only itself. Source of the format: HTML
+standard, section 9.2 “Server-sent events”.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager, suppress
+from time import time
+from typing import Final
+
+import msgspec
+from starlette.types import Receive, Scope, Send
+
+from urc.runtime.clock import Clock, within
+from urc.runtime.hub import Hub
+from urc.web.api.readings import values_of
+from urc.web.api.wire import SignalValues
+from urc.web.fleet.robots import LiveSession
+
+__all__ = ["BEAT_S", "EVENTS_PER_S", "STALL_S", "EventStream"]
+
+EVENTS_PER_S: Final = 30.0
+"""Maximum rate of events."""
+BEAT_S: Final = 5.0
+"""Interval of comments on a quiet stream, in seconds; they show that the connection works."""
+STALL_S: Final = 15.0
+"""Time after which a reader that reads nothing is disconnected, in seconds."""
+_HEADERS: Final = [
+    (b"content-type", b"text/event-stream"),
+    (b"cache-control", b"no-store"),
+    (b"x-accel-buffering", b"no"),  # otherwise nginx would delay the events
+]
+_COMMENT: Final = b": beat\n\n"
+
+log = logging.getLogger(__name__)
+
+
+class EventStream:
+    """A response that ends with the reader, with its right, or with the robot's session."""
+
+    def __init__(
+        self,
+        live: LiveSession,
+        signals: Collection[str],
+        clock: Clock,
+        *,
+        may_read: Callable[[], bool],
+        followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
+        visit: AbstractContextManager[None],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            live: the open session.
+            signals: names of the signals to send.
+            clock: clock of the readings.
+            may_read: function that returns whether the visitor still has the right to read.
+            followed: function that returns a context; in this context, its callback is called
+                after each change of rights.
+            visit: context that keeps the session open.
+        """
+        self._live = live
+        self._signals = frozenset(signals)
+        self._clock = clock
+        self._may_read = may_read
+        self._followed = followed
+        self._visit = visit
+        self._news = asyncio.Event()
+        self._reason = ""
+        """Reason for the end of the stream; "" while it goes on."""
+        self._revoked = asyncio.Event()
+        self._seen = 0
+        """Hub revision of the last event."""
+        self._links = -1
+        """Number of the newest connection states in an event."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send events until the end of the stream."""
+        await send({"type": "http.response.start", "status": 200, "headers": _HEADERS})
+        with self._visit, self._followed(self._recheck):
+            self._recheck()
+            writing = asyncio.ensure_future(self._write(send))
+            leaving = asyncio.ensure_future(_left(receive))
+            revoked = asyncio.ensure_future(self._revoked.wait())
+            tasks = (writing, leaving, revoked)
+            try:
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for task in tasks:
+                    task.cancel()
+                outcome, *_ = await asyncio.gather(*tasks, return_exceptions=True)
+        if leaving.done() and not leaving.cancelled():
+            return
+        if not isinstance(outcome, TimeoutError):
+            # Nothing else is sent. A reader that reads nothing has time to notice the end.
+            body = _event("end", {"reason": self._reason})
+            with suppress(TimeoutError):
+                async with asyncio.timeout(STALL_S):
+                    await send({"type": "http.response.body", "body": body})
+                    return
+        log.warning("a stream was not read for %g s and was disconnected", STALL_S)
+        abort: Callable[[], None] = scope["state"]["abort"]
+        abort()
+        await asyncio.sleep(0)  # the server notices the end of the connection
+
+    def _recheck(self) -> None:
+        if not self._may_read():
+            self._reason = "your sign-in or your right has ended"
+            self._revoked.set()
+
+    async def _write(self, send: Send) -> None:
+        wake = self._news.set
+        self._live.fanout.join(wake)
+        try:
+            while True:
+                self._news.clear()
+                chunk = self._newest()
+                if chunk:
+                    await _send(send, chunk)
+                if self._live.ended.is_set():
+                    self._reason = "the session of the robot has ended"
+                    return
+                await self._clock.sleep(1 / EVENTS_PER_S)
+                try:
+                    async with within(self._clock, BEAT_S):
+                        await self._news.wait()
+                except TimeoutError:
+                    await _send(send, _COMMENT)
+        finally:
+            self._live.fanout.leave(wake)
+
+    def _newest(self) -> bytes:
+        """Return events with all changes since the last call; b"" without a change."""
+        hub, events = self._live.session.hub, b""
+        if self._links != hub.links_count:
+            self._links = hub.links_count
+            events += _event("connections", _connections(hub))
+        changed = [one.signal for one in hub.changed_since(self._seen)]
+        self._seen = hub.revision
+        values = values_of(hub, self._signals.intersection(changed), self._clock.now())
+        if values:
+            events += _event("values", SignalValues(time(), values))
+        return events
+
+
+async def _send(send: Send, chunk: bytes) -> None:
+    async with asyncio.timeout(STALL_S):
+        await send({"type": "http.response.body", "body": chunk, "more_body": True})
+
+
+async def _left(receive: Receive) -> None:
+    """Return when the reader has disconnected."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _connections(hub: Hub) -> dict[str, str]:
+    return {name: link.state for name, link in hub.links.items()}
+
+
+def _event(name: str, value: object) -> bytes:
+    return b"event: %s\ndata: %s\n\n" % (name.encode(), msgspec.json.encode(value))

@@ -1,0 +1,321 @@
+"""The HTTP API of robots: descriptions, signals, commands, and motion under a lease.
+
+Layer 5. The routes decode and answer; `sessions` drives, `command_runner` runs the commands, and
+`event_stream` sends the signals.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, ExitStack
+from time import time
+from typing import Final, TypeVar
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import ASGIApp
+
+from urc.images import media_type
+from urc.protocol.sequences.commands import questions
+from urc.runtime.clock import within
+from urc.runtime.hub import Hub
+from urc.runtime.one_shot_commands import HELD, OUT_OF_SCOPE, role_refusal
+from urc.web.api.describe import robot_info, summary
+from urc.web.api.documents import document_of
+from urc.web.api.event_stream import EventStream
+from urc.web.api.limits import RequestLimits
+from urc.web.api.readings import plain, value_of, values_of
+from urc.web.api.sessions import ProgramSession, ProgramSessions, opened
+from urc.web.api.wire import (
+    LONGEST_TIMEOUT_S,
+    CommandAnswer,
+    CommandAsked,
+    LeaseAnswer,
+    LeaseAsked,
+    MotionAsked,
+    RobotList,
+    SignalValues,
+)
+from urc.web.drive.command_runner import CommandOutcome
+from urc.web.feed.client_socket import SocketPeer
+from urc.web.fleet.robots import RobotService
+from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors, body_of
+from urc.web.serve.rights import WATCH
+from urc.web.serve.visitor import peer_of, visitor_of
+from urc.wire.client_messages import ApprovalRequest, CommandRequest
+
+__all__ = ["RobotCalls"]
+
+FIRST_VALUE_S: Final = 2.0
+"""Longest wait for the first value after a robot was connected, in seconds."""
+_STATUS: Final = {
+    "bad-argument": 422,
+    "unknown-command": 404,
+    "not-confirmed": 428,
+    "queue-full": 429,
+    "busy": 429,
+    "not-allowed": 409,
+    "stopped": 409,
+}
+"""Status of a failed command, by its code; the robot caused all other failures."""
+_BY_ROBOT: Final = 424
+_NO_STORE: Final = {"cache-control": "no-store"}
+_T = TypeVar("_T")
+
+
+class RobotCalls:
+    """The endpoints about robots."""
+
+    def __init__(
+        self,
+        stations: Callable[[], Mapping[str, RobotService]],
+        followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            stations: function that returns the robots, by their names in paths.
+            followed: function that returns a context; in this context, its callback is called
+                after each change of rights.
+        """
+        self._stations = stations
+        self._followed = followed
+        self.sessions = ProgramSessions(followed)
+        self._limits = RequestLimits()
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoints, by the name of their call."""
+        return {
+            "robots": self.robots,
+            "robot": self.robot,
+            "document": self.document,
+            "signals": self.signals,
+            "signal": self.signal,
+            "stream": self.stream,
+            "command": self.command,
+            "lease": self.lease,
+            "motion": self.motion,
+        }
+
+    # Descriptions
+
+    @answers_errors
+    async def robots(self, request: Request) -> Response:
+        """Return the robots that the visitor may watch."""
+        visitor = visitor_of(request)
+        found = []
+        for name, service in self._stations().items():
+            role = visitor.role(name)
+            if role is not None and visitor.may(WATCH, name):
+                found.append(summary(name, service, role))
+        return answer(RobotList(tuple(found)))
+
+    @answers_errors
+    async def robot(self, request: Request) -> Response:
+        """Return a robot with its signals and commands."""
+        name, service = self._service(request)
+        visitor = visitor_of(request)
+        role = visitor.role(name) or "watch"
+        return answer(robot_info(name, service, role, visitor.may_give))
+
+    @answers_errors
+    async def document(self, request: Request) -> Response:
+        """Return the document of a robot."""
+        _, service = self._service(request)
+        data = await asyncio.to_thread(document_of, service.robot.profile)
+        return Response(data, headers=_NO_STORE, media_type="application/yaml")
+
+    # Signals
+
+    @answers_errors
+    async def signals(self, request: Request) -> Response:
+        """Return the latest values of all or some signals."""
+        name, service = self._service(request)
+        names = _names(request, service)
+        with ExitStack() as stack:
+            live = await opened(service, self._peer(request, name), stack)
+            hub = live.session.hub
+            await _first(service, hub, lambda: any(hub.latest(one) for one in hub.signals))
+            values = values_of(hub, names, service.clock.now())
+        return answer(SignalValues(time(), values))
+
+    @answers_errors
+    async def signal(self, request: Request) -> Response:
+        """Return the latest value of one signal; an image as a file."""
+        name, service = self._service(request)
+        wanted = request.path_params["signal"]
+        signal = service.robot.profile.driver.signals.get(wanted)
+        if signal is None:
+            raise ApiError(404, f"{name} has no signal {wanted!r}", "unknown-signal")
+        with ExitStack() as stack:
+            live = await opened(service, self._peer(request, name), stack)
+            hub = live.session.hub
+            await _first(service, hub, lambda: hub.latest(wanted) is not None)
+            sample, now_s = hub.latest(wanted), service.clock.now()
+        if signal.type not in ("image", "blob"):
+            return answer(value_of(signal, sample, now_s))
+        if sample is None or not isinstance(sample.value, bytes):
+            raise ApiError(404, f"no value of {wanted!r} has arrived", "no-value")
+        request.state.is_file = True  # the robot's bytes must not act as a page of URC
+        age_ms = str(round(max(0.0, now_s - sample.time_s) * 1000))
+        headers = {**_NO_STORE, "x-urc-age-ms": age_ms}
+        return Response(sample.value, headers=headers, media_type=media_type(sample.value))
+
+    async def stream(self, request: Request) -> ASGIApp:
+        """Send changed signals until the reader leaves."""
+        return await self._stream(request)
+
+    @answers_errors
+    async def _stream(self, request: Request) -> Response:
+        name, service = self._service(request)
+        names, peer = _names(request, service), self._peer(request, name)
+        visitor = visitor_of(request)
+        with ExitStack() as stack:
+            live = await opened(service, peer, stack)
+        return EventStream(  # type: ignore[return-value]  # an ASGI application, as a response is
+            live,
+            names,
+            service.clock,
+            may_read=lambda: visitor.may(WATCH, name),
+            followed=self._followed,
+            visit=service.visit(peer.who),
+        )
+
+    # Commands
+
+    @answers_errors
+    async def command(self, request: Request) -> Response:
+        """Run a command, and return its reply."""
+        name, service = self._service(request)
+        asked = await _optional_body(request, CommandAsked, CommandAsked())
+        peer = self._moving_peer(request, name, service)
+        wanted = request.path_params["command"]
+        known = service.robot.profile.driver.commands.get(wanted)
+        if known is None:
+            raise ApiError(404, f"{name} has no command {wanted!r}", "unknown-command")
+        with self._limits.running(peer.who), ExitStack() as stack:
+            if asked.session:
+                session = self._session(request, service, asked.session)
+            else:
+                live = await opened(service, peer, stack)
+                session = stack.enter_context(self.sessions.temporary(service, live, peer))
+            run = CommandRequest(
+                0, wanted, asked.arguments, self._confirmation(session, asked, wanted), asked.stops
+            )
+            timeout_s = asked.timeout_s or (LONGEST_TIMEOUT_S if known.steps else None)
+            outcome = await service.commands.run(
+                session.operator, run, session.live.session, timeout_s=timeout_s
+            )
+            if outcome.code:
+                raise _failure(outcome, session, wanted)
+        return answer(CommandAnswer({key: plain(one) for key, one in outcome.values.items()}))
+
+    def _confirmation(self, session: ProgramSession, asked: CommandAsked, wanted: str) -> str:
+        """Return a token for a confirmed command; "" without a question."""
+        known = session.service.robot.profile.driver.commands[wanted]
+        questioned = questions(known, asked.arguments)
+        if any(one.is_two_person for one in questioned):
+            text = "two people must confirm this command: give it on a page"
+            raise ApiError(428, text, "needs-two-people")
+        if not questioned or not asked.confirmed:
+            return ""
+        approval = ApprovalRequest(0, wanted, asked.arguments)
+        return session.service.consent.prepare(session.operator, approval)
+
+    # Motion
+
+    @answers_errors
+    async def lease(self, request: Request) -> Response:
+        """Handle a request about the controls."""
+        name, service = self._service(request)
+        asked = await body_of(request, LeaseAsked)
+        peer = self._moving_peer(request, name, service)
+        if not service.controls.controller.can_move:
+            raise ApiError(409, "this robot has no motion", "no-motion")
+        if asked.session:
+            session = self._session(request, service, asked.session)
+            return answer(self._asked(session, asked))
+        session = await self.sessions.begin(service, peer)
+        try:
+            return answer(self._asked(session, asked))
+        except ApiError:
+            self.sessions.end(session)  # the program does not know its secret
+            raise
+
+    def _asked(self, session: ProgramSession, asked: LeaseAsked) -> LeaseAnswer:
+        said = session.ask(asked)
+        if asked.verb != "leave":
+            return said
+        self.sessions.end(session)
+        return msgspec.structs.replace(said, session="")
+
+    @answers_errors
+    async def motion(self, request: Request) -> Response:
+        """Pass on an input of a held command."""
+        name, service = self._service(request)
+        asked = await body_of(request, MotionAsked)
+        self._moving_peer(request, name, service)
+        return answer(self._session(request, service, asked.session).move(asked))
+
+    # Inside
+
+    def _service(self, request: Request) -> tuple[str, RobotService]:
+        name = request.path_params["name"]
+        service = self._stations().get(name)
+        if service is None:
+            raise ApiError(404, "no robot of that name is served here", "unknown-robot")
+        return name, service
+
+    def _peer(self, request: Request, name: str) -> SocketPeer:
+        return peer_of(request, name)
+
+    def _moving_peer(self, request: Request, name: str, service: RobotService) -> SocketPeer:
+        """Return the visitor; raise `ApiError` for a recording, or above the rate."""
+        peer = self._peer(request, name)
+        self._limits.count(peer.who, service.clock.now())
+        if service.robot.playback is not None:
+            raise ApiError(409, "this is the playback of a recording", "recorded")
+        return peer
+
+    def _session(self, request: Request, service: RobotService, secret: str) -> ProgramSession:
+        return self.sessions.find(secret, service, visitor_of(request).identity)
+
+
+async def _first(service: RobotService, hub: Hub, is_there: Callable[[], bool]) -> None:
+    """Wait for a first value after a robot was connected, for `FIRST_VALUE_S` at most."""
+    if is_there():
+        return
+    try:
+        with hub.subscribe() as subscription:
+            async with within(service.clock, FIRST_VALUE_S):
+                while not is_there():
+                    subscription.seen = hub.revision
+                    await subscription.changed()
+    except TimeoutError:
+        pass
+
+
+def _names(request: Request, service: RobotService) -> tuple[str, ...]:
+    """Return the names in the query parameter ``signals``, or all names."""
+    signals = service.robot.profile.driver.signals
+    text = request.query_params.get("signals", "")
+    names: Iterable[str] = dict.fromkeys(one.strip() for one in text.split(",") if one.strip())
+    for name in names:
+        if name not in signals:
+            raise ApiError(404, f"there is no signal {name[:200]!r}", "unknown-signal")
+    return tuple(names) or tuple(signals)
+
+
+async def _optional_body(request: Request, kind: type[_T], default: _T) -> _T:
+    """Return the body of a request, or `default` for an empty body."""
+    return await body_of(request, kind) if await request.body() else default
+
+
+def _failure(outcome: CommandOutcome, session: ProgramSession, command: str) -> ApiError:
+    status, message = _STATUS.get(outcome.code, _BY_ROBOT), outcome.message
+    if not (outcome.is_ours and outcome.code == "refused"):
+        return ApiError(status, message, outcome.code)
+    known = session.service.robot.profile.driver.commands[command]
+    if message in (OUT_OF_SCOPE, role_refusal(session.operator.client, known.role)):
+        return ApiError(403, message, "forbidden")
+    return ApiError(409, message, "held" if message == HELD else "refused")

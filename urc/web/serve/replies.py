@@ -1,0 +1,99 @@
+"""JSON responses of the HTTP API, and the bodies of its requests.
+
+Layer 5. Every failure has the same form, whether a route, the access control or the page policy
+refuses the request.
+"""
+
+from collections.abc import Awaitable, Callable
+from functools import wraps
+from http import HTTPStatus
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.problems import UrcError
+
+__all__ = ["API", "ApiError", "Endpoint", "Failure", "answer", "answers_errors", "body_of", "told"]
+
+Endpoint = Callable[..., Any]
+
+API: Final = "/api/"
+"""Start of the paths of the HTTP API."""
+_NO_STORE: Final = {"cache-control": "no-store"}
+_JSON: Final = "application/json"
+_T = TypeVar("_T")
+_Self = TypeVar("_Self")
+_P = ParamSpec("_P")
+
+
+class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Response to a request that failed."""
+
+    code: str
+    """Reason as a word for programs, such as ``not-found``."""
+    message: str
+    """Reason in one line, for people."""
+    error: str
+    """Same as `message`; the only key of earlier versions."""
+
+
+class ApiError(Exception):
+    """A failure: its status, one line of text, and a code."""
+
+    def __init__(self, status: int, line: str, code: str = "") -> None:
+        super().__init__(line)
+        self.status = status
+        self.line = line
+        self.code = code
+
+
+def answer(value: object, status: int = 200) -> Response:
+    """Return a JSON response that is not cached."""
+    return Response(msgspec.json.encode(value), status, _NO_STORE, media_type=_JSON)
+
+
+def told(status: int, line: str, code: str = "") -> Response:
+    """Return the response to a failed request.
+
+    Args:
+        status: HTTP status, 400 or above.
+        line: the reason, in one line.
+        code: the reason as a word; "" for the standard phrase of the status.
+    """
+    code = code or HTTPStatus(status).phrase.lower().replace(" ", "-")
+    return answer(Failure(code, line, line), status)
+
+
+async def body_of(request: Request, kind: type[_T]) -> _T:
+    """Return the JSON body of a request, decoded as `kind`.
+
+    Raises:
+        ApiError: the body is of another type.
+    """
+    if request.headers.get("content-type", "").partition(";")[0].strip() != _JSON:
+        raise ApiError(415, f"expected a body of type {_JSON}")
+    try:
+        return msgspec.json.decode(await request.body(), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ApiError(400, f"the request body does not match the schema: {error}") from None
+
+
+def answers_errors(
+    handler: Callable[Concatenate[_Self, Request, _P], Awaitable[Response]],
+) -> Callable[Concatenate[_Self, Request, _P], Awaitable[Response]]:
+    """Turn each `ApiError` and `UrcError` of a handler into a response."""
+
+    @wraps(handler)
+    async def handle(
+        self: _Self, request: Request, /, *args: _P.args, **named: _P.kwargs
+    ) -> Response:
+        try:
+            return await handler(self, request, *args, **named)
+        except ApiError as failure:
+            return told(failure.status, failure.line, failure.code)
+        except UrcError as error:
+            return told(409, str(error).strip().partition("\n")[0])
+
+    return handle
