@@ -26,7 +26,7 @@ def test_every_call_about_robots_is_on_the_page() -> None:
     robots = {
         call.path
         for call in CALLS
-        if call.path.startswith(("/api/v1/robots", "/api/v1/recordings"))
+        if call.path.startswith(("/api/v1/robots", "/api/v1/recordings", "/api/v1/audit"))
         and not call.path.endswith(("/recording", "/recording/move", "/settings", "/dev/start"))
     }
     assert robots == told
