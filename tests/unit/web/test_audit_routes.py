@@ -207,7 +207,10 @@ def test_server_without_a_folder_says_so() -> None:
 def test_unknown_robot_has_no_timeline(client: TestClient) -> None:
     client.cookies = HERE  # type: ignore[assignment]
     answer = client.get("/api/v1/robots/nobody/timeline")
-    assert (answer.status_code, answer.json()["message"]) == (404, "no robot of that name is served here")
+    assert (answer.status_code, answer.json()["message"]) == (
+        404,
+        "no robot of that name is served here",
+    )
 
 
 def test_file_that_is_no_log_is_told(tmp_path: Path) -> None:
