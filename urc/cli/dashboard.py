@@ -4,7 +4,7 @@ import asyncio
 import gc
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,9 +18,11 @@ from urc.cli.start_addresses import ReadyDashboard, access_for, announce
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
+from urc.runtime.audit import FILE, AuditLog
 from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
 from urc.runtime.registries import built_in_catalog
+from urc.runtime.server_recorder import NO_ACTOR, ServerRecorder
 from urc.runtime.session import Motion, Session
 from urc.runtime.settings_store import StoredSettings
 from urc.simulator.emulated_profile import stand_in
@@ -64,6 +66,8 @@ class DashboardAddress:
     """Third-party widgets that run in the page without a sandbox."""
     recordings: Path | None = None
     """Folder for recordings of all sessions; None disables recording."""
+    recorder: ServerRecorder | None = None
+    """Receiver of audit entries about recordings."""
 
 
 def run_dashboard(
@@ -110,6 +114,9 @@ async def _serve(
     faults: Sequence[str],
 ) -> int:
     async with AsyncExitStack() as stack:
+        audit = AuditLog(own_folder(place.data) / FILE)
+        stack.callback(audit.close)
+        place = replace(place, recorder=ServerRecorder(audit.add))
         robot_options = workshop_of(place, given, faulty)
         if warning := await asyncio.to_thread(clock_warning, robot_options.data):
             complain(f"urc: {warning}")
@@ -145,6 +152,7 @@ async def _serve(
             access=access,
             allowed_hosts=place.allowed_hosts,
             data=robot_options.data,
+            audit=audit,
             tiles=place.tiles,
             remake=remade,
             robot_options=robot_options,
@@ -202,7 +210,8 @@ def _robot(
 ) -> Robot:
     """Return a robot with a session that opens together with its first page."""
     settings = values if faulty is None else _complete(profile, values)
-    opened = partial(_session, _motion(place), place.recordings, faulty, profile, settings)
+    keep = None if place.recordings is None else partial(_kept, place.recordings, place.recorder)
+    opened = partial(_session, _motion(place), keep, faulty, profile, settings)
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
@@ -219,7 +228,7 @@ def _seen(emulated_robot: EmulatedRobot) -> Glimpse:
 @asynccontextmanager
 async def _session(
     motion: Motion,
-    recordings: Path | None,
+    keep: Callable[[Session], AbstractAsyncContextManager[None]] | None,
     faulty: FaultInjector | None,
     profile: Profile,
     values: Mapping[str, Value],
@@ -234,19 +243,22 @@ async def _session(
             stack.enter_context(faulty.watch(profile.name, emulated_robot))
             profile = await stack.enter_async_context(stand_in(profile, settings, emulated_robot))
         session = Session(profile, settings, transports, motion=motion)
-        if recordings is not None:
+        if keep is not None:
             # Opened first and closed last, so that both ends of the session are recorded.
-            await stack.enter_async_context(_kept(session, recordings))
+            await stack.enter_async_context(keep(session))
         yield await stack.enter_async_context(session)
 
 
 @asynccontextmanager
-async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
+async def _kept(
+    folder: Path, audit: ServerRecorder | None, session: Session
+) -> AsyncIterator[None]:
     """Record a session. Report a failed recording and continue without it."""
     from urc.runtime.recording.recorder import recorded  # most record nothing
 
     profile = session.profile
-    keeping = recorded(session.hub, folder, profile, is_folder=True)
+    on_step = partial(audit.recording, NO_ACTOR, profile.name) if audit is not None else None
+    keeping = recorded(session.hub, folder, profile, is_folder=True, on_step=on_step)
     async with AsyncExitStack() as stack:
         recorder = await stack.enter_async_context(keeping)
         try:

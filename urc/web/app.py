@@ -90,6 +90,7 @@ def build_app(
     allowed_hosts: Iterable[str] = (),
     linger_s: float = LINGER_S,
     data: Path | None = None,
+    audit: AuditLog | None = None,
     tiles: Path | None = None,
     remake: Mapping[str, Remake] | None = None,
     robot_options: RobotOptions | None = None,
@@ -105,6 +106,7 @@ def build_app(
             server's own names.
         linger_s: time for which a robot stays connected after its last client has left, in seconds.
         data: folder of the latches and the audit log; None to store neither.
+        audit: the audit log of the folder, which is closed at the end; None opens it.
         tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
         remake: functions that create a robot from its saved document; None for a server without
             developer pages.
@@ -117,7 +119,8 @@ def build_app(
         UrcError: two robots use different widgets of the same name.
     """
     access = access or Access()
-    audit = AuditLog(data / AUDIT_FILE) if data else None
+    if audit is None and data is not None:
+        audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     fleet = _fleet(robots, data, audit, linger_s)
     routes = _Routes(

@@ -15,11 +15,11 @@ import os
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any, Final, Literal
 
 from urc import __version__
 from urc.config.resolve import resolve
@@ -30,8 +30,10 @@ from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, RecordingEncoder, channels
 from urc.runtime.widget_registry import widget_folder_of
 
-__all__ = ["Recorder", "check_installed", "named", "recorded"]
+__all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
+RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
+"""Callback with a step of a recording, the name of its file, and the result as text."""
 _SUFFIX: Final = ".mcap"
 _MISSING: Final = "recordings need the package mcap: pip install 'urc[record]'"
 MOST_WAITING: Final = 50_000
@@ -279,6 +281,7 @@ async def recorded(
     profile: Profile,
     *,
     is_folder: bool = False,
+    on_step: RecordingStep | None = None,
 ) -> AsyncIterator[Recorder]:
     """Record all events of a hub while the context is open, without delaying the hub.
 
@@ -290,10 +293,12 @@ async def recorded(
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
+        on_step: callback for the creation of the file, and for its end.
     """
     recorder = Recorder(place, profile, is_folder=is_folder)
+    steps = _Steps(recorder, on_step)
     with hub.tap(with_traffic=True) as tap:
-        feeding = asyncio.create_task(_feed(tap, hub, recorder))
+        feeding = asyncio.create_task(_feed(tap, hub, recorder, steps))
         try:
             yield recorder
         finally:
@@ -301,11 +306,34 @@ async def recorded(
             await asyncio.gather(feeding, return_exceptions=True)
             recorder.record(tap.drain())
             await asyncio.to_thread(recorder.close)
+            steps.ended()
 
 
-async def _feed(tap: EventTap, hub: Hub, recorder: Recorder) -> None:
+class _Steps:
+    def __init__(self, recorder: Recorder, on_step: RecordingStep | None) -> None:
+        self._recorder = recorder
+        self._on_step = on_step
+        self._is_told = False
+
+    def look(self) -> None:
+        """Report the creation of the file once."""
+        if self._on_step is not None and self._recorder.is_begun and not self._is_told:
+            self._is_told = True
+            self._on_step("started", self._recorder.file.name, "")
+
+    def ended(self) -> None:
+        """Report the end of the file, or the reason for a missing file."""
+        self.look()
+        recorder = self._recorder
+        if self._on_step is not None and (recorder.is_begun or recorder.fault):
+            outcome = recorder.fault or f"{recorder.counts.total()} messages"
+            self._on_step("ended", recorder.file.name if recorder.is_begun else "", outcome)
+
+
+async def _feed(tap: EventTap, hub: Hub, recorder: Recorder, steps: _Steps) -> None:
     dropped, said = 0, ""
     while True:
+        steps.look()
         with suppress(TimeoutError):  # the state of the file is also reported without events
             async with asyncio.timeout(_WHOLE_S):
                 await tap.filled()

@@ -1,5 +1,6 @@
 """The recorder keeps what happens, whole, within its bounds, and nobody waits for it."""
 
+import asyncio
 import errno
 import io
 import threading
@@ -14,10 +15,10 @@ from mcap.reader import make_reader
 from urc.config.load import load_profile
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.hub import LogEntry
+from urc.runtime.hub import Hub, LogEntry
 from urc.runtime.recording import recorder as module
 from urc.runtime.recording.reader import open_recording
-from urc.runtime.recording.recorder import Recorder, named
+from urc.runtime.recording.recorder import Recorder, named, recorded
 from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 from urc.testing.profile import line_profile
@@ -247,3 +248,34 @@ def test_without_the_package_it_says_how_to_get_it(
     kept.close()
     assert kept.fault == "recordings need the package mcap: pip install 'urc[record]'"
     assert not file.exists()
+
+
+@pytest.mark.anyio
+async def test_begin_and_end_of_a_recording_are_reported(tmp_path: Path) -> None:
+    """With the name of the file, also for a recording that ends at once."""
+    profile = load_profile(str(shipped("robots") / "puppet.yaml"), CATALOG)
+    steps: list[tuple[str, str, str]] = []
+    async with recorded(
+        Hub({}), tmp_path, profile, is_folder=True, on_step=lambda *step: steps.append(step)
+    ) as kept:
+        while not steps:  # noqa: ASYNC110 - a thread creates the file
+            await asyncio.sleep(0.01)
+        assert steps == [("started", kept.file.name, "")]
+    (file,) = tmp_path.iterdir()
+    assert steps[1:] == [("ended", file.name, "0 messages")]
+
+
+@pytest.mark.anyio
+async def test_recording_that_fails_has_an_end_with_the_reason(tmp_path: Path) -> None:
+    profile = load_profile(str(shipped("robots") / "puppet.yaml"), CATALOG)
+    (tmp_path / "file").touch()
+    steps: list[tuple[str, str, str]] = []
+    folder = tmp_path / "file" / "kept"
+    async with recorded(
+        Hub({}), folder, profile, is_folder=True, on_step=lambda *step: steps.append(step)
+    ) as kept:
+        while not kept.fault:  # noqa: ASYNC110 - a thread sets it
+            await asyncio.sleep(0.01)
+    ((step, file, outcome),) = steps
+    assert (step, file) == ("ended", "")
+    assert "Not a directory" in outcome
