@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection
 from hmac import compare_digest
 from typing import Final
 
+from urc.access.administration import end_sign_ins
 from urc.access.directory import Directory, Identity, Principal, SignIn, Way, digest_of
 from urc.access.grants import AccessError, Grant
 from urc.access.store import AccessStore
@@ -134,6 +135,8 @@ class AccessControl:
                 if self.now() - touched_at >= TOUCH_S:
                     touched_at = self.now()
                     await self._record_use()
+                if self.now() >= self._next_end:
+                    await self._end_overdue()
             except AccessError as error:
                 log.warning("%s", error)
 
@@ -164,7 +167,23 @@ class AccessControl:
             await asyncio.to_thread(self.store.touch_all, used)
             await self.reload()
 
+    async def _end_overdue(self) -> None:
+        """Delete the sign-ins that have ended by themselves, and report the change.
+
+        Sockets of such sign-ins close, and a clock that is set back before the next start revives
+        none of them.
+        """
+        await self._record_use()
+        if self.store is not None:
+            now, directory = self.now(), self._stored
+            await asyncio.to_thread(
+                end_sign_ins, self.store, lambda one, _: directory.end_of(one) <= now
+            )
+            await self.reload()
+
     def _merge(self) -> None:
+        ends = map(self._stored.end_of, self._stored.sign_ins.values())
+        self._next_end = min(ends, default=float("inf"))
         own = {self._program.id: self._program, **self._local}
         sign_ins = {**self._stored.sign_ins, **own}
         self.directory = Directory(

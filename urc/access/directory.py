@@ -142,6 +142,17 @@ class Directory:
             return ()
         return self.principals.get(principal.owner, principal).grants
 
+    def end_of(self, sign_in: SignIn) -> float:
+        """Return the UTC time at which a sign-in ends without further use; infinity: never.
+
+        The sign-in of a device also ends with its owner.
+        """
+        principal = self.principals.get(sign_in.principal)
+        owner = self.principals.get(principal.owner) if principal and principal.owner else None
+        idle_end = None if sign_in.idle_s is None else sign_in.used_at + sign_in.idle_s
+        ends = [sign_in.ends_at, idle_end, *(one.ends_at for one in (principal, owner) if one)]
+        return min((end for end in ends if end is not None), default=float("inf"))
+
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether the scope of a program's token contains a command."""
         principal = self.principals.get(who.principal)

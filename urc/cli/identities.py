@@ -40,6 +40,8 @@ __all__ = [
 
 Action = Callable[["AccessStore", argparse.Namespace], int]
 """One action of a command, such as ``add``."""
+_FIRST_ACTIONS = ("add", "invite", "pair")
+"""Actions that may create the data folder."""
 _LONGEST_DAYS = 3650
 _SPAN = re.compile(r"([0-9]{1,5})(m|h|d)")
 _SECONDS = {"m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -74,7 +76,13 @@ def add_format(parser: argparse.ArgumentParser) -> None:
 
 
 def run_action(actions: Mapping[str, Action], arguments: argparse.Namespace) -> int:
-    """Open the store of the data folder, and run the action of the command line."""
+    """Open the store of the data folder, and run the action of the command line.
+
+    Raises:
+        UrcError: the action needs an existing entry, but the data folder is missing.
+    """
+    if arguments.data and not arguments.data.is_dir() and arguments.action not in _FIRST_ACTIONS:
+        raise UrcError(f"{arguments.data} is not a folder; select the folder of 'urc serve'")
     with opened(arguments.data) as store:
         return actions[arguments.action](store, arguments)
 

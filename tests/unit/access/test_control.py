@@ -143,3 +143,55 @@ async def test_a_clock_set_back_revives_no_sign_in(store: AccessStore, clock: Cl
     assert access.identify(secret) == NOBODY
     clock.now -= 3600
     assert access.identify(secret) == NOBODY
+
+
+async def test_the_end_of_a_sign_in_is_reported_and_survives_a_restart(
+    store: AccessStore, clock: Clock
+) -> None:
+    """Sockets hear of the end, and a clock set back before the next start changes nothing."""
+    access = AccessControl(store, utc=clock)
+    began = clock.now
+    ann = store.add("person", "Ann", [Grant("drive")], now=began)
+    guest = store.add("guest", "Visitor", [Grant("watch")], now=began, ends_at=began + 20)
+    phone = store.add("device", "Phone", now=began, owner=guest.id)
+    for owner, ends in ((ann, began + 10), (guest, None), (phone, None), (ann, None)):
+        store.open_sign_in(owner.id, "link", now=began, ends_at=ends)
+    heard = asyncio.Event()
+    access.on_change.append(heard.set)
+    await access.reload()
+    heard.clear()
+    watching = asyncio.create_task(access.watch())
+    try:
+        for later, left in ((10, 3), (20, 1)):
+            assert not heard.is_set()
+            clock.now = began + later
+            await asyncio.wait_for(heard.wait(), 30)
+            assert len(store.directory().sign_ins) == left
+            heard.clear()
+    finally:
+        watching.cancel()
+    clock.now = began
+    assert len(AccessControl(store, utc=clock).directory.sign_ins) == 2, "Ann and the start key"
+
+
+async def test_a_sign_in_in_use_does_not_end(store: AccessStore, clock: Clock) -> None:
+    """The use of the last minute counts, although the store does not have it yet."""
+    access = AccessControl(store, utc=clock)
+    ann = store.add("person", "Ann", [Grant("drive")], now=clock())
+    used, _ = store.open_sign_in(ann.id, "passkey", now=clock(), idle_s=30)
+    store.open_sign_in(ann.id, "passkey", now=clock(), idle_s=30)
+    await access.reload()
+    clock.now += 20
+    access.used(used.id)
+    heard = asyncio.Event()
+    access.on_change.append(heard.set)
+    watching = asyncio.create_task(access.watch())
+    try:
+        clock.now += 10
+        await asyncio.wait_for(heard.wait(), 30)
+        while len(store.directory().sign_ins) > 1:
+            heard.clear()
+            await asyncio.wait_for(heard.wait(), 30)
+    finally:
+        watching.cancel()
+    assert list(store.directory().sign_ins) == [used.id]

@@ -201,6 +201,18 @@ def test_wrong_use_is_one_line_and_changes_nothing(
         assert base.execute("SELECT count(*) FROM invitations").fetchone() == (0,)
 
 
+def test_a_mistyped_folder_is_not_created(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "mistyped"
+    assert main(["people", "list", "--data-dir", str(folder)]) == 1
+    assert capsys.readouterr().err == (
+        f"urc people: {folder} is not a folder; select the folder of 'urc serve'\n"
+    )
+    assert not folder.exists()
+    assert main(["people", "add", "Ann", "--role", "drive", "--data-dir", str(folder)]) == 0
+
+
 def test_a_token_is_shown_once_and_has_its_scope(urc: Run, store: AccessStore) -> None:
     said = urc("tokens", "add", "Night", "--role", "drive@cart", "--commands", "goto, dock")
     token = said.output.strip()
