@@ -338,3 +338,9 @@ async def test_a_program_records_and_downloads(
         assert (await program.post("robots/cart/recordings/start")).status_code == 403
     for name in ("..%2Fcart.yaml", "cart.yaml", "cart-20260101T000000Z.mcap"):
         assert (await api.get(f"recordings/{name}")).status_code == 404
+    audit = (await api.get("audit", params={"what": "recording", "text": file})).json()
+    told = [(one["command"], one["robot"], one["who"]) for one in reversed(audit["entries"])]
+    who = told[0][2]
+    assert who
+    assert told == [(step, "cart", who) for step in ("started", "ended", "downloaded")]
+    assert {one["way"] for one in audit["entries"]} == {"key"}

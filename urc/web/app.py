@@ -132,7 +132,7 @@ def build_app(
             has_audit=audit is not None,
         ),
         access=access,
-        recording_calls=RecordingCalls(lambda: fleet.stations, recordings),
+        recording_calls=RecordingCalls(lambda: fleet.stations, recordings, recorder),
         robot_calls=RobotCalls(lambda: fleet.stations, access.followed),
         audit=audit,
         recorder=recorder,

@@ -9,21 +9,24 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
+from urc.runtime.server_recorder import ServerRecorder
 from urc.web.api.sessions import opened
 from urc.web.api.wire import RecordingInfo, RecordingList, RecordingState
 from urc.web.fleet.robots import LiveSession, RobotService
+from urc.web.serve.actors import actor_of
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors
 from urc.web.serve.rights import MAINTAIN, MAINTAIN_SERVER
 from urc.web.serve.visitor import peer_of, visitor_of
 
 if TYPE_CHECKING:
-    from urc.runtime.recording.recorder import Recorder
+    from urc.runtime.recording.recorder import Recorder, RecordingStep
 
 __all__ = ["LONGEST_S", "MOST_LISTED", "RecordingCalls"]
 
@@ -32,6 +35,8 @@ LONGEST_S: Final = 24 * 3600.0
 MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
+_FROM_START: Final = "bytes=0-"
+"""Begin of a range that starts with the first byte; further parts are no new download."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII
 )
@@ -62,15 +67,20 @@ class RecordingCalls:
     """The endpoints about recordings."""
 
     def __init__(
-        self, stations: Callable[[], Mapping[str, RobotService]], folder: Path | None
+        self,
+        stations: Callable[[], Mapping[str, RobotService]],
+        folder: Path | None,
+        audit: ServerRecorder,
     ) -> None:
         """Prepare.
 
         Args:
             stations: function that returns the robots, by their names in paths.
             folder: folder of the recordings; None for a server without one.
+            audit: receives an entry for each start, end and download.
         """
         self._stations = stations
+        self._audit = audit
         self._folder = folder
         self._running: dict[str, _Running] = {}
         """Recordings that programs started, by the name of the robot in paths."""
@@ -124,6 +134,9 @@ class RecordingCalls:
         path = self._folder / name
         if not await asyncio.to_thread(_is_plain_file, path):
             raise ApiError(404, "there is no recording of that name", "unknown-recording")
+        if request.headers.get("range", _FROM_START).startswith(_FROM_START):
+            actor = actor_of(request)
+            self._audit.recording(actor, match["robot"], "downloaded", name)
         request.state.is_file = True
         headers = {"cache-control": "no-store"}
         return FileResponse(
@@ -168,7 +181,8 @@ class RecordingCalls:
             del self._running[name]
             stack.close()
             raise
-        work = self._record(running, service, live, stack)
+        on_step = partial(self._audit.recording, actor_of(request, name), name)
+        work = self._record(running, service, live, stack, on_step)
         running.task = asyncio.create_task(work)
         await _until_begun(running)
         if running.state.fault:
@@ -187,7 +201,12 @@ class RecordingCalls:
         return answer(running.state)
 
     async def _record(
-        self, running: _Running, service: RobotService, live: LiveSession, stack: ExitStack
+        self,
+        running: _Running,
+        service: RobotService,
+        live: LiveSession,
+        stack: ExitStack,
+        on_step: "RecordingStep",
     ) -> None:
         from urc.runtime.recording.recorder import recorded
 
@@ -195,7 +214,7 @@ class RecordingCalls:
         profile = service.robot.profile
         with stack:
             async with recorded(
-                live.session.hub, self._folder, profile, is_folder=True
+                live.session.hub, self._folder, profile, is_folder=True, on_step=on_step
             ) as recorder:
                 running.recorder = recorder
                 loop = asyncio.get_running_loop()
