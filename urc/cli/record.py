@@ -2,12 +2,13 @@
 
 import argparse
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, duration, load
 from urc.cli.output import complain
+from urc.cli.server_robot import add_server, opened_robot, refuse_local_options
 from urc.problems import UrcError, printable
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ _SOON_S, _LOOK_S = 0.02, 0.5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: profile, duration and output file."""
     add_profile(parser)
+    add_server(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -40,6 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
+    refuse_local_options(arguments, [])
+    if arguments.server is not None:
+        return run_loop(_record_server(arguments), code_when_ended=0)
     profile = load(arguments.profile)
     settings = complete_settings(profile, arguments)
     return run_loop(_record(profile, settings, arguments), code_when_ended=0)
@@ -57,22 +62,54 @@ async def _record(
     file = arguments.output or named(Path(), profile.name)
     # The recording starts before the session and ends after it, so both ends are recorded.
     async with recorded(session.hub, file, profile) as recorder:
-        while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread sets them
-            await asyncio.sleep(_SOON_S)
-        if recorder.fault:
-            raise UrcError(recorder.fault)
-        complain(f"recording {file}; Ctrl-C ends it")
+        await _until_begun(recorder)
         async with session:
             await _until_over(recorder, arguments.seconds)
             details = {link.detail for link in session.hub.links.values() if link.detail}
     return _told(recorder, details)
 
 
-async def _until_over(recorder: "Recorder", seconds: float | None) -> None:
+async def _record_server(arguments: argparse.Namespace) -> int:
+    """Record the readings and the log of a server's robot.
+
+    A server sends neither its traffic with the robot nor the robot's document.
+    """
+    from urc.model.driver import Driver, TransportSpec
+    from urc.model.profile import Profile
+    from urc.runtime.recording.recorder import check_installed, named, recorded
+
+    check_installed()
+    async with opened_robot(arguments) as robot:
+        driver = Driver({name: TransportSpec(name, "") for name in robot.links}, robot.signals)
+        source = f"{robot.name} at {arguments.server}"
+        profile = Profile(robot.name, robot.name, source, driver=driver)
+        file = arguments.output or named(Path(), robot.name)
+        async with recorded(robot.hub, file, profile, document="") as recorder:
+            await _until_begun(recorder)
+            with robot.shown(tuple(robot.signals)):
+                recorder.record(robot.hub.changed_since(0))
+                await _until_over(recorder, arguments.seconds, robot.check_open)
+        details = {link.detail for link in robot.links.values() if link.detail}
+    return _told(recorder, details)
+
+
+async def _until_begun(recorder: "Recorder") -> None:
+    """Wait until the file is there, and name it."""
+    while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread sets them
+        await asyncio.sleep(_SOON_S)
+    if recorder.fault:
+        raise UrcError(recorder.fault)
+    complain(f"recording {recorder.file}; Ctrl-C ends it")
+
+
+async def _until_over(
+    recorder: "Recorder", seconds: float | None, check: Callable[[], None] = lambda: None
+) -> None:
     """Wait until the duration has elapsed, recording has failed, or Ctrl-C is pressed."""
     try:
         async with asyncio.timeout(seconds):
-            while not recorder.fault:  # noqa: ASYNC110 - a thread sets it
+            while not recorder.fault:
+                check()
                 await asyncio.sleep(_LOOK_S)
     except TimeoutError:
         pass

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from urc.cli.arguments import add_profile, duration, load, what_it_has
 from urc.cli.error_report import Misuse
 from urc.cli.output import json_text
+from urc.cli.server_robot import add_server, opened_robot, refuse_local_options
 from urc.problems import UrcError
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ _WRONG_USE = ("bad-argument", "unknown-command")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: profile, command and the command's arguments."""
     add_profile(parser)
+    add_server(parser)
     parser.add_argument("command", metavar="COMMAND", help="a command of the robot's driver")
     parser.add_argument("words", metavar="ARG=VALUE", nargs="*", default=[], help="its arguments")
     parser.add_argument(
@@ -64,24 +66,26 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
+    refuse_local_options(arguments, ["--despite-stop", "--data-dir"])
+    if arguments.server is not None:
+        return run_loop(_send_server(arguments))
     profile = load(arguments.profile)
     command = profile.driver.commands.get(arguments.command)
     if command is None:
         hint = what_it_has(arguments.command, profile.driver.commands)
         raise Misuse(f"{profile.name} has no command {arguments.command!r}; {hint}")
-    _check_hold(command, arguments.hold_s)
+    is_held = command.hold is not None
+    _check_hold(command.name, is_held=is_held, hold_s=arguments.hold_s)
     values = _arguments(command, arguments.words)
     settings = complete_settings(profile, arguments)
     return run_loop(_send(profile, settings, command, values, arguments))
 
 
-def _check_hold(command: "Command", hold_s: float | None) -> None:
-    if command.hold is None and hold_s is not None:
-        raise Misuse(f"{command.name} is not a held command: remove --hold")
-    if command.hold is not None and hold_s is None:
-        raise Misuse(
-            f"{command.name} moves the robot while held: add a duration, such as --hold 1s"
-        )
+def _check_hold(command: str, *, is_held: bool, hold_s: float | None) -> None:
+    if not is_held and hold_s is not None:
+        raise Misuse(f"{command} is not a held command: remove --hold")
+    if is_held and hold_s is None:
+        raise Misuse(f"{command} moves the robot while held: add a duration, such as --hold 1s")
     if hold_s is not None:
         from urc.runtime.scripted_hold import LONGEST_HOLD_S
 
@@ -139,6 +143,45 @@ def _value(argument: "Argument", text: str) -> "Value":
             raise Misuse(f"{argument.name}: expected true or false, found {text!r}")
         return text == "true"
     return text
+
+
+async def _send_server(arguments: argparse.Namespace) -> int:
+    """Run the command at a robot of a server, under the rules of the server."""
+    from urc.runtime.command_failed import CommandFailed
+
+    name, hold_s = arguments.command, arguments.hold_s
+    values = dict(_json_argument(word) for word in arguments.words)
+    async with opened_robot(arguments) as robot:
+        _check_hold(name, is_held=name in robot.controls, hold_s=hold_s)
+        replied: dict[str, Reading] = {}
+        try:
+            if hold_s is None:
+                replied = await robot.command(name, **values)
+            else:
+                async with robot.drive(name) as stick:
+                    await stick.hold(hold_s, **values)
+        except CommandFailed as failed:
+            text = f"{name} failed ({failed.code}): {failed.message}"
+            raise (Misuse if failed.code in _WRONG_USE else UrcError)(text) from failed
+    print(json_text({"command": name, "values": replied}))
+    return 0
+
+
+def _json_argument(word: str) -> tuple[str, "Reading"]:
+    """Return name and value of an argument; the value is JSON, or else a text.
+
+    The server knows the types, and refuses a value of the wrong type.
+    """
+    import json
+
+    name, equals, text = word.partition("=")
+    if not equals or not name:
+        raise Misuse(f"expected ARG=VALUE, found {word!r}")
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return name, text
+    return name, tuple(value) if isinstance(value, list) else value
 
 
 async def _send(

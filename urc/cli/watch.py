@@ -5,13 +5,14 @@ import asyncio
 import math
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, duration, load, what_it_has
 from urc.cli.error_report import Misuse
 from urc.cli.output import json_text
+from urc.cli.server_robot import add_server, opened_robot, refuse_local_options
 from urc.problems import UrcError, printable
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ _LOSSES_S = 5.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: profile, signals, duration and raw traffic."""
     add_profile(parser)
+    add_server(parser)
     parser.add_argument(
         "signals", metavar="SIGNAL", nargs="*", default=[], help="only these signals"
     )
@@ -50,17 +52,20 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
+    refuse_local_options(arguments, ["--wire"])
+    if arguments.server is not None:
+        return run_loop(_watch_server(arguments))
     profile = load(arguments.profile)
-    _check_signals(profile, arguments.signals)
+    _check_signals(profile.name, profile.driver.signals, arguments.signals)
     settings = complete_settings(profile, arguments)
     return run_loop(_watch(profile, settings, arguments))
 
 
-def _check_signals(profile: "Profile", names: list[str]) -> None:
+def _check_signals(robot: str, signals: Iterable[str], names: list[str]) -> None:
+    known = tuple(signals)
     for name in names:
-        if name not in profile.driver.signals:
-            hint = what_it_has(name, profile.driver.signals)
-            raise Misuse(f"{profile.name} has no signal {name!r}; {hint}")
+        if name not in known:
+            raise Misuse(f"{robot} has no signal {name!r}; {what_it_has(name, known)}")
 
 
 async def _watch(
@@ -79,8 +84,28 @@ async def _watch(
     return 0
 
 
-async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -> None:
-    """Print the robot's events until the duration has elapsed."""
+async def _watch_server(arguments: argparse.Namespace) -> int:
+    """Print the readings of a server's robot, beginning with the present ones."""
+    from urc.cli.event_loop import LineWriter
+
+    async with opened_robot(arguments) as robot:
+        _check_signals(robot.name, robot.signals, arguments.signals)
+        printer = _Printer(LineWriter(), arguments.signals)
+        with robot.hub.tap() as tap, robot.shown(tuple(arguments.signals)):
+            await printer.print_events(robot.hub.changed_since(0))
+            await _follow(tap, printer, arguments.seconds, robot.check_open)
+        if not printer.received:
+            raise UrcError(f"nothing was received from {robot.name}{_reasons(robot.hub)}")
+    return 0
+
+
+async def _follow(
+    tap: "EventTap",
+    printer: "_Printer",
+    seconds: float | None,
+    check: Callable[[], None] = lambda: None,
+) -> None:
+    """Print the robot's events until the duration has elapsed, or `check` raises."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
     is_over = False
@@ -94,6 +119,7 @@ async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -
             async with asyncio.timeout_at(ends + _LAST_WORDS_S):
                 await printer.print_events(tap.drain())
                 await printer.tell_losses(tap.dropped, is_last=is_over)
+                check()
         except TimeoutError:
             raise UrcError("the output is blocked; the last lines are lost") from None
 

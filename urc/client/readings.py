@@ -68,12 +68,12 @@ class HubReadings:
         """
         self._check(name)
         async with asyncio.timeout(timeout):
-            with self._shown((name,)), self.hub.subscribe() as subscription:
+            with self.shown((name,)), self.hub.subscribe() as subscription:
                 while True:
                     found = self.hub.latest(name)
                     if found is not None and (is_met is None or is_met(found.value)):
                         return found
-                    self._check_open()
+                    self.check_open()
                     subscription.seen = self.hub.revision
                     await subscription.changed()
 
@@ -88,12 +88,12 @@ class HubReadings:
         """
         for name in names:
             self._check(name)
-        with self._shown(names or self.hub.names), self.hub.subscribe() as subscription:
+        with self.shown(names or self.hub.names), self.hub.subscribe() as subscription:
             while True:
                 for sample in subscription.changes():
                     if not names or sample.signal in names:
                         yield sample
-                self._check_open()
+                self.check_open()
                 await subscription.changed()
 
     def log(self) -> AsyncIterator[LogEntry]:
@@ -119,16 +119,16 @@ class HubReadings:
                 for line in lines:
                     yield line
                 if hub.notes_count == count:
-                    self._check_open()
+                    self.check_open()
                     subscription.seen = hub.revision
                     await subscription.changed()
 
     # -- for the openings
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
         """Raise `ConnectionLost` if no further reading can arrive."""
 
-    def _shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
+    def shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
         """Request the images among `names` while the context is open."""
         return nullcontext()
 

@@ -193,7 +193,7 @@ class RemoteRobot(HubReadings):
             plain = plain_arguments(arguments)
         except UrcError as error:
             raise CommandFailed("bad-argument", str(error)) from error
-        self._check_open()
+        self.check_open()
         reply = await self._commands.run(name, plain, self.motion.stops)
         if not reply.ok:
             raise CommandFailed(reply.code, reply.message)
@@ -256,7 +256,8 @@ class RemoteRobot(HubReadings):
         links = self.hub.links.values()
         return not links or any(one.state == "connecting" and not one.attempts for one in links)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raise `ConnectionLost` if the connection has ended for good."""
         if self._over is not None:
             raise self._over
 
@@ -337,7 +338,8 @@ class RemoteRobot(HubReadings):
             self.hub.publish((Sample(signal.name, picture.data, time_s),))
 
     @contextmanager
-    def _shown(self, names: tuple[str, ...]) -> Iterator[None]:
+    def shown(self, names: tuple[str, ...]) -> Iterator[None]:
+        """Request the images among `names` while the context is open."""
         signals = self.hub.signals
         images = [name for name in names if signals[name].type in ("image", "blob")]
         if images:

@@ -188,7 +188,7 @@ class Recorder:
             data, now_ns = document.encode(), time.time_ns()
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
         else:
-            text = f"{profile.file} can no longer be loaded: replay the recording with --profile"
+            text = f"{profile.file}: the document is missing; replay the recording with --profile"
             self.record([LogEntry(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()
@@ -282,6 +282,7 @@ async def recorded(
     *,
     is_folder: bool = False,
     on_step: RecordingStep | None = None,
+    document: str | None = None,
 ) -> AsyncIterator[Recorder]:
     """Record all events of a hub while the context is open, without delaying the hub.
 
@@ -294,8 +295,9 @@ async def recorded(
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
         on_step: callback for the creation of the file, and for its end.
+        document: the whole profile as one document, "" for none; None to read the profile's file.
     """
-    recorder = Recorder(place, profile, is_folder=is_folder)
+    recorder = Recorder(place, profile, is_folder=is_folder, document=document)
     steps = _Steps(recorder, on_step)
     with hub.tap(with_traffic=True) as tap:
         feeding = asyncio.create_task(_feed(tap, hub, recorder, steps))

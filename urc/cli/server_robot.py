@@ -1,0 +1,88 @@
+"""The robot of a server, in place of a robot that the command connects itself.
+
+Layer 6. A token never stands in the command line, because every user of a computer can read the
+command lines of all processes. A token comes from a file, or from the environment.
+"""
+
+import argparse
+import os
+from collections.abc import Sequence
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urc.cli.error_report import Misuse
+
+if TYPE_CHECKING:
+    from urc.client.remote import RemoteRobot
+
+__all__ = ["TOKEN", "add_server", "opened_robot", "refuse_local_options"]
+
+TOKEN = "URC_TOKEN"  # noqa: S105 - the name of a variable
+"""Variable of the environment with the token, if no file is given."""
+
+
+def add_server(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of a robot that a server connects."""
+    parser.add_argument(
+        "--server",
+        metavar="URL",
+        help="use the robot PROFILE of a server, such as https://robots.lab:8080",
+    )
+    parser.add_argument(
+        "--token-file",
+        metavar="FILE",
+        type=Path,
+        help=f"file with the token for the server (default: {TOKEN} in the environment)",
+    )
+    parser.add_argument(
+        "--authority",
+        metavar="FILE",
+        type=Path,
+        help="PEM file with the local authority of the server (default: trust of this system)",
+    )
+    parser.add_argument(
+        "--allow-unencrypted",
+        action="store_true",
+        help="send the token to another computer without encryption",
+    )
+
+
+def refuse_local_options(arguments: argparse.Namespace, options: Sequence[str]) -> None:
+    """Raise `Misuse` if an option does not fit the choice of a server.
+
+    Args:
+        arguments: the parsed arguments.
+        options: options that only work without a server, such as ``--wire``; the name of the
+            attribute follows from the option.
+    """
+    if arguments.server is None:
+        for option in ("--token-file", "--authority", "--allow-unencrypted"):
+            if _is_given(arguments, option):
+                raise Misuse(f"{option} needs --server")
+        return
+    for option in ("--set", "--settings", *options):
+        if _is_given(arguments, option):
+            raise Misuse(f"{option} does not work with --server: the server connects the robot")
+
+
+def _is_given(arguments: argparse.Namespace, option: str) -> bool:
+    name = {"--set": "settings", "--settings": "settings_file", "--data-dir": "data"}.get(
+        option, option.removeprefix("--").replace("-", "_")
+    )
+    return bool(getattr(arguments, name))
+
+
+def opened_robot(arguments: argparse.Namespace) -> "AbstractAsyncContextManager[RemoteRobot]":
+    """Return the context of the robot of the server in `arguments`."""
+    from urc.client.remote import open
+
+    token = "" if arguments.token_file else os.environ.get(TOKEN, "").strip()
+    return open(
+        arguments.server,
+        arguments.profile,
+        token=token,
+        token_file=arguments.token_file,
+        authority=arguments.authority,
+        allow_unencrypted=arguments.allow_unencrypted,
+    )
