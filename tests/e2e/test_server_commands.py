@@ -120,7 +120,8 @@ async def test_record_writes_the_readings(tmp_path: Path) -> None:
     async with server(tmp_path) as (cart, options):
         recording = await started("record", "cart", "--for", "2s", "-o", str(file), *options)
         assert recording.stderr is not None
-        assert b"recording" in await recording.stderr.readline()
+        first = await recording.stderr.readline()
+        assert first.endswith(b"Ctrl-C ends it\n")
         await until(lambda: cart.has_line)
         cart.say("level 5", "level 6", "level 7")
         out, err = await recording.communicate()
