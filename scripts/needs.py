@@ -128,6 +128,12 @@ NEEDS = (
         purpose="tests of https against a third-party server",
     ),
     Need(
+        name="certutil",
+        executables=("certutil",),
+        package="libnss3-tools",
+        purpose="tests of a browser that trusts the server's own authority",
+    ),
+    Need(
         name="ffmpeg",
         executables=("ffmpeg",),
         package="ffmpeg",

@@ -13,7 +13,9 @@ from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app, serve
 from urc.web.serve.access import Access
+from urc.web.serve.certificates import Certificates
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S
+from urc.web.serve.tls_listener import Handshakes
 
 WAIT_S = 30.0
 
@@ -26,10 +28,13 @@ async def running_dashboard(
     connections: int = CONNECTIONS,
     trusted: Iterable[str] = (),
     access: Access = ACCESS,
+    certificates: Certificates | None = None,
+    handshakes: Handshakes | None = None,
 ) -> AsyncIterator[str]:
     """Serve the robots on this machine; give the address, and end cleanly.
 
-    Foreign widgets live in frames, but for those whose names are `trusted`.
+    Foreign widgets live in frames, but for those whose names are `trusted`. With `certificates`,
+    the address is one of HTTPS.
     """
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
@@ -38,6 +43,7 @@ async def running_dashboard(
         allowed_hosts=[PLAIN_HOST],
         linger_s=0.2,
         trusted=trusted,
+        certificates=certificates,
     )
     task = asyncio.create_task(
         serve(
@@ -46,6 +52,8 @@ async def running_dashboard(
             on_ready=ready.set_result,
             request_s=request_s,
             connections=connections,
+            certificates=certificates,
+            handshakes=handshakes,
         )
     )
     try:

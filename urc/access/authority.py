@@ -21,7 +21,9 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from urc.access.grants import AccessError
 from urc.access.wrong_clock import RELEASED
-from urc.private_files import put_private
+from urc.packages.atomic_files import exclusive
+from urc.packages.names import PackageError
+from urc.private_files import make_private, put_private
 
 __all__ = [
     "AUTHORITY_FOLDER",
@@ -64,13 +66,18 @@ class ServerCertificate(NamedTuple):
 class CertificateAuthority:
     """The authority in one folder; both keys are readable to the owner only."""
 
-    def __init__(self, folder: Path, names: Sequence[str], now: datetime) -> None:
+    def __init__(
+        self, folder: Path, names: Sequence[str], now: datetime, *, optional: Sequence[str] = ()
+    ) -> None:
         """Load the authority, or make one.
 
         Args:
             folder: folder for certificates and keys.
-            names: names and addresses of this machine that clients use.
+            names: names and addresses that the certificate must have. A name outside of the limits
+                of the existing authority needs a new authority, which all devices have to trust.
             now: time of this machine's clock, with a time zone.
+            optional: further names and addresses, left out if the existing authority does not
+                permit them; see `left_out`.
 
         Raises:
             AccessError: a file cannot be read or written, or a name is invalid.
@@ -78,18 +85,34 @@ class CertificateAuthority:
         self._folder = folder
         self._now = max(now, OLDEST)
         self._names = _parsed(names)
+        more = [one for one in _parsed(optional) if one not in self._names]
+        self.left_out: tuple[str, ...] = ()
+        """Optional names that the certificate lacks."""
         self.file = folder / "authority.pem"
         """Root certificate, which devices trust; public."""
         self.is_new = False
         """Whether devices have to trust a new root."""
         try:
+            make_private(folder)
+            with exclusive(folder / "lock"):
+                self._open(more)
+        except PackageError:
+            raise AccessError(f"{folder}: another URC process is using the authority") from None
+        except OSError as error:
+            raise AccessError(f"{folder}: cannot be used: {error.strerror}") from None
+
+    def _open(self, more: list[x509.GeneralName]) -> None:
+        try:
             self._load()
         except FileNotFoundError:
-            self._make()
+            self._make(more)
         except (OSError, ValueError) as error:
             raise AccessError(f"{self.file}: cannot be read: {error}") from None
         if not self._is_usable():
-            self._make()
+            self._make(more)
+        allowed = self._allowed()
+        self._names += (one for one in more if _is_allowed(one, allowed))
+        self.left_out = tuple(str(one.value) for one in more if not _is_allowed(one, allowed))
 
     @property
     def fingerprint(self) -> str:
@@ -107,6 +130,14 @@ class CertificateAuthority:
         Raises:
             AccessError: the files cannot be written.
         """
+        try:
+            with exclusive(self._folder / "lock"):
+                return self._issued()
+        except PackageError:
+            text = f"{self._folder}: another URC process is using the authority"
+            raise AccessError(text) from None
+
+    def _issued(self) -> ServerCertificate:
         chain, key = self._folder / "server.pem", self._folder / "server.key"
         kept = _certificate(chain)
         if kept is not None and key.exists() and self._is_good(kept):
@@ -141,17 +172,19 @@ class CertificateAuthority:
             raise ValueError("key and certificate do not belong together")
         self._key = key
 
-    def _make(self) -> None:
+    def _make(self, more: Sequence[x509.GeneralName]) -> None:
         self.is_new = True
+        names = [*self._names, *more]
         self._key = ec.generate_private_key(ec.SECP256R1())
-        name = f"URC on {next(_dns_of(self._names), 'this machine')}"
+        own_name = next((one for one in _dns_of(names) if one != "localhost"), "this machine")
+        name = f"URC on {own_name}"
         networks = [x509.IPAddress(ipaddress.ip_network(one)) for one in _LOCAL_NETWORKS]
         own = [
             x509.IPAddress(ipaddress.ip_network(one.value))
-            for one in self._names
+            for one in names
             if isinstance(one, x509.IPAddress)
         ]
-        domains = [x509.DNSName(one) for one in (*_LOCAL_NAMES, *_dns_of(self._names))]
+        domains = [x509.DNSName(one) for one in (*_LOCAL_NAMES, *_dns_of(names))]
         self._root = (
             self._builder(name, self._key, self._now + AUTHORITY_LASTS)
             .issuer_name(_named(name))
@@ -185,9 +218,12 @@ class CertificateAuthority:
         """Return whether the root lasts, and allows all names of this machine."""
         if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
-        found = self._root.extensions.get_extension_for_class(x509.NameConstraints).value
-        allowed = found.permitted_subtrees or []
+        allowed = self._allowed()
         return all(_is_allowed(name, allowed) for name in self._names)
+
+    def _allowed(self) -> list[x509.GeneralName]:
+        found = self._root.extensions.get_extension_for_class(x509.NameConstraints).value
+        return found.permitted_subtrees or []
 
     def _is_good(self, leaf: x509.Certificate) -> bool:
         if leaf.not_valid_after_utc - self._now < RENEW_BEFORE:

@@ -14,7 +14,8 @@ from urc.cli.error_report import Misuse
 from urc.cli.event_loop import run_loop
 from urc.cli.fault_injection import FaultInjector
 from urc.cli.output import complain
-from urc.cli.start_addresses import ReadyDashboard, access_for, announce
+from urc.cli.start_addresses import ReadyDashboard, access_for, announce, ready_addresses
+from urc.cli.tls_options import PLAIN, TlsOptions, certificates_of
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
@@ -68,6 +69,8 @@ class DashboardAddress:
     """Folder for recordings of all sessions; None disables recording."""
     recorder: ServerRecorder | None = None
     """Receiver of audit entries about recordings."""
+    tls: TlsOptions = PLAIN
+    """Certificate of HTTPS, and public names of a web server in front of this one."""
 
 
 def run_dashboard(
@@ -123,11 +126,14 @@ async def _serve(
         if is_interrupted(robot_options.data):
             complain("urc: 'urc restore' was interrupted; run it again with --replace")
         access = access_for(robot_options.data, is_open=place.is_open)
+        certificates = await certificates_of(
+            place.tls, place.host, place.allowed_hosts, robot_options.data
+        )
 
         def ready(url: str) -> None:
-            ready_dashboard = ReadyDashboard(url, access)
-            announce(stack, robot_options.data, place.host, ready_dashboard)
-            on_ready(ready_dashboard)
+            addresses = ready_addresses(url, place.host, access, certificates, place.tls)
+            announce(stack, robot_options.data, addresses)
+            on_ready(addresses)
 
         factory = RobotFactory(robot_options)
         robots: dict[str, Robot] = {}
@@ -150,7 +156,7 @@ async def _serve(
         app = build_app(
             robots,
             access=access,
-            allowed_hosts=place.allowed_hosts,
+            allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
             data=robot_options.data,
             audit=audit,
             tiles=place.tiles,
@@ -158,10 +164,17 @@ async def _serve(
             robot_options=robot_options,
             trusted=place.trusted,
             recordings=place.recordings,
+            certificates=certificates,
         )
         gc.collect()
         gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us
-        await serve(app, host=place.host, port=place.port, on_ready=ready)
+        await serve(
+            place.tls.around(app),
+            host=place.host,
+            port=place.port,
+            on_ready=ready,
+            certificates=certificates,
+        )
     return 0
 
 

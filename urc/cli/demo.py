@@ -13,6 +13,7 @@ from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
 from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
 from urc.cli.start_addresses import ReadyDashboard
+from urc.cli.tls_options import add_tls, tls_of
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -25,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_host(parser)
     add_port(parser)
     parser.set_defaults(port=None)
+    add_tls(parser)
     add_dev(parser)
     add_faults(parser, has_names=True)
     parser.add_argument(
@@ -59,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     return run_dashboard(
         profiles,
-        DashboardAddress(arguments.host, _port(arguments)),
+        DashboardAddress(arguments.host, _port(arguments), tls=tls_of(arguments)),
         is_simulated=True,
         on_ready=announce,
         is_dev=arguments.dev,

@@ -6,9 +6,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, add_port, duration, load
+from urc.cli.data_folder import own_folder
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
-from urc.cli.start_addresses import ReadyDashboard, access_for, print_entrance
+from urc.cli.start_addresses import access_for, print_entrance, ready_addresses
+from urc.cli.tls_options import TlsOptions, add_tls, certificates_of, tls_of
 from urc.problems import ProblemsError, UrcError
 
 if TYPE_CHECKING:
@@ -46,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loop", action="store_true", help="restart playback at the end")
     add_host(parser)
     add_port(parser)
+    add_tls(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -73,19 +76,25 @@ def run(arguments: argparse.Namespace) -> int:
         start_s=start_s,
         is_looped=arguments.loop,
     )
-    return run_loop(_serve(player, arguments.host, arguments.port), code_when_ended=0)
+    serving = _serve(player, arguments.host, arguments.port, tls_of(arguments))
+    return run_loop(serving, code_when_ended=0)
 
 
-async def _serve(player: "Player", host: str, port: int) -> int:
+async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int:
     from urc.web.app import Robot, build_app, serve
 
     profile = player.profile
     robot = Robot(profile, player.settings, player.session, playback=player)
     access = access_for()
-    app = build_app({profile.name: robot}, access=access)
-    await serve(
-        app, host=host, port=port, on_ready=lambda url: print_entrance(ReadyDashboard(url, access))
+    certificates = await certificates_of(tls, host, (), own_folder())
+    app = build_app(
+        {profile.name: robot}, access=access, allowed_hosts=tls.hosts(), certificates=certificates
     )
+
+    def ready(url: str) -> None:
+        print_entrance(ready_addresses(url, host, access, certificates, tls))
+
+    await serve(tls.around(app), host=host, port=port, on_ready=ready, certificates=certificates)
     return 0
 
 

@@ -10,6 +10,7 @@ from urc.cli.arguments import add_dev, add_host, add_port, add_settings, is_loop
 from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
 from urc.cli.output import complain
+from urc.cli.tls_options import add_tls, tls_of
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_host(parser)
     add_port(parser)
     _add_names(parser, "--allow-host", "additional host name of this machine")
+    add_tls(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting to them"
     )
@@ -83,6 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.widget_registry import hidden_beside
 
     _check(arguments)
+    tls_of(arguments)
     profiles = [load(word) for word in arguments.profiles]
     if not profiles and (arguments.settings or arguments.settings_file):
         raise Misuse("--set and --settings require a profile on the command line")
@@ -122,6 +125,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.installed or not profiles,
             tuple(arguments.trust_widget),
             arguments.record,
+            tls=tls_of(arguments),
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,

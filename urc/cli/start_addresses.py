@@ -12,17 +12,23 @@ from urc.cli.arguments import is_loopback
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
+    from urc.cli.tls_options import TlsOptions
     from urc.web.serve.access import Access
+    from urc.web.serve.certificates import Certificates, LoadedCertificate
 
-__all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance"]
+__all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance", "ready_addresses"]
 
 
 class ReadyDashboard(NamedTuple):
     """The addresses of a running dashboard."""
 
     url: str
-    """Without a key."""
+    """Address for this machine, without a key."""
     access: "Access"
+    others: str = ""
+    """Address for other machines; "" if only this machine reaches the dashboard."""
+    certificate: "LoadedCertificate | None" = None
+    """Certificate of HTTPS; None for plain HTTP."""
 
     @property
     def address(self) -> str:
@@ -37,10 +43,41 @@ class ReadyDashboard(NamedTuple):
     def lines(self) -> Iterator[str]:
         """Yield the lines of the start message. The first line is the address with all rights."""
         yield f"dashboard {self.address}"
-        if self.access.anonymous:
-            yield f"for others {self.url} (without a sign-in: {self.access.anonymous})"
-        elif not is_loopback(urlsplit(self.url).hostname or ""):
-            yield f"for others {self.url} (with a sign-in)"
+        if self.others and self.access.anonymous:
+            yield f"for others {self.others} (without a sign-in: {self.access.anonymous})"
+        elif self.others:
+            yield f"for others {self.others} (with a sign-in)"
+        if self.certificate is not None:
+            yield from _certificate_lines(self.certificate, self.others or self.url)
+
+
+def _certificate_lines(certificate: "LoadedCertificate", url: str) -> Iterator[str]:
+    if not certificate.authority:
+        yield f"certificate {certificate.fingerprint}"
+        return
+    # Plain HTTP: browsers warn of the certificate until the device trusts the authority.
+    plain = url.replace("https://", "http://", 1)
+    yield f"new devices {plain}trust (once, before the first visit)"
+    yield f"authority {certificate.fingerprint}"
+
+
+def ready_addresses(
+    url: str, host: str, access: "Access", certificates: "Certificates | None", tls: "TlsOptions"
+) -> ReadyDashboard:
+    """Return the addresses of a dashboard that listens on `host`.
+
+    Args:
+        url: first address of the dashboard, without a key.
+        host: value of `--host`.
+        access: the keys of the dashboard.
+        certificates: certificates of HTTPS; None for plain HTTP.
+        tls: public names of a web server in front of the dashboard.
+    """
+    others = "" if is_loopback(host) else url
+    if tls.public_names:
+        others = f"https://{tls.public_names[0]}/"
+    current = certificates.current if certificates is not None else None
+    return ReadyDashboard(_near(url, host), access, others, current)
 
 
 def print_entrance(ready_dashboard: ReadyDashboard) -> None:
@@ -67,16 +104,21 @@ def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
 
 
 def announce(
-    stack: ExitStack | AsyncExitStack, data: Path, host: str, ready_dashboard: ReadyDashboard
+    stack: ExitStack | AsyncExitStack, data: Path, ready_dashboard: ReadyDashboard
 ) -> None:
     """Register the dashboard for other programs of this user until `stack` closes."""
     from urc.runtime.running_servers import RunningServer, announced
 
+    found = ready_dashboard.certificate
+    if not ready_dashboard.url.startswith("https://"):
+        found = None
     server = RunningServer(
-        _near(ready_dashboard.url, host),
+        ready_dashboard.url,
         ready_dashboard.access.key,
         os.getpid(),
-        "" if is_loopback(host) else ready_dashboard.url,
+        ready_dashboard.others,
+        str(found.file.absolute()) if found is not None else "",
+        found.name if found is not None else "",
     )
     try:
         stack.enter_context(announced(data, ready_dashboard.access.instance, server))
@@ -86,7 +128,11 @@ def announce(
 
 
 def _near(url: str, host: str) -> str:
-    """Return the dashboard's address for programs on this machine."""
+    """Return the dashboard's address for this machine.
+
+    A server for all addresses accepts plain HTTP of this machine, even with a certificate. Browsers
+    then show no warning, and treat the address as secure.
+    """
     port = urlsplit(url).port
     try:
         address = ip_address(host)

@@ -13,11 +13,11 @@ from contextlib import suppress
 from http import HTTPStatus
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
 from urc.problems import printable
 from urc.runtime.latch import LatchStore
-from urc.runtime.running_servers import RunningServer, headers, servers
+from urc.runtime.running_servers import RunningServer, headers, open_connection, servers
 
 __all__ = ["MotionInterlock"]
 
@@ -94,9 +94,9 @@ class MotionInterlock:
 
     def _answer(self, file: Path, server: RunningServer) -> str:
         url = server.address
-        place = urlsplit(url)
-        line = HTTPConnection(place.hostname or "", place.port, timeout=_ANSWER_S)
+        line: HTTPConnection | None = None
         try:
+            line = open_connection(server, _ANSWER_S)
             path = f"/api/v1/robots/{quote(self._robot, safe='')}/controls"
             line.request("GET", path, headers=headers(server))
             answer = line.getresponse()
@@ -114,7 +114,8 @@ class MotionInterlock:
         except (OSError, HTTPException, ValueError, KeyError, TypeError, RecursionError):
             return f"the server at {url} does not report the operator of the robot"
         finally:
-            line.close()
+            if line is not None:
+                line.close()
         if by:
             return printable(f"STOP was latched by {by}: reset it first on {url}")
         return printable(f"{holder} drives the robot on {url}") if holder else ""

@@ -2,21 +2,25 @@
 
 Layer 4. Each running server keeps one small file, readable only by its owner::
 
-    servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711}
+    servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711, …}
 
-Programs send the key with each request, as ``Authorization: Bearer …``.
+Programs send the key with each request, as ``Authorization: Bearer …``. For an address with HTTPS,
+the file also names the certificate by which programs verify the server.
 """
 
 import json
 import os
+import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from http.client import HTTPConnection, HTTPSConnection
 from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import urlsplit
 
 from urc.private_files import put_private
 
-__all__ = ["RunningServer", "announced", "headers", "servers"]
+__all__ = ["RunningServer", "announced", "headers", "open_connection", "servers"]
 
 _FOLDER = "servers"
 _MOST_BYTES = 4096
@@ -33,11 +37,55 @@ class RunningServer(NamedTuple):
     """Process id."""
     public: str = ""
     """Base address for other devices; "" if the server accepts clients on this machine only."""
+    certificate: str = ""
+    """File in PEM with the certificate to trust for an ``https`` address; "" for plain HTTP."""
+    name: str = ""
+    """Name in the server's certificate, which may differ from the host of the address."""
 
 
 def headers(server: RunningServer) -> dict[str, str]:
     """Return the HTTP headers of a program's requests to `server`."""
     return {"authorization": f"Bearer {server.key}"}
+
+
+def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
+    """Return a connection to `server`, which connects and verifies with its first request.
+
+    Args:
+        server: the server.
+        timeout_s: time limit of each step, in seconds.
+
+    Raises:
+        OSError: the file of the certificate cannot be read.
+        ValueError: the address is invalid.
+    """
+    place = urlsplit(server.address)
+    if place.scheme != "https":
+        return HTTPConnection(place.hostname or "", place.port, timeout=timeout_s)
+    return _Verified(server, place.hostname or "", place.port, timeout_s)
+
+
+class _Verified(HTTPSConnection):
+    """A connection that trusts one certificate, and expects one name in the server's certificate.
+
+    The certificate of an operator may lack the address at which the server listens.
+    """
+
+    def __init__(
+        self, server: RunningServer, host: str, port: int | None, timeout_s: float
+    ) -> None:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.load_verify_locations(server.certificate)
+        # The file of an operator begins with the server's own certificate, not with a root.
+        context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+        super().__init__(host, port, timeout=timeout_s, context=context)
+        self._verifier = context
+        self._name = server.name or host
+
+    def connect(self) -> None:
+        """Connect, and verify the certificate."""
+        HTTPConnection.connect(self)
+        self.sock = self._verifier.wrap_socket(self.sock, server_hostname=self._name)
 
 
 @contextmanager
@@ -91,8 +139,12 @@ def _read(file: Path) -> RunningServer | None:
     try:
         with file.open("rb") as opened:
             said = json.loads(opened.read(_MOST_BYTES))
-        public = str(said.get("public", ""))
-        return RunningServer(str(said["address"]), str(said["key"]), int(said["pid"]), public)
+        return RunningServer(
+            str(said["address"]),
+            str(said["key"]),
+            int(said["pid"]),
+            *(str(said.get(name, "")) for name in ("public", "certificate", "name")),
+        )
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 

@@ -54,6 +54,7 @@ from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
 from urc.web.serve.access import Access
 from urc.web.serve.actors import stopper_of
+from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
 from urc.web.serve.replies import API, Endpoint, told
 from urc.web.serve.rights import (
@@ -73,6 +74,7 @@ from urc.web.show.gallery import Gallery
 from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
 from urc.web.show.pages import PageHead, error_page, robot_page
+from urc.web.show.trust import TrustPages
 from urc.web.wire import messages as wire
 
 __all__ = ["Robot", "build_app", "serve"]
@@ -96,6 +98,7 @@ def build_app(
     robot_options: RobotOptions | None = None,
     trusted: Iterable[str] = (),
     recordings: Path | None = None,
+    certificates: Certificates | None = None,
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -114,6 +117,7 @@ def build_app(
             settings.
         trusted: names of third-party widgets that run in the page instead of a frame.
         recordings: folder of the recordings; None for a server that records nothing.
+        certificates: certificates of HTTPS, whose authority devices may trust; None for plain HTTP.
 
     Raises:
         UrcError: two robots use different widgets of the same name.
@@ -150,7 +154,8 @@ def build_app(
         dev = Dev(fleet.stations, remake, renew)
         routes.dev_start = DevStart(fleet, remake, renew, routes.ways)
     files = FileRoutes(vendored(), tiles, routes.widget_files)
-    return _Dashboard(routes, files, frozenset(allowed_hosts), dev)
+    trust = TrustPages(certificates)
+    return _Dashboard(routes, files, frozenset(allowed_hosts), dev, trust)
 
 
 def _unread(entry: AuditEntry) -> None:
@@ -196,6 +201,7 @@ class _Dashboard(Starlette):
         files: FileRoutes,
         allowed_hosts: frozenset[str],
         dev: Dev | None,
+        trust: TrustPages,
     ) -> None:
         self._access = access = routes.access
         self._stoppable = routes.stoppable
@@ -223,6 +229,7 @@ class _Dashboard(Starlette):
                 *(route for one in parts for route in one.routes()),
                 *gallery.routes(),
                 *files.routes(),
+                *trust.routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),

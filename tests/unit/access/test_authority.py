@@ -4,6 +4,7 @@ import shutil
 import ssl
 import stat
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -105,3 +106,26 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "authority.pem").write_bytes(b"nonsense")
     with pytest.raises(AccessError, match=r"authority\.pem: cannot be read: "):
         CertificateAuthority(tmp_path, NAMES, NOW)
+
+
+def test_an_optional_name_never_needs_another_authority(tmp_path: Path) -> None:
+    """A laptop in another network must not ask all devices to trust it again."""
+    home = CertificateAuthority(tmp_path, ["lab-pi.local"], NOW, optional=["lab-pi", "192.168.4.1"])
+    away = CertificateAuthority(
+        tmp_path, ["lab-pi.local"], NOW, optional=["lab-pi", "10.1.2.3", "141.30.1.2", "other"]
+    )
+    assert (home.left_out, away.is_new) == ((), False)
+    assert away.left_out == ("141.30.1.2", "other")
+    leaf = x509.load_pem_x509_certificate(away.issue().chain.read_bytes())
+    names = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert [str(one.value) for one in names] == ["lab-pi.local", "lab-pi", "10.1.2.3"]
+
+
+def test_two_servers_that_start_together_share_one_authority(tmp_path: Path) -> None:
+    with ThreadPoolExecutor() as pool:
+        made = list(pool.map(lambda _: CertificateAuthority(tmp_path, NAMES, NOW), range(8)))
+        leaves = list(pool.map(lambda one: one.issue(), made))
+    assert len({one.fingerprint for one in made}) == 1
+    assert sum(one.is_new for one in made) == 1
+    assert sum(one.is_new for one in leaves) == 1
+    ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(leaves[0].chain, leaves[0].key)

@@ -1,4 +1,4 @@
-"""The HTTP server: uvicorn, run by a coroutine, with small send buffers.
+"""The HTTP and HTTPS server: uvicorn, run by a coroutine, with small send buffers.
 
 Layer 5. Only this module and `connection` depend on uvicorn. The kernel and the process buffer as
 little unsent data per client as possible, because buffered data becomes outdated and cannot be
@@ -23,8 +23,11 @@ from urc._addresses import local_addresses
 from urc.problems import UrcError
 from urc.transports.own_listeners import OWN_DOORS
 from urc.web.feed.client_socket import SocketFlow
+from urc.web.serve.certificates import Certificates
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S, HttpConnection
 from urc.web.serve.frames import WebSocketFrames, text_of
+from urc.web.serve.tls_listener import FirstBytes, Handshakes
+from urc.web.serve.tls_port import TlsPort
 from urc.web.wire.messages import INBOUND_BYTES
 
 __all__ = ["reachable_urls", "serve"]
@@ -47,6 +50,8 @@ async def serve(
     on_ready: Callable[[str], None] | None = None,
     request_s: float = REQUEST_S,
     connections: int = CONNECTIONS,
+    certificates: Certificates | None = None,
+    handshakes: Handshakes | None = None,
 ) -> None:
     """Serve `app` until SIGINT, SIGTERM or cancellation, then close within 3 seconds.
 
@@ -59,12 +64,19 @@ async def serve(
         request_s: time limit for the arrival of a complete request, in seconds.
         connections: maximum number of open connections; beyond this number, new connections get
             status 503.
+        certificates: certificates of HTTPS; None for plain HTTP.
+        handshakes: limits of unfinished handshakes; None for the usual limits.
 
     Raises:
         UrcError: the server cannot listen on the address.
     """
     listener = _listen(host, port)
+    connection: Callable[..., asyncio.Protocol]
     connection = partial(HttpConnection, request_s=request_s, most=connections)
+    if certificates is not None:
+        handshakes = handshakes or Handshakes(certificates.context)
+        connection = partial(_first_bytes, handshakes, connection)
+        app = TlsPort(app)
     config = uvicorn.Config(
         app,
         loop="none",
@@ -85,14 +97,37 @@ async def serve(
     )
     server = _Server(config)
     try:
-        with _ending(server), OWN_DOORS.kept(listener):
+        with _ending(server), OWN_DOORS.kept(listener), _renewed(certificates, handshakes):
             running = asyncio.ensure_future(server.serve(sockets=[listener]))
             await _until_ready(server, running)
             if on_ready and server.started:
-                on_ready(reachable_urls(*listener.getsockname()[:2])[0])
+                scheme = "http" if certificates is None else "https"
+                place, real_port = listener.getsockname()[:2]
+                on_ready(reachable_urls(place, real_port, scheme)[0])
             await _follow(server, running)
     finally:
         listener.close()
+
+
+def _first_bytes(
+    handshakes: Handshakes, connection: Callable[..., asyncio.Protocol], **options: Any
+) -> FirstBytes:
+    """Return the protocol of a new connection to a port with TLS."""
+    return FirstBytes(handshakes, partial(connection, **options))
+
+
+@contextlib.contextmanager
+def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -> Iterator[None]:
+    """Renew the certificate while the context is open; then end all handshakes."""
+    if certificates is None or handshakes is None:
+        yield
+        return
+    keeping = asyncio.ensure_future(certificates.keep())
+    try:
+        yield
+    finally:
+        keeping.cancel()
+        handshakes.close()
 
 
 class _Server(uvicorn.Server):
@@ -217,7 +252,7 @@ def _listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def reachable_urls(host: str, port: int) -> tuple[str, ...]:
+def reachable_urls(host: str, port: int, scheme: str = "http") -> tuple[str, ...]:
     """Return the URLs of a dashboard that listens on `host`.
 
     For ``0.0.0.0`` and ``::``, the URLs contain the addresses of all network interfaces of this
@@ -227,20 +262,21 @@ def reachable_urls(host: str, port: int) -> tuple[str, ...]:
     Args:
         host: the address or name on which the server listens.
         port: the actual port, not 0.
+        scheme: ``http`` or ``https``.
     """
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
-        return (_url(host, port),)
+        return (_url(scheme, host, port),)
     if not address.is_unspecified:
-        return (_url(host, port),)
+        return (_url(scheme, host, port),)
     found = [each for each in local_addresses() if each.version <= address.version]
     loopback = ipaddress.ip_address("127.0.0.1" if address.version == 4 else "::1")
-    return tuple(_url(str(each), port) for each in found or [loopback])
+    return tuple(_url(scheme, str(each), port) for each in found or [loopback])
 
 
-def _url(host: str, port: int) -> str:
-    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+def _url(scheme: str, host: str, port: int) -> str:
+    return f"{scheme}://[{host}]:{port}/" if ":" in host else f"{scheme}://{host}:{port}/"
 
 
 async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") -> None:

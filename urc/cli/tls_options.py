@@ -1,0 +1,130 @@
+"""The options of `urc serve`, `urc demo` and `urc replay` for HTTPS."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from urc.cli.arguments import is_loopback
+from urc.cli.error_report import Misuse
+from urc.cli.output import complain
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
+    from urc.web.serve.certificates import Certificates
+
+__all__ = ["AUTHORITY", "PLAIN", "TlsOptions", "add_tls", "certificates_of", "tls_of"]
+
+AUTHORITY = "authority"
+"""Name of the local authority's folder in the data folder."""
+
+
+class TlsOptions(NamedTuple):
+    """The kind of certificate, and the public names of a web server in front of URC."""
+
+    kind: Literal["plain", "local", "given"] = "plain"
+    """Plain HTTP, a certificate of the local authority, or a certificate from files."""
+    chain: Path = Path()
+    key: Path = Path()
+    public_names: Sequence[str] = ()
+    """Host names with an optional port, for which another web server provides HTTPS."""
+
+    def around(self, app: "ASGIApp") -> "ASGIApp":
+        """Return the application with secure public names."""
+        from urc.web.serve.tls_port import BehindProxy
+
+        return BehindProxy(app, self.public_names) if self.public_names else app
+
+    def hosts(self) -> list[str]:
+        """Return the public names without ports, for the check of Host."""
+        from urc.web.serve.policy import parse_host
+
+        return [one.host for one in map(parse_host, self.public_names) if one is not None]
+
+
+PLAIN = TlsOptions()
+
+
+def add_tls(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of HTTPS."""
+    parser.add_argument(
+        "--tls",
+        choices=("auto",),
+        help="HTTPS with a certificate of this machine's own authority"
+        " (default for a --host that other machines can reach)",
+    )
+    parser.add_argument(
+        "--tls-cert",
+        metavar="FILE",
+        type=Path,
+        help="HTTPS with this certificate in PEM, followed by intermediate certificates",
+    )
+    parser.add_argument(
+        "--tls-key", metavar="FILE", type=Path, help="key of --tls-cert in PEM, without passphrase"
+    )
+    parser.add_argument(
+        "--behind-proxy",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="public name of a web server on this machine that provides HTTPS for URC",
+    )
+    parser.add_argument(
+        "--insecure-plain-http",
+        action="store_true",
+        help="plain HTTP although other machines can reach --host: everyone on the network can"
+        " read keys and change commands",
+    )
+
+
+def tls_of(arguments: argparse.Namespace) -> TlsOptions:
+    """Return the kind of certificate.
+
+    Raises:
+        Misuse: the options contradict each other, or a name is invalid.
+    """
+    from urc.web.serve.policy import parse_host
+
+    names = tuple(arguments.behind_proxy)
+    for name in names:
+        if parse_host(name) is None:
+            raise Misuse(f"--behind-proxy: expected a name like robots.example, found {name!r}")
+    if bool(arguments.tls_cert) is not bool(arguments.tls_key):
+        raise Misuse("--tls-cert and --tls-key belong together: give both")
+    if arguments.tls and arguments.tls_cert:
+        raise Misuse("--tls auto makes a certificate: remove --tls-cert and --tls-key, or --tls")
+    if arguments.insecure_plain_http:
+        if arguments.tls or arguments.tls_cert:
+            raise Misuse("--insecure-plain-http turns HTTPS off: remove it, or the --tls options")
+        return TlsOptions(public_names=names)
+    if arguments.tls_cert:
+        return TlsOptions("given", arguments.tls_cert, arguments.tls_key, names)
+    is_local = arguments.tls == "auto" or not is_loopback(arguments.host)
+    return TlsOptions("local" if is_local else "plain", public_names=names)
+
+
+async def certificates_of(
+    options: TlsOptions, host: str, allowed_hosts: Sequence[str], data: Path
+) -> "Certificates | None":
+    """Return the certificates of a server; None for plain HTTP.
+
+    Raises:
+        UrcError: a certificate cannot be made or read.
+    """
+    if options.kind == "plain":
+        return None
+    from urc.web.serve.certificates import (
+        Certificates,
+        CertificateSource,
+        GivenCertificate,
+        LocalCertificate,
+    )
+
+    source: CertificateSource = LocalCertificate(data / AUTHORITY, host, allowed_hosts)
+    if options.kind == "given":
+        source = GivenCertificate(options.chain, options.key)
+    certificates = await Certificates.of(source)
+    for note in certificates.current.notes:
+        complain(f"urc: {note}")
+    return certificates

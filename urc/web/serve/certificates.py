@@ -1,0 +1,248 @@
+"""The certificate of a server: from the local authority, or from files of the operator.
+
+Layer 5. `Certificates` loads a certificate in a thread and replaces it while the server runs. New
+connections use the new certificate; open connections keep the old one.
+"""
+
+import asyncio
+import ipaddress
+import logging
+import ssl
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, NamedTuple, Protocol
+
+from cryptography import x509
+
+from urc._addresses import local_addresses
+from urc.access.authority import RENEW_BEFORE, CertificateAuthority, fingerprint
+from urc.problems import UrcError
+from urc.web.serve.policy import own_names
+
+__all__ = ["Certificates", "GivenCertificate", "LoadedCertificate", "LocalCertificate", "names_of"]
+
+LOOK_S: Final = 60.0
+"""Time between two checks of addresses, files and dates, in seconds."""
+_ALWAYS: Final = ("localhost", "127.0.0.1", "::1")
+log = logging.getLogger(__name__)
+
+
+class LoadedCertificate(NamedTuple):
+    """A certificate, ready for new connections."""
+
+    context: ssl.SSLContext
+    fingerprint: str
+    """SHA-256 of the certificate that people trust: the authority, or the given certificate."""
+    file: Path
+    """File in PEM by which local programs verify the server."""
+    name: str
+    """A name or an address in the certificate."""
+    authority: bytes
+    """The local authority in PEM, which people may trust; b"" for a given certificate."""
+    notes: tuple[str, ...] = ()
+    """Messages for the operator, such as a new authority."""
+
+
+class CertificateSource(Protocol):
+    """A kind of certificate; both methods block."""
+
+    def load(self) -> LoadedCertificate:
+        """Return the current certificate; raise `UrcError` if there is none."""
+
+    def has_changed(self) -> bool:
+        """Return whether `load` would return another certificate."""
+
+
+class LocalCertificate:
+    """A certificate of the local authority, for the names and addresses of this machine."""
+
+    def __init__(self, folder: Path, host: str, allowed_hosts: Iterable[str] = ()) -> None:
+        """Prepare.
+
+        Args:
+            folder: folder of the authority.
+            host: address on which the server listens.
+            allowed_hosts: further names of this machine.
+        """
+        self._folder = folder
+        self._host = host
+        self._allowed_hosts = tuple(allowed_hosts)
+        self._names: tuple[Sequence[str], Sequence[str]] = ((), ())
+        self._renew_at = datetime.max.replace(tzinfo=UTC)
+
+    def load(self) -> LoadedCertificate:
+        """Issue a certificate if necessary.
+
+        Raises:
+            AccessError: the files cannot be read or written.
+        """
+        had_one = (self._folder / "authority.pem").exists()
+        self._names = required, optional = names_of(self._host, self._allowed_hosts)
+        authority = CertificateAuthority(
+            self._folder, required, datetime.now(UTC), optional=optional
+        )
+        issued = authority.issue()
+        self._renew_at = issued.ends - RENEW_BEFORE
+        notes = []
+        if authority.is_new and had_one:
+            notes.append(
+                "a new certificate authority replaces the old one: all devices have to trust it"
+            )
+        if authority.left_out:
+            left_out = ", ".join(authority.left_out)
+            notes.append(
+                f"the authority's limits exclude {left_out}; --allow-host with this name makes"
+                " a new authority"
+            )
+        return LoadedCertificate(
+            _context(issued.chain, issued.key),
+            authority.fingerprint,
+            authority.file,
+            _ALWAYS[0],
+            authority.pem,
+            tuple(notes),
+        )
+
+    def has_changed(self) -> bool:
+        """Return whether the certificate ends soon, or this machine has other addresses."""
+        is_late = datetime.now(UTC) >= self._renew_at
+        return is_late or names_of(self._host, self._allowed_hosts) != self._names
+
+
+class GivenCertificate:
+    """A certificate and a key in files of the operator."""
+
+    def __init__(self, chain: Path, key: Path) -> None:
+        """Prepare.
+
+        Args:
+            chain: file in PEM: the server's certificate, then intermediate certificates.
+            key: file in PEM, without a passphrase.
+        """
+        self._chain = chain
+        self._key = key
+        self._seen: tuple[int, ...] = ()
+
+    def load(self) -> LoadedCertificate:
+        """Read both files.
+
+        Raises:
+            UrcError: a file cannot be read, or the files do not belong together.
+        """
+        self._seen = self._stamps()
+        try:
+            leaf = x509.load_pem_x509_certificate(self._chain.read_bytes())
+            self._key.read_bytes()  # its error names the file
+            context = _context(self._chain, self._key)
+        except _PassphraseError:
+            text = f"--tls-key: {self._key} has a passphrase; expected a key without one"
+            raise UrcError(text) from None
+        except ssl.SSLError as error:
+            reason = error.reason or "the files do not belong together"
+            text = f"--tls-cert: cannot use {self._chain} with {self._key}: {reason}"
+            raise UrcError(text) from error
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
+            file = getattr(error, "filename", None) or self._chain
+            raise UrcError(f"--tls-cert: cannot use {file}: {reason}") from error
+        ends = leaf.not_valid_after_utc
+        late = ends <= datetime.now(UTC)
+        notes = (f"{self._chain}: the certificate ended on {ends:%Y-%m-%d}",) if late else ()
+        return LoadedCertificate(
+            context, fingerprint(leaf), self._chain.absolute(), _name_in(leaf), b"", notes
+        )
+
+    def has_changed(self) -> bool:
+        """Return whether a program has replaced a file."""
+        return self._stamps() != self._seen
+
+    def _stamps(self) -> tuple[int, ...]:
+        try:
+            return tuple(one.stat().st_mtime_ns for one in (self._chain, self._key))
+        except OSError:
+            return ()
+
+
+class Certificates:
+    """The current certificate of a running server."""
+
+    def __init__(self, source: CertificateSource, first: LoadedCertificate) -> None:
+        """Begin with a certificate that `source` has loaded."""
+        self._source = source
+        self.current = first
+
+    @classmethod
+    async def of(cls, source: CertificateSource) -> "Certificates":
+        """Load the first certificate in a thread; raise `UrcError` if there is none."""
+        return cls(source, await asyncio.to_thread(source.load))
+
+    def context(self) -> ssl.SSLContext:
+        """Return the certificate and the options for a new connection."""
+        return self.current.context
+
+    async def keep(self, look_s: float = LOOK_S) -> None:
+        """Renew the certificate until cancelled; a fault keeps the old certificate."""
+        while True:
+            await asyncio.sleep(look_s)
+            await self.renew()
+
+    async def renew(self) -> bool:
+        """Load the certificate again if it has changed; return whether it is another one."""
+        try:
+            if not await asyncio.to_thread(self._source.has_changed):
+                return False
+            new = await asyncio.to_thread(self._source.load)
+        except UrcError as error:
+            log.warning("the old certificate stays in use: %s", error)
+            return False
+        for note in new.notes:
+            if note not in self.current.notes:
+                log.warning("%s", note)
+        self.current = new
+        return True
+
+
+def names_of(host: str, allowed_hosts: Iterable[str]) -> tuple[Sequence[str], Sequence[str]]:
+    """Return the names and addresses of a certificate: the required and the optional ones.
+
+    The names are those that the page policy accepts. Public IPv6 addresses are left out if the
+    machine has other addresses: providers change them often, and the authority must name each.
+    """
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        given = [host]
+    else:
+        given = [] if address.is_unspecified else [str(address)]
+    required = dict.fromkeys((*_ALWAYS, *given, *allowed_hosts))
+    addresses = local_addresses()
+    local = [str(one) for one in addresses if one.version == 4 or not one.is_global]
+    optional = (*sorted(own_names()), *(local or map(str, addresses)))
+    return tuple(required), tuple(one for one in optional if one not in required)
+
+
+def _context(chain: Path, key: Path) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.options |= ssl.OP_NO_RENEGOTIATION
+    context.set_alpn_protocols(["http/1.1"])
+    context.load_cert_chain(chain, key, password=_refused)
+    return context
+
+
+class _PassphraseError(Exception):
+    """A key has a passphrase."""
+
+
+def _refused() -> str:
+    """Refuse a key with a passphrase; without this function, OpenSSL would ask the terminal."""
+    raise _PassphraseError
+
+
+def _name_in(leaf: x509.Certificate) -> str:
+    try:
+        found = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return ""
+    return next((str(one.value).replace("*", "urc", 1) for one in found), "")

@@ -1,0 +1,214 @@
+"""One TLS connection over an asyncio transport, with no buffer of its own.
+
+Layer 5. Encryption is `ssl.SSLObject` of the standard library. The TLS layer of an event loop has
+a buffer above the transport of TCP, and reports a full buffer one write too late. The dashboard
+would then write one more frame, which becomes outdated in the buffer. Here, each write goes to TCP
+at once, so the callbacks of TCP are exact, and paused data stays in the kernel.
+"""
+
+import asyncio
+import contextlib
+import ssl
+from collections.abc import Callable
+from typing import Any
+
+__all__ = ["READ_BYTES", "TlsConnection"]
+
+READ_BYTES = 64 * 1024
+"""Maximum number of decrypted bytes in one call of a protocol."""
+
+
+class TlsConnection(asyncio.Transport, asyncio.Protocol):
+    """The protocol of a TCP transport, and the transport of a protocol above TLS."""
+
+    def __init__(
+        self,
+        tcp: asyncio.Transport,
+        context: ssl.SSLContext,
+        make: Callable[[], asyncio.Protocol],
+        on_end: Callable[[], None],
+    ) -> None:
+        """Prepare the handshake; `data_received` begins it.
+
+        Args:
+            tcp: an open transport, whose protocol becomes this connection.
+            context: certificate and options of the server.
+            make: function that returns the upper protocol, called after the handshake.
+            on_end: callback for the end of the handshake: success, failure or lost connection.
+        """
+        super().__init__()
+        self._tcp = tcp
+        self._make = make
+        self._on_end = on_end
+        self._context = context
+        self._in = ssl.MemoryBIO()
+        self._out = ssl.MemoryBIO()
+        self._tls = context.wrap_bio(self._in, self._out, server_side=True)
+        self._protocol: asyncio.BaseProtocol | None = None
+        """The upper protocol; None before the handshake and after the end."""
+        self._is_ready = False
+        self._is_reading = True
+        self._is_closing = False
+        self._loop = asyncio.get_running_loop()
+
+    # Called by TCP
+
+    def data_received(self, data: bytes) -> None:
+        """Decrypt received bytes."""
+        self._in.write(data)
+        if not self._is_ready:
+            self._handshake()
+        if self._is_ready:
+            self._read()
+
+    def eof_received(self) -> bool | None:
+        """Close the connection: without a closing message of TLS, the data may be incomplete."""
+        self._in.write_eof()
+        if isinstance(self._protocol, asyncio.Protocol) and not self._is_closing:
+            self._protocol.eof_received()
+        return False
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Pass on the end of the connection."""
+        self._is_closing = True
+        if not self._is_ready:
+            self._on_end()
+        protocol, self._protocol = self._protocol, None
+        if protocol is not None:
+            protocol.connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Pass on that the kernel's buffer is full."""
+        if self._protocol is not None:
+            self._protocol.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Pass on that the kernel has accepted all bytes."""
+        if self._protocol is not None:
+            self._protocol.resume_writing()
+
+    def _handshake(self) -> None:
+        try:
+            self._tls.do_handshake()
+        except ssl.SSLWantReadError:
+            self._flush()
+            return
+        except (ssl.SSLError, ssl.CertificateError):
+            self._fail()
+            return
+        self._flush()
+        self._is_ready = True
+        self._on_end()
+        self._protocol = protocol = self._make()
+        protocol.connection_made(self)
+
+    def _read(self) -> None:
+        while self._is_reading and not self._is_closing:
+            try:
+                data = self._tls.read(READ_BYTES)
+            except ssl.SSLWantReadError:
+                break
+            except ssl.SSLError:
+                self._fail()
+                return
+            if not data:  # the client has closed TLS
+                if isinstance(self._protocol, asyncio.Protocol):
+                    self._protocol.eof_received()
+                self.close()
+                return
+            if isinstance(self._protocol, asyncio.Protocol):
+                self._protocol.data_received(data)
+        self._flush()  # replies of TLS itself, such as a change of keys
+
+    def _fail(self) -> None:
+        """Send the alert that explains the failure, and close."""
+        self._flush()
+        self._is_closing = True
+        self._tcp.close()
+
+    def _flush(self) -> None:
+        if self._out.pending and not self._tcp.is_closing():
+            self._tcp.write(self._out.read())
+
+    # Called by the upper protocol
+
+    def get_extra_info(self, name: str, default: Any = None) -> Any:
+        """Return data on the connection, such as ``peername`` or ``sslcontext``."""
+        if name == "sslcontext":
+            return self._context
+        if name == "ssl_object":
+            return self._tls
+        return self._tcp.get_extra_info(name, default)
+
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        """Return the upper protocol."""
+        return self._protocol or self
+
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        """Replace the upper protocol, as at the start of a WebSocket."""
+        self._protocol = protocol
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        """Encrypt data and give it to TCP."""
+        if self._is_closing or not data:
+            return
+        try:
+            self._tls.write(data)
+        except ssl.SSLError:
+            self._fail()
+        else:
+            self._flush()
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
+        """Set the limits of TCP's buffer, in encrypted bytes."""
+        self._tcp.set_write_buffer_limits(high, low)
+
+    def get_write_buffer_size(self) -> int:
+        """Return the number of encrypted bytes that the kernel has not accepted."""
+        return self._tcp.get_write_buffer_size()
+
+    def pause_reading(self) -> None:
+        """Leave further data in the kernel's buffer."""
+        self._is_reading = False
+        self._tcp.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Read again, first the bytes of the last packet."""
+        if not self._is_reading:
+            self._is_reading = True
+            self._loop.call_soon(self._resumed)
+
+    def _resumed(self) -> None:
+        if self._is_ready:
+            self._read()
+        if self._is_reading and not self._tcp.is_closing():
+            self._tcp.resume_reading()
+
+    def is_reading(self) -> bool:
+        """Return whether data is being read."""
+        return self._is_reading
+
+    def is_closing(self) -> bool:
+        """Return whether the connection is closing or closed."""
+        return self._is_closing or self._tcp.is_closing()
+
+    def can_write_eof(self) -> bool:
+        """Return False: TLS closes both directions together."""
+        return False
+
+    def close(self) -> None:
+        """Close the connection after all written data, without waiting for the client's reply."""
+        if self._is_closing:
+            return
+        self._is_closing = True
+        if self._is_ready:
+            # The message is written; the client's reply is not awaited.
+            with contextlib.suppress(ssl.SSLError):
+                self._tls.unwrap()
+            self._flush()
+        self._tcp.close()
+
+    def abort(self) -> None:
+        """Close the connection immediately."""
+        self._is_closing = True
+        self._tcp.abort()

@@ -1,0 +1,169 @@
+"""The first bytes of a connection to a port with TLS: handshake, or plain HTTP.
+
+Layer 5. A client can open many connections and never finish a handshake. `Handshakes` limits their
+number, their duration, and their share of the event loop's time.
+"""
+
+import asyncio
+import ssl
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import cast
+
+from urc.web.serve.tls_connection import TlsConnection
+
+__all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
+
+HANDSHAKES = 128
+"""Maximum number of unfinished handshakes. One more closes the oldest one of the address with the
+most."""
+HANDSHAKE_S = 5.0
+"""Time limit from the opening of a connection to the end of its handshake, in seconds."""
+SHARE = 0.25
+"""Maximum share of handshakes in the event loop's time, from 0 to 1; further handshakes wait."""
+_TLS_HANDSHAKE = 0x16
+"""First byte of a TLS connection (RFC 8446, 5.1); no method of HTTP begins with it."""
+
+
+class Handshakes:
+    """The unfinished handshakes of one server."""
+
+    def __init__(
+        self,
+        context: Callable[[], ssl.SSLContext],
+        *,
+        most: int = HANDSHAKES,
+        limit_s: float = HANDSHAKE_S,
+    ) -> None:
+        """Begin without connections.
+
+        Args:
+            context: function that returns the current certificate and options.
+            most: maximum number of unfinished handshakes.
+            limit_s: time limit of a handshake, in seconds.
+        """
+        self.context = context
+        self._most = most
+        self._limit_s = limit_s
+        self._open: dict[FirstBytes, asyncio.TimerHandle] = {}
+        self._waiting: deque[FirstBytes] = deque()
+        self._free_s = 0.0
+        """Time of the event loop's clock at which the next handshake may begin."""
+        self._is_timed = False
+
+    def __len__(self) -> int:
+        """Return the number of unfinished handshakes."""
+        return len(self._open)
+
+    def add(self, one: "FirstBytes") -> None:
+        """Limit the time of a new connection; close another connection if there are too many."""
+        loop = asyncio.get_running_loop()
+        self._open[one] = loop.call_later(self._limit_s, one.abort)
+        if len(self._open) > self._most:
+            count = Counter(each.address for each in self._open)
+            most = max(count.values())
+            next(each for each in self._open if count[each.address] == most).abort()
+
+    def remove(self, one: "FirstBytes") -> None:
+        """Forget a connection: its handshake has ended, or the connection is lost."""
+        timer = self._open.pop(one, None)
+        if timer is not None:
+            timer.cancel()
+
+    def close(self) -> None:
+        """Close all connections without a finished handshake."""
+        for one in list(self._open):
+            one.abort()
+
+    def begin(self, one: "FirstBytes") -> None:
+        """Process the first message of a handshake now, or later if handshakes took much time."""
+        self._waiting.append(one)
+        if not self._is_timed:
+            self._next()
+
+    def _next(self) -> None:
+        """Process one waiting message; its duration determines the time of the next one."""
+        self._is_timed = False
+        loop = asyncio.get_running_loop()
+        if loop.time() < self._free_s:
+            self._later(loop)
+            return
+        while self._waiting:
+            one = self._waiting.popleft()
+            if one in self._open:  # else it is closed
+                begin_s = loop.time()
+                one.shake()
+                end_s = loop.time()
+                self._free_s = end_s + (end_s - begin_s) * (1 / SHARE - 1)
+                break
+        if self._waiting:
+            self._later(loop)
+
+    def _later(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._is_timed = True
+        loop.call_at(self._free_s, self._next)
+
+
+class FirstBytes(asyncio.Protocol):
+    """The protocol of a new connection, until its first bytes have shown TLS or plain HTTP."""
+
+    def __init__(self, handshakes: Handshakes, make: Callable[[], asyncio.Protocol]) -> None:
+        """Prepare.
+
+        Args:
+            handshakes: the unfinished handshakes of the server.
+            make: function that returns the protocol of HTTP.
+        """
+        self._handshakes = handshakes
+        self._make = make
+        self._tcp: asyncio.Transport | None = None
+        self._begun = b""
+        self.address = ""
+        """Network address of the client."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Wait for the first bytes."""
+        self._tcp = cast("asyncio.Transport", transport)
+        peer = transport.get_extra_info("peername") or ("",)
+        self.address = str(peer[0])
+        self._handshakes.add(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Begin a handshake, or pass plain HTTP on."""
+        if self._tcp is None:
+            return
+        is_first = not self._begun
+        self._begun += data  # bounded: reading is paused until the turn of this connection
+        if is_first and data[0] == _TLS_HANDSHAKE:
+            self._tcp.pause_reading()
+            self._handshakes.begin(self)
+        elif is_first:
+            self._handshakes.remove(self)
+            plain = self._make()
+            self._tcp.set_protocol(plain)
+            plain.connection_made(self._tcp)
+            plain.data_received(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._handshakes.remove(self)
+
+    def shake(self) -> None:
+        """Process the first message of the handshake."""
+        if self._tcp is None or self._tcp.is_closing():
+            return
+        secure = TlsConnection(
+            self._tcp,
+            self._handshakes.context(),
+            self._make,
+            lambda: self._handshakes.remove(self),
+        )
+        self._tcp.set_protocol(secure)
+        self._tcp.resume_reading()
+        secure.data_received(self._begun)
+
+    def abort(self) -> None:
+        """Close the connection, whose handshake took too long or too much room."""
+        self._handshakes.remove(self)
+        if self._tcp is not None:
+            self._tcp.abort()

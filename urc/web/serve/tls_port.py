@@ -1,0 +1,103 @@
+"""Plain HTTP on a port with TLS, and TLS that a web server in front of URC provides.
+
+Layer 5. Two small ASGI middlewares around the application. `TlsPort` redirects plain HTTP to HTTPS.
+Plain HTTP has three exceptions: connections of this machine, STOP, and the pages that a device
+needs before it trusts the certificate. `BehindProxy` gives requests to a public name its scheme.
+"""
+
+import ipaddress
+import re
+from collections.abc import Iterable
+from urllib.parse import quote
+
+from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from urc._addresses import unmapped
+from urc.web.serve.connection_quota import is_stop
+from urc.web.serve.policy import REFUSAL_HEADERS, Authority, parse_host
+
+__all__ = ["BehindProxy", "TlsPort"]
+
+_SECURE = {"http": "https", "ws": "wss"}
+_PLAIN = re.compile(
+    r"/trust(?:/authority\.crt)?|/healthz|/favicon\.ico|/app\.webmanifest"
+    r"|/(?:static|vendor|words)/.+\.\w+"
+)
+"""Paths without data about robots, which need no encryption."""
+
+
+class TlsPort:
+    """The middleware of a port with TLS."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward the request, or redirect it to HTTPS."""
+        is_secure = scope.get("scheme", "https") in ("https", "wss")  # a lifespan has no scheme
+        if is_secure or _may_be_plain(scope):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008, "reason": "use wss"})
+        else:
+            await _redirect(scope)(scope, receive, send)
+
+
+class BehindProxy:
+    """The middleware of a server with public names, whose TLS ends at a web server in front."""
+
+    def __init__(self, app: ASGIApp, names: Iterable[str]) -> None:
+        """Prepare.
+
+        Args:
+            app: the application.
+            names: public host names with an optional port, as in the address bar of browsers.
+        """
+        self._app = app
+        self._names = {one for one in map(parse_host, names) if one is not None}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward the request, with a secure scheme if its host is a public name."""
+        if scope["type"] != "lifespan" and _host(scope) in self._names:
+            scope = {**scope, "scheme": _SECURE.get(scope["scheme"], scope["scheme"])}
+        await self._app(scope, receive, send)
+
+
+def _may_be_plain(scope: Scope) -> bool:
+    if _is_near(scope.get("client")) and _is_near(scope.get("server")):
+        return True
+    if scope["type"] == "websocket":
+        return False
+    if is_stop(scope["method"], scope["path"]):
+        return True
+    return scope["method"] in ("GET", "HEAD") and _PLAIN.fullmatch(scope["path"]) is not None
+
+
+def _is_near(place: tuple[str, int | None] | None) -> bool:
+    """Return whether an end of a connection has a loopback address."""
+    try:
+        return place is not None and unmapped(ipaddress.ip_address(place[0])).is_loopback
+    except ValueError:
+        return False
+
+
+def _redirect(scope: Scope) -> ASGIApp:
+    """Return the response to a plain request that needs HTTPS."""
+    host = _host(scope)
+    headers = {name.decode(): value.decode() for name, value in REFUSAL_HEADERS}
+    headers["cache-control"] = "no-store"
+    if host is None or scope["method"] not in ("GET", "HEAD"):
+        text = "This port requires HTTPS: use an address that begins with https://\n"
+        return PlainTextResponse(text, 403, headers)
+    port = "" if host.port is None else f":{host.port}"
+    query = scope["query_string"].decode("latin-1")
+    path = "/" + quote(scope["path"].lstrip("/")) + (f"?{query}" if query else "")
+    # Temporary: the same address may serve plain HTTP after the next start.
+    return RedirectResponse(f"https://{host.host}{port}{path}", 307, headers)
+
+
+def _host(scope: Scope) -> Authority | None:
+    """Return the host of a request, or None for a missing, repeated or invalid header."""
+    found = [value for name, value in scope["headers"] if name == b"host"]
+    return parse_host(found[0].decode("latin-1")) if len(found) == 1 else None

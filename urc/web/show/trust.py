@@ -1,0 +1,160 @@
+"""The page on this connection: the browser's features at this address, and trust in the authority.
+
+Layer 5. The page and the certificate contain no data about robots, so everyone may load them, even
+over plain HTTP: a device needs them before it trusts the certificate.
+"""
+
+from dataclasses import dataclass
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from urc.web.serve.certificates import Certificates
+from urc.web.serve.policy import parse_host
+from urc.web.serve.rights import ANYONE, ProtectedRoute
+from urc.web.show.pages import PageHead, render
+from urc.web.words import t
+
+__all__ = ["AUTHORITY_PATH", "TRUST_PATH", "DeviceGuide", "TrustPage", "TrustPages"]
+
+TRUST_PATH = "/trust"
+AUTHORITY_PATH = "/trust/authority.crt"
+_CRT = "application/x-x509-ca-cert"
+"""Media type that Android, iOS, macOS, Windows and Firefox know as a certificate authority."""
+_HEADERS = {"cache-control": "no-store"}
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceGuide:
+    """The steps for one kind of device, after the download of the certificate."""
+
+    name: str
+    """Name for scripts, such as ``ios``."""
+    title: str
+    steps: tuple[str, ...]
+    removal: str
+    command: str = ""
+    """Command of the last step; "" without a command."""
+    removal_command: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TrustPage:
+    """Context of ``trust.html.j2``."""
+
+    head: PageHead
+    fingerprint: tuple[str, ...]
+    """Groups of the fingerprint of the certificate to trust; empty for plain HTTP."""
+    has_authority: bool
+    """Whether the server has a local authority, which devices may trust."""
+    certificate_url: str
+    secure_url: str
+    """The same server by HTTPS; "" if the page came by HTTPS, or the server has no HTTPS."""
+    guides: tuple[DeviceGuide, ...]
+
+
+class TrustPages:
+    """The routes of the page and of the authority's certificate."""
+
+    def __init__(self, certificates: Certificates | None) -> None:
+        """Prepare; `certificates` is None for a server with plain HTTP."""
+        self._certificates = certificates
+
+    def routes(self) -> list[ProtectedRoute]:
+        """Return the routes."""
+        return [
+            ProtectedRoute(TRUST_PATH, self._page, ANYONE),
+            ProtectedRoute(AUTHORITY_PATH, self._certificate, ANYONE),
+        ]
+
+    async def _page(self, request: Request) -> Response:
+        found = self._certificates.current if self._certificates is not None else None
+        has_authority = found is not None and bool(found.authority)
+        page = TrustPage(
+            head=PageHead(request.state.nonce, t("This connection")),
+            fingerprint=tuple(found.fingerprint.split()) if found is not None else (),
+            has_authority=has_authority,
+            certificate_url=AUTHORITY_PATH,
+            secure_url=_secure_url(request) if found is not None else "",
+            guides=_guides() if has_authority else (),
+        )
+        return HTMLResponse(render("trust.html.j2", page), headers=_HEADERS)
+
+    async def _certificate(self, request: Request) -> Response:
+        found = self._certificates.current if self._certificates is not None else None
+        if found is None or not found.authority:
+            raise HTTPException(404)
+        return Response(found.authority, media_type=_CRT, headers=_HEADERS)
+
+
+def _secure_url(request: Request) -> str:
+    host = parse_host(request.headers.get("host", ""))
+    if request.url.scheme == "https" or host is None:
+        return ""
+    return f"https://{host.host}/" if host.port is None else f"https://{host.host}:{host.port}/"
+
+
+def _guides() -> tuple[DeviceGuide, ...]:
+    """Return the guides in the language of the request. Names of menus are those of the systems."""
+    return (
+        DeviceGuide(
+            "android",
+            "Android",
+            (
+                t("Open the settings of the device, and search for “CA certificate”."),
+                t("Confirm the warning, and choose the downloaded file authority.crt."),
+            ),
+            t("Search for “trusted credentials”, open “User”, choose it, and remove it."),
+        ),
+        DeviceGuide(
+            "ios",
+            "iPhone, iPad",
+            (
+                t("Download it in Safari, and allow the profile."),
+                t("Open Settings, General, VPN & Device Management: install the profile."),
+                t("Open Settings, General, About, Certificate Trust Settings: turn it on."),
+            ),
+            t("Open Settings, General, VPN & Device Management: remove the profile."),
+        ),
+        DeviceGuide(
+            "windows",
+            "Windows (Chrome, Edge)",
+            (
+                t("Open the file, and choose “Install Certificate”, then “Current User”."),
+                t("Place it in the store “Trusted Root Certification Authorities”, and confirm."),
+                t("Close all windows of the browser, and open it again."),
+            ),
+            t("Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete it."),
+        ),
+        DeviceGuide(
+            "macos",
+            "macOS (Safari, Chrome)",
+            (
+                t("Open the file: Keychain Access adds it to the login keychain."),
+                t("Open it there, open “Trust”, and choose “Always Trust” for SSL."),
+            ),
+            t("Delete it in Keychain Access."),
+        ),
+        DeviceGuide(
+            "linux",
+            "Linux (Chrome, Chromium)",
+            (
+                t("Install the program certutil (package libnss3-tools or nss-tools)."),
+                t("Run this command in the folder of the download, then restart the browser:"),
+            ),
+            t("Run this command:"),
+            "mkdir -p $HOME/.pki/nssdb && certutil -d sql:$HOME/.pki/nssdb -A -t C,, -n urc"
+            " -i authority.crt",
+            "certutil -d sql:$HOME/.pki/nssdb -D -n urc",
+        ),
+        DeviceGuide(
+            "firefox",
+            "Firefox",
+            (
+                t("Open the settings, search for “certificates”: View Certificates, Authorities."),
+                t("Import the file, and select “Trust this CA to identify websites”."),
+            ),
+            t("Choose it in the same list, then “Delete or Distrust”."),
+        ),
+    )
