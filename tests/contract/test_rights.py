@@ -22,10 +22,12 @@ OPEN_TO_ALL = {
     "/healthz",
     "/static/{file:path}",
     "/sw.js",
+    "/trust",
+    "/trust/authority.crt",
     "/vendor/{file:path}",
     "/words/{tag}.js",
 }
-"""Paths without a sign-in: STOP, and what the sign-in page loads."""
+"""Paths without a sign-in: STOP, what the sign-in page loads, and the page of the certificate."""
 
 
 @pytest.fixture

@@ -30,12 +30,12 @@ Start = Callable[..., UrcProcess]
 
 
 @asynccontextmanager
-async def person(home: Path) -> AsyncIterator[BrowserContext]:
+async def person(home: Path, profile: str = "profile") -> AsyncIterator[BrowserContext]:
     """Open the browser of a person with a home of their own, where it finds its authorities."""
     program = next(need for need in NEEDS if need.name == "chromium").find()
     async with async_playwright() as playwright:
         context = await playwright.chromium.launch_persistent_context(
-            str(home / "profile"),
+            str(home / profile),
             executable_path=program,
             args=[*FLAGS],
             env={**os.environ, "HOME": str(home)},
@@ -84,6 +84,7 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         page = await context.new_page()
         with pytest.raises(Error, match="ERR_CERT_AUTHORITY_INVALID"):
             await page.goto(others)
+        page = await context.new_page()
         await page.goto(others.replace("https://", "http://") + "trust")
         printed = await page.locator("[data-fingerprint] code").all_inner_texts()
         assert " ".join(printed) == shown
@@ -124,7 +125,8 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         assert any(one["secure"] and one["httpOnly"] for one in cookies)
 
     await asyncio.to_thread(typed, home, removal)
-    async with person(home) as context:
+    # In the old profile, the installed app would open without the server.
+    async with person(home, "other") as context:
         page = await context.new_page()
         with pytest.raises(Error, match="ERR_CERT_AUTHORITY_INVALID"):
             await page.goto(others)

@@ -48,7 +48,7 @@ class CertificateSource(Protocol):
     """A kind of certificate; both methods block."""
 
     def load(self) -> LoadedCertificate:
-        """Return the current certificate; raise `UrcError` if there is none."""
+        """Return the current certificate, or raise `UrcError`."""
 
     def has_changed(self) -> bool:
         """Return whether `load` would return another certificate."""
@@ -174,7 +174,7 @@ class Certificates:
 
     @classmethod
     async def of(cls, source: CertificateSource) -> "Certificates":
-        """Load the first certificate in a thread; raise `UrcError` if there is none."""
+        """Load the first certificate in a thread, or raise `UrcError`."""
         return cls(source, await asyncio.to_thread(source.load))
 
     def context(self) -> ssl.SSLContext:

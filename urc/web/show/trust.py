@@ -1,7 +1,7 @@
 """The page on this connection: the browser's features at this address, and trust in the authority.
 
-Layer 5. The page and the certificate contain no data about robots, so everyone may load them, even
-over plain HTTP: a device needs them before it trusts the certificate.
+Layer 5. The page and the certificate contain no data about robots. Everyone may load them, even
+over plain HTTP, because a device needs them before it trusts the certificate.
 """
 
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ class TrustPages:
     """The routes of the page and of the authority's certificate."""
 
     def __init__(self, certificates: Certificates | None) -> None:
-        """Prepare; `certificates` is None for a server with plain HTTP."""
+        """Prepare. Without `certificates`, the server uses plain HTTP."""
         self._certificates = certificates
 
     def routes(self) -> list[ProtectedRoute]:
