@@ -4,12 +4,13 @@ npm installs the modules as pinned in the committed lock file. The modules form 
 package, ``urc_vendor``. The modules are never written into the source tree, where the files could
 become outdated. An sdist contains the modules, so a build from an sdist needs neither npm nor the
 network. Only a real wheel contains the data folders: an editable installation reads these folders
-from the checkout.
+from the checkout. A real wheel also contains its SBOM, from hatch_sbom.py.
 """
 
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import tempfile
@@ -77,8 +78,10 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         root = Path(self.root)
         is_editable = version == "editable"
         key = "force_include_editable" if is_editable else "force_include"
-        build_data[key][str(self._vendor_folder(root))] = "urc_vendor"
+        vendor = self._vendor_folder(root)
+        build_data[key][str(vendor)] = "urc_vendor"
         if self.target_name == "wheel" and not is_editable:
+            build_data["sbom_files"].append(str(self._write_sbom(root, vendor)))
             for name in DATA_FOLDERS:
                 build_data[key][str(root / name)] = f"urc/_shipped/{name}"
 
@@ -87,13 +90,27 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         if hasattr(self, "_temporary"):
             self._temporary.cleanup()
 
+    def _write_sbom(self, root: Path, vendor: Path) -> Path:
+        """Return the file of the wheel's SBOM, in the temporary folder."""
+        # The build backend loads this hook by its path, so its neighbour is not importable.
+        made = runpy.run_path(str(root / "hatch_sbom.py"))
+        file = self._work_folder() / str(made["SBOM"])
+        names = sorted(VENDORED)
+        file.write_bytes(made["sbom"](root, vendor, self.metadata.version, names))
+        return file
+
+    def _work_folder(self) -> Path:
+        """Return the temporary folder of this build."""
+        if not hasattr(self, "_temporary"):
+            self._temporary = tempfile.TemporaryDirectory(prefix="urc-build-")
+        return Path(self._temporary.name)
+
     def _vendor_folder(self, root: Path) -> Path:
         """Return the `urc_vendor` of an unpacked sdist, or build it in a temporary folder."""
         packed = root / "urc_vendor"
         if packed.is_dir():
             return packed
-        self._temporary = tempfile.TemporaryDirectory(prefix="urc-build-")
-        work = Path(self._temporary.name)
+        work = self._work_folder()
         try:
             install_modules(root, work)
             return collect(work / "node_modules", work / "urc_vendor", root)

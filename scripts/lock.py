@@ -25,6 +25,8 @@ LOCKS: dict[str, tuple[str, ...]] = {
 }
 """Arguments of each lock file: `demo` and `build` for `./dev demo`, `dev` for `./dev test`, `node`
 for machines without npm."""
+SYSTEMS = "platform_python_implementation == 'CPython' and sys_platform != 'emscripten'"
+"""The environments of ``[tool.uv]`` in pyproject.toml."""
 _HEADER = """\
 # Made by `python -m scripts.lock` from pyproject.toml: exact versions with hashes.
 """
@@ -52,7 +54,7 @@ def lock(uv: str, name: str, *, is_upgrade: bool) -> int:
     file = FOLDER / f"{name}.txt"
     command = [
         uv, "pip", "compile", *LOCKS[name], "--universal", "--python-version", OLDEST,
-        "--generate-hashes", "--no-header", "--no-annotate", "--no-config", "--quiet",
+        "--generate-hashes", "--no-header", "--no-annotate", "--quiet",
         "--output-file", str(file),
     ]  # fmt: skip
     if is_upgrade:
@@ -61,7 +63,10 @@ def lock(uv: str, name: str, *, is_upgrade: bool) -> int:
         command += ["--constraints", str(FOLDER / "demo.txt")]
     done = subprocess.run(command, cwd=ROOT, timeout=_TIMEOUT_S, check=False)
     if done.returncode == 0:
-        file.write_text(_HEADER + file.read_text("utf-8").removeprefix(_HEADER), "utf-8")
+        text = file.read_text("utf-8").removeprefix(_HEADER)
+        # True wherever `./dev` reads a lock, and repeated by uv in every line.
+        text = text.replace(f" and {SYSTEMS}", "").replace(f" ; {SYSTEMS}", "")
+        file.write_text(_HEADER + text, "utf-8")
     return done.returncode
 
 

@@ -1,5 +1,8 @@
 """The wheel: what is in it, and that it runs without the checkout."""
 
+import hashlib
+import json
+import re
 import subprocess
 import sys
 import sysconfig
@@ -8,6 +11,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import urc
 
@@ -79,6 +84,60 @@ def test_the_wheel_carries_every_file_of(wheel: Path, folder: str) -> None:
     }
     assert here, f"{folder} is empty"
     assert there == {name.replace("\\", "/") for name in here}
+
+
+def sbom_of(wheel: Path) -> str:
+    """Return the SBOM, from its place by PEP 770."""
+    with zipfile.ZipFile(wheel) as opened:
+        return opened.read(f"urc-{urc.__version__}.dist-info/sboms/urc.cdx.json").decode()
+
+
+def test_the_sbom_is_valid_by_its_official_schema(wheel: Path) -> None:
+    """The schema of CycloneDX, as the project's own library has it."""
+    from cyclonedx.schema import SchemaVersion
+    from cyclonedx.validation.json import JsonStrictValidator
+
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(sbom_of(wheel)) is None
+
+
+def test_the_sbom_lists_each_bundled_file_with_its_hash(wheel: Path) -> None:
+    """Each file of urc_vendor, except the two that the build writes itself."""
+    components = json.loads(sbom_of(wheel))["components"]
+    listed = {
+        file["name"]: file["hashes"][0]["content"]
+        for one in components
+        for file in one.get("components", ())
+    }
+    with zipfile.ZipFile(wheel) as opened:
+        there = {
+            name: hashlib.sha256(opened.read(name)).hexdigest()
+            for name in opened.namelist()
+            if name.startswith("urc_vendor/")
+        }
+    made = {"urc_vendor/__init__.py", "urc_vendor/importmap.json"}
+    assert listed == {name: digest for name, digest in there.items() if name not in made}
+    assert made <= there.keys()
+
+
+def test_the_sbom_names_every_dependency_of_the_wheel(wheel: Path) -> None:
+    """With version, licence and hashes."""
+    with zipfile.ZipFile(wheel) as opened:
+        told = opened.read(f"urc-{urc.__version__}.dist-info/METADATA").decode()
+    needed = {
+        canonicalize_name(Requirement(one).name)
+        for one in re.findall(r"^Requires-Dist: (.+)$", told, re.MULTILINE)
+        if "extra ==" not in one
+    }
+    said = json.loads(sbom_of(wheel))
+    components = said["components"]
+    assert len(needed) > 20
+    assert needed <= {one["name"] for one in components}
+    assert {one["name"] for one in components} >= {"leaflet", "three", "uplot", "@xterm/xterm"}
+    for one in components:
+        assert one["version"]
+        assert one["licenses"][0]["expression"]
+        assert one["hashes"]
+    assert said["metadata"]["component"]["version"] == urc.__version__
 
 
 def test_the_wheel_carries_nothing_of_the_workshop(wheel: Path) -> None:
