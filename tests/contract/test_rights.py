@@ -20,6 +20,10 @@ OPEN_TO_ALL = {
     "/app.webmanifest",
     "/favicon.ico",
     "/healthz",
+    "/sign-in/oidc",
+    "/sign-in/oidc/callback",
+    "/sign-in/passkey",
+    "/sign-in/passkey/options",
     "/static/{file:path}",
     "/sw.js",
     "/trust",
@@ -27,7 +31,7 @@ OPEN_TO_ALL = {
     "/vendor/{file:path}",
     "/words/{tag}.js",
 }
-"""Paths without a sign-in: STOP, what the sign-in page loads, and the page of the certificate."""
+"""Paths without a sign-in: STOP, the ways to sign in, and the pages of sign-in and certificate."""
 
 
 @pytest.fixture

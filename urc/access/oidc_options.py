@@ -13,16 +13,25 @@ import httpx2
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.access.options_file import OptionsFile, is_loopback_url
 
-__all__ = ["ANY", "LONGEST_H", "ClaimRule", "OidcOptions", "claim_values", "read_oidc_options"]
+__all__ = [
+    "ANY",
+    "KEYS",
+    "LONGEST_H",
+    "ClaimRule",
+    "OidcOptions",
+    "claim_values",
+    "read_oidc_options",
+]
 
 ANY: Final = "*"
 """Value of a rule that holds for every value of its claim."""
 LONGEST_H: Final = 12.0
 """Longest life of a sign-in, in hours."""
-_KEYS: Final = (
+KEYS: Final = (
     "issuer", "client_id", "client_secret_file", "title", "address", "scopes", "name",
     "authority_file", "hours", "grants",
 )  # fmt: skip
+"""All keys of the file."""
 _RULE_KEYS: Final = ("claim", "value", "grant")
 _SCOPES: Final = ("openid", "profile")
 _OPENID: Final = "openid"
@@ -108,7 +117,7 @@ def read_oidc_options(file: str) -> OidcOptions:
     Raises:
         ProblemsError: the file or the file of a secret cannot be read, or a value is invalid.
     """
-    options = OptionsFile(file, _KEYS)
+    options = OptionsFile(file, KEYS)
     issuer = options.text("issuer")
     _check_url(options, "issuer", issuer)
     address = options.text("address", "")

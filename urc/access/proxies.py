@@ -14,11 +14,12 @@ from typing import Final, NamedTuple
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.access.options_file import OptionsFile
 
-__all__ = ["ProxiedRequest", "TrustedProxy", "read_proxy_options", "without_proxy_headers"]
+__all__ = ["KEYS", "ProxiedRequest", "TrustedProxy", "read_proxy_options", "without_proxy_headers"]
 
 SHORTEST_SECRET: Final = 32
 """Fewest characters of the secret; 32 random letters cannot be guessed."""
-_KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
+KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
+"""All keys of the file."""
 _HEADER: Final = re.compile(r"[A-Za-z0-9-]{1,64}")
 _TAKEN: Final = re.compile(
     r"host|origin|cookie|authorization|connection|upgrade|content-.*|transfer-.*|sec-.*|user-agent",
@@ -93,7 +94,7 @@ def read_proxy_options(file: str) -> TrustedProxy:
     Raises:
         ProblemsError: the file or the file of the secret cannot be read, or a value is invalid.
     """
-    options = OptionsFile(file, _KEYS)
+    options = OptionsFile(file, KEYS)
     user, secret = (_header(options, key) for key in ("user_header", "secret_header"))
     if user == secret:
         raise options.fault(("secret_header",), "expected another header than user_header")

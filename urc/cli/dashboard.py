@@ -5,7 +5,7 @@ import gc
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from urc.simulator.emulated_robot import EmulatedRobot
 from urc.web.app import Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
+from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.clock_check import clock_warning
 
 __all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
@@ -71,6 +72,8 @@ class DashboardAddress:
     """Receiver of audit entries about recordings."""
     tls: TlsOptions = PLAIN
     """Certificate of HTTPS, and public names of a web server in front of this one."""
+    sign_in: SignInOptions = field(default_factory=SignInOptions)
+    """Options of the ways to sign in."""
 
 
 def run_dashboard(
@@ -165,6 +168,7 @@ async def _serve(
             trusted=place.trusted,
             recordings=place.recordings,
             certificates=certificates,
+            sign_in=place.sign_in,
         )
         gc.collect()
         gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us

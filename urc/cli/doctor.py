@@ -34,6 +34,7 @@ OPTIONAL = {
     "cbor2": "CBOR images from rosbridge (pip install 'urc[cbor]')",
     "zeroconf": "discovery of announced robots by 'urc discover' (pip install 'urc[mdns]')",
     "mcap": "recordings of sessions (pip install 'urc[record]')",
+    "joserfc": "sign-in with an OpenID Connect provider (pip install 'urc[oidc]')",
     "google-re2": "patterns without provably linear run time; refused without this package",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
 }

@@ -15,6 +15,7 @@ from urc.cli.tls_options import add_tls, tls_of
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
+    from urc.web.people.ways_in import SignInOptions
 
 EXAMPLE = "urc serve puppet --set host=192.168.1.20"
 
@@ -41,6 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--installed",
         action="store_true",
         help="also serve all installed robots and drivers",
+    )
+    parser.add_argument(
+        "--oidc",
+        metavar="FILE",
+        help="file with the OpenID Connect provider whose accounts sign in: see docs/sign-in.md",
+    )
+    parser.add_argument(
+        "--trust-proxy",
+        dest="proxies",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="file with a proxy that signs people in, and names them in a header",
     )
     parser.add_argument(
         "--without-sign-in",
@@ -126,6 +140,7 @@ def run(arguments: argparse.Namespace) -> int:
             tuple(arguments.trust_widget),
             arguments.record,
             tls=tls_of(arguments),
+            sign_in=_sign_in(arguments),
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,
@@ -133,6 +148,20 @@ def run(arguments: argparse.Namespace) -> int:
         is_dev=arguments.dev,
         faults=arguments.faults,
     )
+
+
+def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
+    """Return the ways to sign in that need options.
+
+    Raises:
+        ProblemsError: a file has mistakes.
+    """
+    from urc.access.oidc_options import read_oidc_options
+    from urc.access.proxies import read_proxy_options
+    from urc.web.people.ways_in import SignInOptions
+
+    oidc = read_oidc_options(arguments.oidc) if arguments.oidc else None
+    return SignInOptions(oidc, tuple(read_proxy_options(file) for file in arguments.proxies))
 
 
 def _check(arguments: argparse.Namespace) -> None:

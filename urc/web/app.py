@@ -52,6 +52,8 @@ from urc.web.manage.playback_control import move_playback, playback_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
+from urc.web.people.proxy_middleware import ProxyMiddleware
+from urc.web.people.ways_in import SignInOptions, WaysIn
 from urc.web.serve.access import Access
 from urc.web.serve.actors import stopper_of
 from urc.web.serve.certificates import Certificates
@@ -99,6 +101,7 @@ def build_app(
     trusted: Iterable[str] = (),
     recordings: Path | None = None,
     certificates: Certificates | None = None,
+    sign_in: SignInOptions = SignInOptions(),  # noqa: B008 - immutable
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -118,9 +121,11 @@ def build_app(
         trusted: names of third-party widgets that run in the page instead of a frame.
         recordings: folder of the recordings; None for a server that records nothing.
         certificates: certificates of HTTPS, whose authority devices may trust; None for plain HTTP.
+        sign_in: options of the ways to sign in.
 
     Raises:
-        UrcError: two robots use different widgets of the same name.
+        UrcError: two robots use different widgets of the same name, or a way to sign in needs an
+            extra package.
     """
     access = access or Access()
     if audit is None and data is not None:
@@ -140,6 +145,7 @@ def build_app(
         robot_calls=RobotCalls(lambda: fleet.stations, access.followed),
         audit=audit,
         recorder=recorder,
+        ways_in=WaysIn(access, recorder, sign_in),
         trust=WidgetTrust.of(trusted),
     )
     access.tags_of = routes.tags_of
@@ -204,6 +210,7 @@ class _Dashboard(Starlette):
         trust: TrustPages,
     ) -> None:
         self._access = access = routes.access
+        self._ways_in = routes.ways_in
         self._stoppable = routes.stoppable
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
@@ -227,6 +234,7 @@ class _Dashboard(Starlette):
                 ProtectedRoute(DOCUMENT, document, SIGNED_IN),
                 *api_routes(endpoints),
                 *(route for one in parts for route in one.routes()),
+                *routes.ways_in.routes(),
                 *gallery.routes(),
                 *files.routes(),
                 *trust.routes(),
@@ -245,9 +253,10 @@ class _Dashboard(Starlette):
         """Put the page policy around the whole application, with its error handlers."""
         inner = super().build_middleware_stack()
         door = AccessMiddleware(inner, self._access, self.routes, self._stoppable)
-        return Policy(
+        policy = Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
         )
+        return ProxyMiddleware(policy, self._ways_in.sign_ins, self._ways_in.options.proxies)
 
 
 @dataclass(slots=True)
@@ -259,6 +268,7 @@ class _Routes:
     recorder: ServerRecorder
     recording_calls: RecordingCalls
     robot_calls: RobotCalls
+    ways_in: WaysIn
     audit: AuditLog | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None

@@ -1,0 +1,1 @@
+"""Sign-in over HTTP: the ways in, and what people manage about themselves."""

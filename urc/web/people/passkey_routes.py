@@ -1,0 +1,186 @@
+"""Routes of passkeys: sign-in with one, and adding, naming and removing one's own.
+
+Layer 5. Only people have passkeys. A passkey is added within ten minutes after a sign-in, so a
+passer-by at a shared tablet cannot add one to the operator.
+"""
+
+import asyncio
+from typing import Final
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.access.directory import Principal
+from urc.access.grants import AccessError
+from urc.access.passkey_table import Passkey, PasskeyTable
+from urc.access.passkeys import Passkeys, RelyingParty, relying_party
+from urc.web.people.browser_sign_ins import BrowserSignIns, address_of, answers_refusals
+from urc.web.people.wire import (
+    PasskeyAnswer,
+    PasskeyChoice,
+    PasskeyLine,
+    PasskeyList,
+    PasskeyName,
+    SignedIn,
+)
+from urc.web.serve.actors import actor_of
+from urc.web.serve.policy import parse_host
+from urc.web.serve.replies import ApiError, answer, body_of
+from urc.web.serve.rights import ANYONE, SIGNED_IN, ProtectedRoute
+from urc.web.serve.visitor import visitor_of
+
+__all__ = ["FRESH_S", "PasskeyRoutes"]
+
+FRESH_S: Final = 600.0
+"""Time after a sign-in in which passkeys are added, in seconds."""
+
+
+class PasskeyRoutes:
+    """The routes."""
+
+    def __init__(self, sign_ins: BrowserSignIns) -> None:
+        """Prepare.
+
+        Args:
+            sign_ins: the sign-ins of all browsers.
+        """
+        self._sign_ins = sign_ins
+        store = sign_ins.control.store
+        self._known = Passkeys(PasskeyTable(store)) if store is not None else None
+
+    def routes(self) -> list[ProtectedRoute]:
+        """Return the routes."""
+        own = "/account/passkeys"
+        return [
+            ProtectedRoute(
+                "/sign-in/passkey/options", self.sign_in_options, ANYONE, methods=["POST"]
+            ),
+            ProtectedRoute("/sign-in/passkey", self.sign_in, ANYONE, methods=["POST"]),
+            ProtectedRoute(own, self.listed, SIGNED_IN),
+            ProtectedRoute(f"{own}/options", self.options, SIGNED_IN, methods=["POST"]),
+            ProtectedRoute(f"{own}/add", self.add, SIGNED_IN, methods=["POST"]),
+            ProtectedRoute(f"{own}/rename", self.rename, SIGNED_IN, methods=["POST"]),
+            ProtectedRoute(f"{own}/remove", self.remove, SIGNED_IN, methods=["POST"]),
+        ]
+
+    # Sign-in
+
+    @answers_refusals
+    async def sign_in_options(self, request: Request) -> Response:
+        """Return the options of a sign-in."""
+        self._sign_ins.check_wait(request)
+        found = await asyncio.to_thread(
+            self._passkeys.authentication, _party(request), address_of(request)
+        )
+        return answer(found)
+
+    @answers_refusals
+    async def sign_in(self, request: Request) -> Response:
+        """Sign in the owner of a passkey."""
+        self._sign_ins.check_wait(request)
+        said = await body_of(request, PasskeyAnswer)
+        party = _party(request)
+        now = self._sign_ins.control.now()
+        try:
+            passkey = await asyncio.to_thread(
+                self._passkeys.authenticate, party, said.response, now
+            )
+            person = self._sign_ins.control.directory.principals.get(passkey.principal)
+            if person is None:
+                raise AccessError("the owner of the passkey was removed")
+            done = answer(SignedIn(person.name))
+            await self._sign_ins.open(request, done, person, "passkey")
+        except AccessError as error:
+            self._sign_ins.failed(request, "passkey", error)
+            raise
+        return done
+
+    # One's own passkeys
+
+    @answers_refusals
+    async def listed(self, request: Request) -> Response:
+        """List the passkeys of the person."""
+        passkeys = await asyncio.to_thread(self._passkeys.table.of, _person(request).id)
+        return answer(PasskeyList([_line(each) for each in passkeys]))
+
+    @answers_refusals
+    async def options(self, request: Request) -> Response:
+        """Return the options of a new passkey."""
+        self._check_fresh(request)
+        found = await asyncio.to_thread(
+            self._passkeys.registration, _person(request), _party(request), address_of(request)
+        )
+        return answer(found)
+
+    @answers_refusals
+    async def add(self, request: Request) -> Response:
+        """Add a passkey to the person."""
+        self._check_fresh(request)
+        said = await body_of(request, PasskeyAnswer)
+        passkey = await asyncio.to_thread(
+            self._passkeys.register, _person(request), _party(request), said.response, said.name,
+            self._sign_ins.control.now(),
+        )  # fmt: skip
+        self._record(request, "passkeys add", passkey.name)
+        return answer(_line(passkey))
+
+    @answers_refusals
+    async def rename(self, request: Request) -> Response:
+        """Give a passkey of the person another name."""
+        said = await body_of(request, PasskeyName)
+        table, owner = self._passkeys.table, _person(request).id
+        await asyncio.to_thread(table.rename, owner, said.id, said.name)
+        self._record(request, "passkeys rename", said.name)
+        return await self.listed(request)
+
+    @answers_refusals
+    async def remove(self, request: Request) -> Response:
+        """Remove a passkey of the person."""
+        said = await body_of(request, PasskeyChoice)
+        table, owner = self._passkeys.table, _person(request).id
+        names = {one.id: one.name for one in await asyncio.to_thread(table.of, owner)}
+        await asyncio.to_thread(table.remove, owner, said.id)
+        self._record(request, "passkeys remove", names.get(said.id, ""))
+        return await self.listed(request)
+
+    @property
+    def _passkeys(self) -> Passkeys:
+        if self._known is None:
+            raise ApiError(404, "this server keeps no people, so it has no passkeys")
+        return self._known
+
+    def _check_fresh(self, request: Request) -> None:
+        """Raise `ApiError` if the sign-in of a person is too old for a new passkey."""
+        _person(request)
+        control = self._sign_ins.control
+        sign_in = control.directory.sign_ins[visitor_of(request).identity.sign_in]
+        if control.now() - sign_in.created_at > FRESH_S:
+            minutes = round(FRESH_S / 60)
+            raise ApiError(
+                403, f"sign out and in first: passkeys are added within {minutes} minutes after"
+                " a sign-in",
+            )  # fmt: skip
+
+    def _record(self, request: Request, command: str, name: str) -> None:
+        self._sign_ins.recorder.access_changed(actor_of(request), command, passkey=name)
+
+
+def _person(request: Request) -> Principal:
+    """Return the signed-in person; raise `ApiError` for any other visitor."""
+    visitor = visitor_of(request)
+    who = visitor.identity
+    if who.kind != "person" or visitor.is_local or visitor.is_program:
+        raise ApiError(403, "only people have passkeys: sign in as a person first")
+    return Principal(who.principal, "person", who.name)
+
+
+def _party(request: Request) -> RelyingParty:
+    authority = parse_host(request.headers["host"])
+    if authority is None:
+        raise ApiError(400, "the request names no host")  # the page policy refused it before
+    return relying_party(authority.host, authority.port)
+
+
+def _line(one: Passkey) -> PasskeyLine:
+    used_at = one.used_at if one.used_at > one.created_at else None
+    return PasskeyLine(one.id, one.name, one.host, one.created_at, used_at)

@@ -1,0 +1,176 @@
+"""Requests of trusted proxies: the person in the header becomes the visitor of the request.
+
+Layer 5. This ASGI middleware is the outermost one. It removes the headers of proxies from all
+requests, so no other part of the server can see, or believe, a forged one.
+
+Theory of operation. Each request carries the proof of the proxy. The first request of a
+browser opens a sign-in, whose secret stays in this process. The middleware puts the secret into
+the cookie of the request, so all other rules (rights, origin, revocation) are those of a browser.
+"""
+
+import asyncio
+import logging
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from urc.access.directory import NOBODY, Principal
+from urc.access.external_accounts import admit_named
+from urc.access.grants import AccessError
+from urc.access.proxies import ProxiedRequest, TrustedProxy, without_proxy_headers
+from urc.web.people.browser_sign_ins import BrowserSignIns
+from urc.web.serve.connection_quota import is_stop
+from urc.web.serve.policy import REFUSAL_HEADERS
+
+__all__ = ["MOST_PROXIED", "ProxyMiddleware"]
+
+MOST_PROXIED: Final = 1000
+"""Most browsers behind proxies; the least recently used one gets another sign-in."""
+_LASTS_S: Final = 12 * 3600.0
+_TELL_S: Final = 60.0
+_REFUSED_S: Final = 5.0
+
+log = logging.getLogger(__name__)
+
+
+class _Browser(NamedTuple):
+    user: str
+    proxy: str
+    agent: str
+
+
+class ProxyMiddleware:
+    """The middleware."""
+
+    def __init__(
+        self, app: ASGIApp, sign_ins: BrowserSignIns, proxies: Sequence[TrustedProxy]
+    ) -> None:
+        """Prepare.
+
+        Args:
+            app: the wrapped application, with the page policy.
+            sign_ins: the sign-ins of all browsers.
+            proxies: the trusted proxies.
+        """
+        self._app = app
+        self._sign_ins = sign_ins
+        self._proxies = proxies
+        self._secrets: OrderedDict[_Browser, str] = OrderedDict()
+        self._refused: dict[str, tuple[float, str]] = {}
+        self._lock = asyncio.Lock()
+        self._told_at = float("-inf")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward the request without the headers of proxies, in the name of the person."""
+        if scope["type"] not in ("http", "websocket") or not self._proxies:
+            await self._app(scope, receive, send)
+            return
+        found = without_proxy_headers(scope["headers"], self._proxies)
+        scope = {**scope, "headers": found.headers}
+        if found.fault:
+            self._tell(found.fault)
+        if found.proxy is not None and found.user:
+            try:
+                secret = await self._secret(scope, found, found.proxy)
+            except AccessError as error:
+                # STOP needs no person.
+                if scope["type"] == "http" and not is_stop(scope["method"], scope["path"]):
+                    await _refuse(send, f"The proxy {found.proxy.name} was not believed: {error}")
+                    return
+            else:
+                scope["headers"] = self._as_person(found.headers, secret)
+        await self._app(scope, receive, send)
+
+    def _as_person(
+        self, headers: Sequence[tuple[bytes, bytes]], secret: str
+    ) -> list[tuple[bytes, bytes]]:
+        """Return the headers with the person's sign-in in place of the browser's own ones."""
+        access = self._sign_ins.access
+        names = (access.cookie, access.sign_in_cookie)
+        ours = {each.encode() for name in names for each in (name, f"__Host-{name}")}
+        kept = []
+        for name, value in headers:
+            if name == b"cookie":
+                parts = [part.strip() for part in value.split(b";")]
+                value = b"; ".join(one for one in parts if one.partition(b"=")[0] not in ours)
+            kept.append((name, value))
+        return [*kept, (b"cookie", f"{access.sign_in_cookie}={secret}".encode())]
+
+    async def _secret(self, scope: Scope, found: ProxiedRequest, proxy: TrustedProxy) -> str:
+        user = " ".join(found.user.split())
+        agents = [value for name, value in found.headers if name == b"user-agent"]
+        agent = agents[0].decode("latin-1")[:200] if agents else ""
+        browser = _Browser(user.casefold(), proxy.name, agent)
+        secret = self._known(browser)
+        if secret is not None:
+            return secret
+        at, reason = self._refused.get(browser.user, (float("-inf"), ""))
+        if time.monotonic() - at < _REFUSED_S:
+            raise AccessError(reason)
+        async with self._lock:
+            secret = self._known(browser)
+            if secret is None:
+                try:
+                    secret = await self._opened(scope, user, proxy, agent)
+                except AccessError as error:
+                    if len(self._refused) >= MOST_PROXIED:
+                        self._refused.clear()
+                    self._refused[browser.user] = (time.monotonic(), str(error))
+                    raise
+                self._secrets[browser] = secret
+                while len(self._secrets) > MOST_PROXIED:
+                    self._secrets.popitem(last=False)
+            return secret
+
+    def _known(self, browser: _Browser) -> str | None:
+        """Return the secret of an open sign-in of a person who still has the name."""
+        secret = self._secrets.get(browser)
+        who = self._sign_ins.control.identify(secret) if secret is not None else NOBODY
+        if who == NOBODY or who.name.casefold() != browser.user:
+            self._secrets.pop(browser, None)
+            return None
+        self._secrets.move_to_end(browser)
+        return secret
+
+    async def _opened(self, scope: Scope, user: str, proxy: TrustedProxy, agent: str) -> str:
+        control, now = self._sign_ins.control, self._sign_ins.control.now()
+        store = control.store
+        if store is None:
+            raise AccessError("this server keeps no people")
+        client = scope.get("client") or ("",)
+        place = str(client[0])
+
+        def opened() -> tuple[Principal, str]:
+            person = admit_named(store, user, proxy.new_people, now)
+            _, secret = store.open_sign_in(
+                person.id, "proxy", now=now, ends_at=now + _LASTS_S, place=place, agent=agent
+            )
+            return person, secret
+
+        person, secret = await asyncio.to_thread(opened)
+        await control.reload()
+        self._sign_ins.record(control.identify(secret), place, agent)
+        log.info("the proxy %s signed %s in", proxy.name, person.name)
+        return secret
+
+    def _tell(self, fault: str) -> None:
+        """Log a fault, at most once a minute: clients can cause any number of them."""
+        now = time.monotonic()
+        if now - self._told_at >= _TELL_S:
+            self._told_at = now
+            log.warning("%s: the header was removed", fault)
+
+
+async def _refuse(send: Send, text: str) -> None:
+    body = text.encode() + b"\n"
+    headers = [
+        (b"content-type", b"text/plain; charset=utf-8"),
+        (b"content-length", str(len(body)).encode()),
+        (b"cache-control", b"no-store"),
+        *REFUSAL_HEADERS,
+    ]
+    await send({"type": "http.response.start", "status": 403, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
