@@ -319,6 +319,8 @@ class Server(Program):
         script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
         command = [sys.executable, *script, "serve", *map(str, profiles)]
         command += ["--host", host, "--port", "0", "--data-dir", str(data), *options]
+        if host != "127.0.0.1":
+            command.append("--insecure-plain-http")  # the operators use plain sockets
         self.host = host
         super().__init__(command, inside=inside)
         url = self.wait_for("dashboard", READY_S)[1]

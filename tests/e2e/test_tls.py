@@ -188,7 +188,7 @@ async def test_a_server_for_others_prints_what_they_need(
     others = (await process.wait_for_async(r"^for others (https://\S+)"))[1]
     plain = others.replace("https://", "http://")
     await process.wait_for_async(f"^new devices {re.escape(plain)}trust ")
-    folder = tmp_path / "authority"
+    folder = tmp_path / "tls"
     shown = (await process.wait_for_async(r"^authority ([0-9A-F ]{79})$"))[1]
     authority = CertificateAuthority(folder, ["localhost"], datetime.now(UTC))
     assert shown == authority.fingerprint
@@ -219,8 +219,9 @@ async def test_plain_http_for_others_only_if_asked_for(urc_process: Start, tmp_p
     words = ("--host", "0.0.0.0", "--port", "0", "--data-dir", str(tmp_path))
     process = urc_process("serve", TELLO, "--simulate", *words, "--insecure-plain-http")
     others = (await process.wait_for_async(r"^for others (http://\S+)"))[1]
+    await process.wait_for_async("^urc: 0.0.0.0 uses plain HTTP: everyone on the network can read")
     assert b" 200 OK" in await asked(others, "/healthz", None)
-    assert not (tmp_path / "authority").exists()
+    assert not (tmp_path / "tls").exists()
     page = await asked(others, "/trust", None)
     assert b" 200 OK" in page
     assert b"authority.crt" not in page
@@ -274,7 +275,7 @@ async def test_urc_send_asks_a_server_over_https(urc_process: Start, tmp_path: P
     place = ("--data-dir", str(tmp_path / "data"))
     process = urc_process("serve", str(file), "--port", "0", "--tls", "auto", *place)
     address = (await process.wait_for_async(r"^dashboard (https://127\.0\.0\.1:\d+/)"))[1]
-    trusted = trusting(tmp_path / "data" / "authority")
+    trusted = trusting(tmp_path / "data" / "tls")
     url = address.replace("https://", "wss://") + "ws?robot=cart"
     async with connect(
         url,
@@ -288,7 +289,7 @@ async def test_urc_send_asks_a_server_over_https(urc_process: Start, tmp_path: P
                 break
         done = await asyncio.to_thread(run, "send", str(file), "go", *place)
         assert f"screen 1 drives the robot on {address}" in done.stderr
-        (tmp_path / "data" / "authority" / "authority.pem").write_bytes(
+        (tmp_path / "data" / "tls" / "authority.pem").write_bytes(
             CertificateAuthority(tmp_path / "other", ["localhost"], datetime.now(UTC)).pem
         )
         done = await asyncio.to_thread(run, "send", str(file), "go", *place)

@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 
     from urc.web.serve.certificates import Certificates
 
-__all__ = ["AUTHORITY", "PLAIN", "TlsOptions", "add_tls", "certificates_of", "tls_of"]
-
-AUTHORITY = "authority"
-"""Name of the local authority's folder in the data folder."""
+__all__ = ["PLAIN", "TlsOptions", "add_tls", "certificates_of", "tls_of"]
 
 
 class TlsOptions(NamedTuple):
@@ -113,7 +110,13 @@ async def certificates_of(
         UrcError: a certificate cannot be made or read.
     """
     if options.kind == "plain":
+        if not is_loopback(host):
+            complain(
+                f"urc: {host} uses plain HTTP: everyone on the network can read keys and change"
+                " commands"
+            )
         return None
+    from urc.access.authority import AUTHORITY_FOLDER
     from urc.web.serve.certificates import (
         Certificates,
         CertificateSource,
@@ -121,7 +124,7 @@ async def certificates_of(
         LocalCertificate,
     )
 
-    source: CertificateSource = LocalCertificate(data / AUTHORITY, host, allowed_hosts)
+    source: CertificateSource = LocalCertificate(data / AUTHORITY_FOLDER, host, allowed_hosts)
     if options.kind == "given":
         source = GivenCertificate(options.chain, options.key)
     certificates = await Certificates.of(source)
