@@ -9,6 +9,7 @@ consecutive numbers must also fit together.
 
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -22,6 +23,10 @@ __all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "e
 
 _AT_ONCE: Final = 500
 """Number of entries of one read transaction: a slow download must not hold back the writer."""
+_SLICE: Final = 25
+_PAUSE_S: Final = 0.001
+"""Pause after every `_SLICE` entries, in seconds, so that an export does not delay motion, which
+another thread of the same interpreter handles."""
 LONGEST_LINE: Final = 100_000
 """Maximum length of a line of an export, in characters."""
 
@@ -83,7 +88,9 @@ def exported(file: Path, robots: frozenset[str] | None = None) -> Iterator[str]:
             if base is None:
                 return
             found = base.execute(select(base) + where + order, (*values, after, _AT_ONCE))
-            for row in map(row_of, found.fetchall()):
+            for number, row in enumerate(map(row_of, found.fetchall())):
+                if number % _SLICE == 0:
+                    time.sleep(_PAUSE_S)
                 known = base.execute(before, (row.id - 1,)).fetchone()
                 chain = known[0] if known else _before_first(base, row.id)
                 lines.append(line_of(row, chain))

@@ -3,6 +3,8 @@
 import hashlib
 import json
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -270,3 +272,51 @@ def test_export_of_what_the_log_deleted_by_itself_stays_good(file: Path) -> None
     write(file, *(entry(n) for n in range(3000)), retention=Retention(most_bytes=40_000))
     assert compare(file, found) == ""
     assert check_export(lines_of(file)).fault == ""
+
+
+# One byte, and several processes
+
+
+@pytest.mark.parametrize("column", [*AuditEntry._fields, "chain"])
+def test_change_of_any_column_shows(file: Path, column: str) -> None:
+    write(file, *(entry(number) for number in range(5)))
+    kind = AuditEntry.__annotations__.get(column, str)
+    value = {float: "7.5", int: "9"}.get(kind, "'Eve'")
+    change(file, f"UPDATE entries SET {column} = {value} WHERE id = 3")  # noqa: S608
+    assert "entry" in check(file)
+
+
+def test_swapped_rows_show(file: Path) -> None:
+    write(file, *(entry(number) for number in range(5)))
+    for step in ("id = -1 WHERE id = 2", "id = 2 WHERE id = 3", "id = 3 WHERE id = -1"):
+        change(file, f"UPDATE entries SET {step}")  # noqa: S608
+    assert "entry 2" in check(file)
+
+
+_WRITER = """
+import sys
+from pathlib import Path
+from urc.runtime.audit import AuditLog
+from urc.runtime.audit_entry import AuditEntry
+with AuditLog(Path(sys.argv[1])) as log:
+    print("ready", flush=True)
+    for number in range(300):
+        log.add(AuditEntry(1000.0 + number, "", "access", sys.argv[2]))
+        if number % 10 == 0:
+            assert log.settle(30)
+    assert log.settle(30)
+"""
+
+
+def test_several_processes_write_one_chain(file: Path) -> None:
+    """As a server does with the commands that manage people."""
+    commands = [[sys.executable, "-c", _WRITER, str(file), name] for name in ("Ann", "Ben", "Cid")]
+    running = [subprocess.Popen(command, stdout=subprocess.PIPE) for command in commands]
+    for one in running:
+        _, _ = one.communicate(timeout=60)
+        assert one.returncode == 0
+    found = entries_of(file)
+    whos = [each.who for each in found if each.what == "access"]
+    assert [whos.count(name) for name in ("Ann", "Ben", "Cid")] == [300] * 3
+    assert whos != sorted(whos), "they took turns"
+    assert check(file) == ""
