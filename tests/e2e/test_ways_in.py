@@ -36,10 +36,10 @@ def browser(whole_browser: Browser) -> Browser:
     return whole_browser
 
 
-def start(urc_process: Start, data: Path, *more: str) -> str:
+def start(urc_process: Start, data: Path, *more: str, port: int = 0) -> str:
     """Start the dashboard; give its address by name, because passkeys need one."""
     process = urc_process(
-        "serve", TELLO, "--simulate", "--port", "0", "--data-dir", str(data), *more
+        "serve", TELLO, "--simulate", "--port", str(port), "--data-dir", str(data), *more
     )
     address = process.wait_for(r"^dashboard (http://\S+)")[1]
     return str(address).replace("127.0.0.1", "localhost")
@@ -140,23 +140,21 @@ async def test_an_address_of_numbers_says_why_it_has_no_passkeys(
 
 @contextmanager
 def provider(*users: dict[str, object]) -> Iterator[str]:
-    """Run an OpenID Connect provider that others wrote; give its address."""
+    """Run an OpenID Connect provider that others wrote; give its address.
+
+    It knows registered servers only, and insists on their secrets and redirect addresses.
+    """
     port = free_port()
     given = [word for user in users for word in ("--user-claims", json.dumps(user))]
     process = subprocess.Popen(
         [
-            sys.executable,
-            "-m",
-            "oidc_provider_mock",
-            "--port",
-            str(port),
-            "--require-nonce",
-            *given,
+            sys.executable, "-m", "oidc_provider_mock", "--port", str(port), "--require-nonce",
+            "--require-registration", *given,
         ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env=os.environ | {"PYTHONWARNINGS": "ignore"},
-    )
+    )  # fmt: skip
     address = f"http://127.0.0.1:{port}"
     try:
         end = time.monotonic() + TIMEOUT_S
@@ -168,6 +166,16 @@ def provider(*users: dict[str, object]) -> Iterator[str]:
     finally:
         process.terminate()
         process.wait(TIMEOUT_S)
+
+
+def registered(issuer: str, redirect: str) -> tuple[str, str]:
+    """Register a server with a redirect address; give its id and its secret."""
+    body = json.dumps({"redirect_uris": [redirect]}).encode()
+    headers = {"content-type": "application/json"}
+    request = Request(f"{issuer}/oauth2/clients", body, headers)  # noqa: S310 (this machine)
+    with urlopen(request, timeout=TIMEOUT_S) as answer:  # noqa: S310
+        made = json.load(answer)
+    return made["client_id"], made["client_secret"]
 
 
 def asked(url: str, method: str = "GET", **headers: str) -> tuple[int, str]:
@@ -196,15 +204,16 @@ async def test_an_account_of_a_provider_signs_in(
     """In a group it drives; out of the group it is refused, and loses what it had."""
     ann = {"sub": "17", "preferred_username": "ann", "groups": ["drivers"]}
     eve = {"sub": "18", "preferred_username": "eve", "groups": ["guests"]}
-    private(tmp_path / "secret", "any secret")
-    data = tmp_path / "data"
+    data, port = tmp_path / "data", free_port()
     with provider(ann, eve) as issuer:
+        ours, secret = registered(issuer, f"http://localhost:{port}/sign-in/oidc/callback")
+        private(tmp_path / "secret", secret)
         options = tmp_path / "oidc.yaml"
         options.write_text(
-            f"issuer: {issuer}\nclient_id: urc\nclient_secret_file: secret\ntitle: Lab\n"
+            f"issuer: {issuer}\nclient_id: {ours}\nclient_secret_file: secret\ntitle: Lab\n"
             "grants: [{claim: groups, value: drivers, grant: drive}]\n"
         )
-        address = start(urc_process, data, "--oidc", str(options))
+        address = start(urc_process, data, "--oidc", str(options), port=port)
         page = await new_page()
         # Pages of the provider ask for a style sheet from the internet, and have no icon.
         new_page.allow(
@@ -222,6 +231,8 @@ async def test_an_account_of_a_provider_signs_in(
         assert "state=" in (await back.value).url
         await page.wait_for_url(address)
         await expect(page.get_by_role("link", name="Tello").first).to_be_visible()
+        # The code has been used: the way back leads in once.
+        assert asked((await back.value).url)[0] == 403
         with closing(AccessStore(data)) as store:
             directory = store.directory()
             (person,) = directory.principals.values()

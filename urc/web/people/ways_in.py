@@ -42,6 +42,8 @@ class WaysIn:
             AccessError: an extra package is missing.
         """
         self.options = options
+        recorder.hide(one.secret.decode() for one in options.proxies)
+        recorder.hide([options.oidc.client_secret] if options.oidc else [])
         self.sign_ins = BrowserSignIns(access, recorder)
         """The end of every way to sign in."""
         provider = OidcSignIn(options.oidc) if options.oidc else None
