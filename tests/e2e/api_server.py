@@ -101,17 +101,31 @@ class ApiServer:
         self.address = address
         self.store = store
 
-    def token(self, *grants: str, commands: tuple[str, ...] = ()) -> tuple[str, str]:
-        """Return the id and the token of a new program."""
+    def token(
+        self, *grants: str, commands: tuple[str, ...] = (), is_known: bool = True
+    ) -> tuple[str, str]:
+        """Return the id and the token of a new program; wait until the server knows it.
+
+        A program without a role is never known: `is_known` is false.
+        """
         now = time.time()
         allowed = [parse_grant(one) for one in grants]
         name = secrets.token_hex(4)
         added = self.store.add("program", name, allowed, now=now, commands=commands)
         _, secret = self.store.open_sign_in(added.id, "token", now=now)
         until = time.monotonic() + _KNOWN_S
-        while self._status(secret) == 401:  # the server looks at the file ten times a second
+        while (
+            is_known and self._status(secret) == 401
+        ):  # the server looks at the file ten times a second
             assert time.monotonic() < until, "the server does not know the token"
         return added.id, secret
+
+    def remove(self, program: str, token: str) -> None:
+        """Remove a program; wait until the server refuses its token."""
+        self.store.remove(program)
+        until = time.monotonic() + _KNOWN_S
+        while self._status(token) != 401:
+            assert time.monotonic() < until, "the server still accepts the token"
 
     def _status(self, token: str) -> int:
         headers = {"authorization": f"Bearer {token}"}

@@ -1,17 +1,35 @@
-"""The whole HTTP API under a fuzzer: no server error, and only documented answers."""
+"""The whole HTTP API under a fuzzer: no server error, and no answer beyond the right.
+
+``URC_THOROUGH=1`` tries many more requests.
+"""
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 import pytest
 
-from tests.e2e.api_fuzzer import fuzzed, operations
+from tests.e2e.api_fuzzer import FuzzVisitor, fuzzed, operations
 from tests.e2e.api_server import ApiServer, started
 from tests.e2e.processes import UrcProcess
-from tests.effort import examples
+from tests.effort import IS_THOROUGH, examples
 
-OPERATIONS = dict(operations())
+OPERATIONS: Final[dict[str, Any]] = dict(operations())
+EACH: Final = 60 if IS_THOROUGH else 3
+"""Requests of each kind and call from one visitor."""
+VISITORS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
+    "nobody": ((), ()),
+    "a removed token": (("administer",), ()),
+    "a token without a role": ((), ()),
+    "watch": (("watch",), ()),
+    "watch at one robot": (("watch@cart",), ()),
+    "drive": (("drive",), ()),
+    "drive at a tag": (("drive@#lab",), ()),
+    "drive with one command": (("drive",), ("echo",)),
+    "maintain": (("maintain",), ()),
+    "maintain at one robot": (("maintain@other", "watch@cart"), ()),
+}
+"""Grants and commands of each visitor."""
 
 
 @pytest.fixture(scope="module")
@@ -32,19 +50,44 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ApiServer]:
 
 
 @pytest.fixture(scope="module")
-def token(server: ApiServer) -> str:
-    return server.token("administer")[1]
+def administrator(server: ApiServer) -> FuzzVisitor:
+    _, token = server.token("administer")
+    return FuzzVisitor({"authorization": f"Bearer {token}"}, ("administer",))
+
+
+def is_sound(server: ApiServer) -> bool:
+    """Return whether the server runs, and has printed no fault."""
+    return server.process.is_running and not any(
+        "Traceback" in line or "ERROR" in line for line in server.process.errors
+    )
 
 
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_no_request_of_an_administrator_breaks_the_server(
-    name: str, server: ApiServer, token: str
+    name: str, server: ApiServer, administrator: FuzzVisitor
 ) -> None:
     """Requests that fit the document, and others."""
-    statuses: Counter[int] = Counter()
-    operation: Any = OPERATIONS[name]
-    headers = {"authorization": f"Bearer {token}"}
-    statuses += fuzzed(name, operation, server.address.rstrip("/"), headers, examples(120))
+    address = server.address.rstrip("/")
+    statuses = fuzzed(name, OPERATIONS[name], address, administrator, examples(120))
     assert sum(statuses.values()) >= 1
-    assert server.process.is_running
-    assert not [line for line in server.process.errors if "Traceback" in line]
+    assert is_sound(server)
+
+
+@pytest.mark.parametrize("who", VISITORS)
+def test_no_visitor_gets_an_answer_beyond_its_right(who: str, server: ApiServer) -> None:
+    """Every call, by every kind of visitor."""
+    grants, commands = VISITORS[who]
+    headers = {}
+    if who != "nobody":
+        program, token = server.token(*grants, commands=commands, is_known=bool(grants))
+        headers = {"authorization": f"Bearer {token}"}
+        if who == "a removed token":
+            server.remove(program, token)
+            grants = ()
+    visitor = FuzzVisitor(headers, grants, commands)
+    statuses: Counter[int] = Counter()
+    for name, operation in OPERATIONS.items():
+        statuses += fuzzed(name, operation, server.address.rstrip("/"), visitor, EACH)
+    assert sum(statuses.values()) > len(OPERATIONS)
+    assert statuses[401] + statuses[403] > 0
+    assert is_sound(server)

@@ -36,7 +36,7 @@ class Reader:
         self._left = asyncio.Event()
         self.task: asyncio.Task[None] | None = None
 
-    async def open(self, *signals: str) -> None:
+    async def open(self, *signals: str, method: str = "GET") -> None:
         with self.service.visit():
             live = await self.service.live()
             stream = EventStream(
@@ -48,7 +48,7 @@ class Reader:
                 visit=self.service.visit(),
             )
             state = {"abort": self.abort}
-            scope = {"type": "http", "state": state}
+            scope = {"type": "http", "method": method, "state": state}
             self.task = asyncio.create_task(stream(scope, self.receive, self.send))
             await settle()
 
@@ -221,6 +221,15 @@ async def test_a_stream_ends_with_the_session_of_the_robot() -> None:
         await it.clock.advance(1.0)
         assert it.events[-1] == ("end", {"reason": "the session of the robot has ended"})
         assert it.is_over
+
+
+async def test_a_look_at_the_headers_ends_at_once() -> None:
+    """A response to HEAD has no body, so nothing would ever end it."""
+    async with reader() as it:
+        await it.open(method="HEAD")
+        assert it.task is not None
+        assert it.task.done()
+        assert (it.is_over, it.chunks) == (True, [b""])
 
 
 async def test_a_reader_that_leaves_frees_the_robot() -> None:

@@ -81,6 +81,9 @@ class EventStream:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send events until the end of the stream."""
         await send({"type": "http.response.start", "status": 200, "headers": _HEADERS})
+        if scope["method"] == "HEAD":  # such a response ends with its headers
+            await send({"type": "http.response.body", "body": b""})
+            return
         with self._visit, self._followed(self._recheck):
             self._recheck()
             writing = asyncio.ensure_future(self._write(send))

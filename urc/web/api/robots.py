@@ -6,7 +6,7 @@ Layer 5. The routes decode and answer; `sessions` drives, `command_runner` runs 
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from time import time
 from typing import Final, TypeVar
 
@@ -18,7 +18,6 @@ from starlette.types import ASGIApp
 from urc.images import media_type
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
-from urc.runtime.hub import Hub
 from urc.runtime.one_shot_commands import HELD, OUT_OF_SCOPE, role_refusal
 from urc.web.api.describe import robot_info, summary
 from urc.web.api.documents import document_of
@@ -38,7 +37,7 @@ from urc.web.api.wire import (
 )
 from urc.web.drive.command_runner import CommandOutcome
 from urc.web.feed.client_socket import SocketPeer
-from urc.web.fleet.robots import RobotService
+from urc.web.fleet.robots import LiveSession, RobotService
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors, body_of
 from urc.web.serve.rights import WATCH
 from urc.web.serve.visitor import peer_of, visitor_of
@@ -135,7 +134,7 @@ class RobotCalls:
         with ExitStack() as stack:
             live = await opened(service, self._peer(request, name), stack)
             hub = live.session.hub
-            await _first(service, hub, lambda: any(hub.latest(one) for one in hub.signals))
+            await _first(service, live, lambda: any(hub.latest(one) for one in hub.signals))
             values = values_of(hub, names, service.clock.now())
         return answer(SignalValues(time(), values))
 
@@ -150,7 +149,7 @@ class RobotCalls:
         with ExitStack() as stack:
             live = await opened(service, self._peer(request, name), stack)
             hub = live.session.hub
-            await _first(service, hub, lambda: hub.latest(wanted) is not None)
+            await _first(service, live, lambda: hub.latest(wanted) is not None)
             sample, now_s = hub.latest(wanted), service.clock.now()
         if signal.type not in ("image", "blob"):
             return answer(value_of(signal, sample, now_s))
@@ -281,18 +280,17 @@ class RobotCalls:
         return self.sessions.find(secret, service, visitor_of(request).identity)
 
 
-async def _first(service: RobotService, hub: Hub, is_there: Callable[[], bool]) -> None:
-    """Wait for a first value after a robot was connected, for `FIRST_VALUE_S` at most."""
-    if is_there():
+async def _first(service: RobotService, live: LiveSession, is_there: Callable[[], bool]) -> None:
+    """Wait for a first value until `FIRST_VALUE_S` after the robot was connected."""
+    hub = live.session.hub
+    left_s = live.began_s + FIRST_VALUE_S - service.clock.now()
+    if is_there() or left_s <= 0:
         return
-    try:
-        with hub.subscribe() as subscription:
-            async with within(service.clock, FIRST_VALUE_S):
-                while not is_there():
-                    subscription.seen = hub.revision
-                    await subscription.changed()
-    except TimeoutError:
-        pass
+    with suppress(TimeoutError), hub.subscribe() as subscription:
+        async with within(service.clock, left_s):
+            while not is_there():
+                subscription.seen = hub.revision
+                await subscription.changed()
 
 
 def _names(request: Request, service: RobotService) -> tuple[str, ...]:

@@ -156,6 +156,8 @@ class LiveSession:
     """Number of the session, unique even across restarts of the server."""
     ended: asyncio.Event
     """Event that is set when the session has ended for any reason."""
+    began_s: float
+    """Time of its opening on the clock of the service, in seconds."""
 
 
 class SessionFailed(UrcError):
@@ -370,7 +372,7 @@ class RobotService:
     async def _serve(self, session: SessionLike) -> None:
         each = each_counts(self.robot.profile)
         fanout = Fanout(session.hub, clock=self.clock, each=each)
-        live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event())
+        live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event(), self.clock.now())
         self._coming().set_result(live)
         self.controls.recorder.attend(session.hub, self.clock.now)
         try:
