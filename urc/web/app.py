@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import quote
@@ -55,7 +56,7 @@ from urc.web.page_socket import BrowserClient
 from urc.web.people.proxy_middleware import ProxyMiddleware
 from urc.web.people.ways_in import SignInOptions, WaysIn
 from urc.web.serve.access import Access
-from urc.web.serve.actors import stopper_of
+from urc.web.serve.actors import record_admission, stopper_of
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
 from urc.web.serve.replies import API, Endpoint, told
@@ -149,6 +150,7 @@ def build_app(
         trust=WidgetTrust.of(trusted),
     )
     access.tags_of = routes.tags_of
+    access.on_admit = partial(record_admission, recorder)
 
     def renew(name: str, robot: Robot) -> None:
         routes.renew(name, robot, _latch(data, robot))

@@ -109,6 +109,22 @@ def test_no_secret_of_a_sign_in_reaches_the_log(tmp_path: Path, ann: dict[str, s
             assert form not in text, secret
 
 
+def test_start_key_signs_in_with_a_name_and_wrong_keys_are_counted(tmp_path: Path) -> None:
+    with served(tmp_path, cookies={}) as client:
+        assert client.get(f"/?key={KEY}").status_code == 200
+        for _ in range(30):
+            client.get("/?key=a-key-of-an-earlier-start")
+    found = entries_of(tmp_path)
+    (one,) = [each for each in found if each.what == "signed in"]
+    assert (one.who, one.way, one.role, one.place) == (
+        "this computer", "key", "administer", "testclient",
+    )  # fmt: skip
+    failed = [each for each in found if each.what == "sign-in failed"]
+    assert sum(each.times for each in failed) == 30
+    assert len(failed) <= 4
+    assert "a-key-of" not in str(found)
+
+
 def test_programs_are_named_by_their_way(tmp_path: Path) -> None:
     with served(tmp_path, cookies={}) as client:
         assert client.get("/api/v1/audit/export", headers=BEARER).status_code == 200

@@ -68,6 +68,9 @@ class Access:
         sends no cookies."""
         self.tags_of: Callable[[str], Collection[str]] = _untagged
         """Function that returns the tags of a robot."""
+        self.on_admit: Callable[[Identity, str, str], None] = _unrecorded
+        """Callback for each use of a start key or code: the new identity, or `NOBODY` for a wrong
+        key; the network address; the browser."""
         self._dependents: set[Callable[[], None]] = set()
         self.control.on_change.append(self.recheck)
 
@@ -117,7 +120,9 @@ class Access:
 
     def admit(self, word: str, *, place: str = "", agent: str = "") -> str | None:
         """Return the secret of a new sign-in of the local user for the start key or a code."""
-        return self.control.admit(word, place=place, agent=agent)
+        secret = self.control.admit(word, place=place, agent=agent)
+        self.on_admit(self.control.identify(secret) if secret else NOBODY, place, agent)
+        return secret
 
     def cookies(
         self, secret: str, headers: _Headers, *, is_secure: bool, is_kept: bool = False
@@ -206,6 +211,10 @@ def _deleted(names: Iterable[str]) -> list[str]:
         f"{name}=; Max-Age=0; {_attributes(is_secure=name.startswith(SECURE))}"
         for name in sorted(names)
     ]
+
+
+def _unrecorded(who: Identity, place: str, agent: str) -> None:
+    """Ignore the use of a start key, because this server has no audit log."""
 
 
 def _untagged(_: str) -> Collection[str]:

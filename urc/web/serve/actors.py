@@ -5,11 +5,12 @@ Layer 5. Pure.
 
 from starlette.requests import HTTPConnection
 
+from urc.access.directory import NOBODY, Identity
 from urc.motion.lease import Operator
-from urc.runtime.server_recorder import Actor
+from urc.runtime.server_recorder import Actor, ServerRecorder
 from urc.web.serve.visitor import is_loopback, peer_of, visitor_of
 
-__all__ = ["actor_of", "stopper_of"]
+__all__ = ["actor_of", "record_admission", "stopper_of"]
 
 
 def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
@@ -48,3 +49,19 @@ def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
         place="" if is_near else host,
         kind=who.kind,
     )
+
+
+def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent: str) -> None:
+    """Record the use of a start key or of a code in its place.
+
+    Args:
+        recorder: writer of the audit entries.
+        who: the new identity; `NOBODY` for a wrong key.
+        place: network address.
+        agent: browser and system in words.
+    """
+    if who == NOBODY:
+        recorder.sign_in_failed("key", place, "the start key is wrong, or of an earlier start")
+    else:
+        actor = Actor(who.name, who.principal, who.kind, "administer", "key", place, who.sign_in)
+        recorder.signed_in(actor, agent)
