@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from urc.access.grants import AccessError
 from urc.access.store import AccessStore, parse_name
 
-__all__ = ["MOST_PASSKEYS", "Passkey", "PasskeyTable"]
+__all__ = ["MOST_PASSKEYS", "Passkey", "PasskeyTable", "check_number"]
 
 MOST_PASSKEYS: Final = 20
 """Most passkeys of one person."""
@@ -36,6 +36,12 @@ class Passkey(NamedTuple):
     """UTC time of the last sign-in; `created_at` before the first."""
 
 
+def check_number(count: int) -> None:
+    """Raise `AccessError` if a person with `count` passkeys may have no further one."""
+    if count >= MOST_PASSKEYS:
+        raise AccessError(f"you have {count} passkeys; remove one first")
+
+
 class PasskeyTable:
     """The passkeys in the file."""
 
@@ -60,8 +66,7 @@ class PasskeyTable:
             (count,) = base.execute(
                 "SELECT count(*) FROM passkeys WHERE principal = ?", (passkey.principal,)
             ).fetchone()
-            if count >= MOST_PASSKEYS:
-                raise AccessError(f"you have {count} passkeys; remove one first")
+            check_number(count)
             added = base.execute(
                 "INSERT INTO passkeys VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
                 passkey,

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from urc.access.directory import Principal
 from urc.access.grants import AccessError
-from urc.access.passkey_table import Passkey, PasskeyTable
+from urc.access.passkey_table import Passkey, PasskeyTable, check_number
 from urc.access.pending import Pending
 
 if TYPE_CHECKING:
@@ -102,6 +102,9 @@ class Passkeys:
             owner: the signed-in person.
             party: this server.
             place: network address of the request.
+
+        Raises:
+            AccessError: the person has too many passkeys.
         """
         from webauthn import generate_registration_options
         from webauthn.helpers.structs import (
@@ -111,7 +114,9 @@ class Passkeys:
             UserVerificationRequirement,
         )
 
-        known = [each for each in self.table.of(owner.id) if each.host == party.host]
+        passkeys = self.table.of(owner.id)
+        check_number(len(passkeys))  # before the authenticator makes one
+        known = [each for each in passkeys if each.host == party.host]
         options = generate_registration_options(
             rp_id=party.host,
             rp_name=_NAME,

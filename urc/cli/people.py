@@ -24,6 +24,7 @@ from urc.cli.identities import (
     words_of,
 )
 from urc.cli.output import complain
+from urc.cli.passkeys import list_passkeys, remove_passkey
 from urc.problems import UrcError, printable
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(
         parser,
         _ACTIONS,
-        "list; add, grant, revoke, remove, passphrase or invite NAME; rename NAME NEW",
+        "list; add, grant, revoke, remove, passphrase, invite or passkeys NAME; rename NAME NEW;"
+        " remove-passkey NAME PASSKEY",
     )
     add_roles(
         parser,
@@ -217,4 +219,6 @@ _ACTIONS = {
     "remove": _remove,
     "passphrase": _passphrase,
     "invite": _invite,
+    "passkeys": list_passkeys,
+    "remove-passkey": remove_passkey,
 }

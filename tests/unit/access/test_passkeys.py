@@ -259,8 +259,11 @@ def test_only_people_have_passkeys_and_not_too_many(house: House) -> None:
             house.register(owner)
     for each in range(MOST_PASSKEYS):
         house.register(name=f"key {each}")
+    kept = house.table.of(house.ann.id)
     with pytest.raises(AccessError, match=f"you have {MOST_PASSKEYS} passkeys"):
-        house.register()
+        house.passkeys.registration(house.ann, PARTY, PLACE)
+    with pytest.raises(AccessError, match=f"you have {MOST_PASSKEYS} passkeys"):
+        house.table.add(kept[0]._replace(id="another"))
 
 
 def test_a_passkey_is_registered_once(house: House) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from urc.access.authority import AUTHORITY_FOLDER, CertificateAuthority
 from urc.access.directory import NOBODY
+from urc.access.passkey_table import Passkey, PasskeyTable
 from urc.access.passphrases import matches
 from urc.access.store import AccessStore
 from urc.cli.identities import ends_at, minutes_of
@@ -376,3 +377,28 @@ def test_durations_are_for_people() -> None:
     assert [minutes_of(one) for one in lengths] == [
         "30 seconds", "1 minute", "2 minutes", "90 minutes", "1 hour", "1 day", "2 days",
     ]  # fmt: skip
+
+
+def test_passkeys_are_listed_and_removed(urc: Run, store: AccessStore) -> None:
+    ann = store.add("person", "Ann", now=1.0)
+    table = PasskeyTable(store)
+    for name, used_at in (("old phone", 1.0), ("tablet", 5.0)):
+        passkey = f"{name[0]}-id-of-the-passkey"
+        table.add(Passkey(passkey, ann.id, name, "cart.lab", b"key", 0, 1.0, used_at))
+    for way in ("passkey", "passphrase"):
+        store.open_sign_in(ann.id, way, now=time.time())  # type: ignore[arg-type]
+    said = urc("people", "passkeys", "ann", "--format", "json")
+    rows = [json.loads(line) for line in said.output.splitlines()]
+    assert [(row["name"], row["host"], row["last_use"]) for row in rows] == [
+        ("old phone", "cart.lab", None),
+        ("tablet", "cart.lab", "1970-01-01T00:00:05Z"),
+    ]
+    assert "o-id-of-" in urc("people", "passkeys", "Ann").output
+    missing = urc("people", "remove-passkey", "Ann", "watch")
+    assert (missing.code, "Ann has no passkey 'watch'" in missing.errors) == (1, True)
+    removed = urc("people", "remove-passkey", "Ann", "Old Phone")
+    assert removed.output == "removed the passkey old phone of Ann; 1 sign-ins ended\n"
+    assert [one.name for one in table.of(ann.id)] == ["tablet"]
+    assert [one.way for one in store.directory().sign_ins.values()] == ["passphrase"]
+    assert urc("people", "remove-passkey", "Ann", "t-id").code == 0
+    assert "Ann has no passkeys" in urc("people", "passkeys", "Ann").errors
