@@ -2,7 +2,8 @@
 
 Layer 4. Pure, and slow on purpose: a hash takes about 50 ms and 64 MiB. Servers therefore make one
 hash at a time, in a thread. RFC 9106 (argon2id, the second recommended choice of
-parameters); NIST SP 800-63B-4 for the rules: length counts, no composition rules.
+parameters); NIST SP 800-63B-4 for the rules: length counts, common passwords are refused, and no
+composition rules.
 """
 
 import unicodedata
@@ -19,6 +20,11 @@ SHORTEST: Final = 8
 LONGEST: Final = 256
 """Most characters; the hash of a longer text would cost an attacker nothing and the server time."""
 _FEWEST_DIFFERENT: Final = 4
+_JUDGED: Final = 16
+"""Characters that the estimate of guesses reads; 16 take at most 0.1 s."""
+_FEWEST_POINTS: Final = 2
+"""Fewest points of the estimate; 2 of 4 means more than a million guesses."""
+_OWN_WORDS: Final = ("urc", "robot", "robots", "controller")
 _HASHER: Final = argon2.PasswordHasher()
 _NEVER: Final = _HASHER.hash("no passphrase has this hash")
 """Compared for unknown names, so that the time of the answer does not tell which names exist."""
@@ -28,7 +34,8 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
     """Return the hash of a new passphrase, with its salt and parameters.
 
     Raises:
-        AccessError: the passphrase is too short, too long, too uniform, or is the name.
+        AccessError: the passphrase is too short, too long or too uniform, is the name, or is easy
+            to guess, such as a common password.
     """
     passphrase = _normal(passphrase)
     length = len(passphrase)
@@ -42,6 +49,8 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
         raise AccessError(f"the passphrase needs {_FEWEST_DIFFERENT} different characters")
     if name and passphrase.casefold() == name.casefold():
         raise AccessError("the passphrase is the name; choose several words")
+    if _is_common(passphrase, name):
+        raise AccessError("the passphrase is easy to guess; choose several words")
     return _HASHER.hash(passphrase)
 
 
@@ -68,6 +77,18 @@ def matches(passphrase: str, kept: str | None) -> bool:
 def is_stale(kept: str) -> bool:
     """Return whether the hash has older parameters and should be replaced at the next sign-in."""
     return _HASHER.check_needs_rehash(kept)
+
+
+def _is_common(passphrase: str, name: str) -> bool:
+    """Return whether a million guesses of a program find the passphrase.
+
+    Only its beginning counts, because the estimate of a long text can take seconds.
+    """
+    from zxcvbn import zxcvbn  # a megabyte of word lists, loaded only for new passphrases
+
+    known = [*_OWN_WORDS, *name.split()]
+    score: int = zxcvbn(passphrase[:_JUDGED], user_inputs=known)["score"]
+    return score < _FEWEST_POINTS
 
 
 def _normal(passphrase: str) -> str:

@@ -1,5 +1,7 @@
 """Passphrases: rules and hashes."""
 
+import time
+
 import pytest
 
 from urc.access.grants import AccessError
@@ -27,6 +29,12 @@ def test_a_passphrase_matches_its_hash_alone() -> None:
         ("x1" * 129, "the passphrase has 258 characters; at most 256 are allowed"),
         ("aaabbbaaabbb", "the passphrase needs 4 different characters"),
         ("Margarethe", "the passphrase is the name; choose several words"),
+        ("Margarethe1", "the passphrase is easy to guess; choose several words"),
+        ("password1", "the passphrase is easy to guess; choose several words"),
+        ("P@ssw0rd!", "the passphrase is easy to guess; choose several words"),
+        ("robot123", "the passphrase is easy to guess; choose several words"),
+        ("qwertzuiop", "the passphrase is easy to guess; choose several words"),
+        ("password" * 8, "the passphrase is easy to guess; choose several words"),
     ],
 )
 def test_a_weak_passphrase_is_refused(text: str, message: str) -> None:
@@ -55,3 +63,10 @@ def test_broken_text_is_refused_without_an_exception() -> None:
     with pytest.raises(AccessError, match="cannot be shown"):
         hash_of("long enough \udcff")
     assert not matches("long enough \udcff", hash_of("long enough"))
+
+
+def test_a_hostile_text_is_judged_in_a_short_time() -> None:
+    """The estimate of 72 such characters takes eight seconds."""
+    began = time.process_time()
+    hash_of("4@8({[</369&#!1i|0$5+7%2/" * 10, name="4@8 " * 16)
+    assert time.process_time() - began < 2
