@@ -10,7 +10,9 @@ people type passphrases into the wrong field.
 
 import json
 import logging
+import os
 import re
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -286,8 +288,16 @@ class ServerRecorder:
 
 def terminal_actor() -> Actor:
     """Return the user of this process, who administers by the right to the data folder."""
+    return Actor(f"{_user()} on this computer", "local", "person", "administer", "terminal")
+
+
+def _user() -> str:
+    """Return the name of the process's user, from the system instead of the environment."""
     try:
-        user = getuser()
+        if sys.platform == "win32":
+            return getuser()
+        import pwd
+
+        return pwd.getpwuid(os.getuid()).pw_name
     except (OSError, KeyError, ImportError):
-        user = "unknown user"
-    return Actor(f"{user} on this computer", "local", "person", "administer", "terminal")
+        return f"user {os.getuid()}" if hasattr(os, "getuid") else "unknown user"

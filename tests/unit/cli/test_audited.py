@@ -14,7 +14,7 @@ from urc.runtime.audit_search import AuditQuery, search
 
 @pytest.fixture(autouse=True)
 def ann(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("urc.runtime.server_recorder.getuser", lambda: "ann")
+    monkeypatch.setattr("urc.runtime.server_recorder._user", lambda: "ann")
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """What happens around the robots has a name in the audit, and no secret."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -159,15 +160,21 @@ def test_mistake_in_here_reaches_nobody_and_is_told_once(
     assert told == ["an event is missing in the audit log"]
 
 
-def test_user_of_a_terminal_has_a_name_without_any_environment(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def unknown() -> str:
+@pytest.mark.skipif(os.name != "posix", reason="POSIX users")
+def test_user_of_a_terminal_has_the_name_of_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not the name of a variable, which every user can set."""
+    import pwd
+
+    for variable in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.setenv(variable, "eve")
+    mine = pwd.getpwuid(os.getuid()).pw_name
+    assert terminal_actor().name == f"{mine} on this computer"
+
+    def unknown(_: int) -> None:
         raise KeyError("uid 4711")
 
-    assert terminal_actor().name.endswith(" on this computer")
-    monkeypatch.setattr("urc.runtime.server_recorder.getuser", unknown)
-    assert terminal_actor().name == "unknown user on this computer"
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    assert terminal_actor().name == f"user {os.getuid()} on this computer"
 
 
 CANARIES = {
