@@ -1,7 +1,9 @@
 """The HTTP API with a real server, a real guard and an emulated robot."""
 
 import asyncio
+import os
 import re
+import signal
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any
 import httpx2
 import pytest
 import yaml
+from anyio import to_thread
 
 from tests.e2e.api_server import ApiServer, started, streaming
 from tests.e2e.processes import UrcProcess
@@ -346,3 +349,30 @@ async def test_a_program_records_and_downloads(
     assert who
     assert told == [(step, "cart", who) for step in ("started", "ended", "downloaded")]
     assert {one["way"] for one in audit["entries"]} == {"key"}
+
+
+async def test_the_server_ends_with_open_streams(tmp_path: Path) -> None:
+    """Without a wait for readers, and without a fault in its output."""
+    process: list[UrcProcess] = []
+
+    def start(*arguments: str) -> UrcProcess:
+        process.append(UrcProcess(arguments, {}))
+        return process[-1]
+
+    server = started(start, tmp_path)
+    try:
+        async with (
+            server.client() as client,
+            streaming(client, "robots/cart/stream?signals=battery") as events,
+        ):
+            await events.until("values")
+            began = time.monotonic()
+            os.kill(process[0].pid, signal.SIGTERM)
+            end = await events.until("end")
+            assert "server" in end["reason"]
+            assert (await events.next())[0] == "over"
+        assert await to_thread.run_sync(process[0].wait) == 0
+        assert time.monotonic() - began < 5
+        assert process[0].errors == []
+    finally:
+        process[0].kill()

@@ -34,6 +34,7 @@ class Reader:
         self._hears = asyncio.Event()
         self._hears.set()
         self._left = asyncio.Event()
+        self.closing = asyncio.Event()
         self.task: asyncio.Task[None] | None = None
 
     async def open(self, *signals: str, method: str = "GET") -> None:
@@ -47,7 +48,7 @@ class Reader:
                 followed=self.followed,
                 visit=self.service.visit(),
             )
-            state = {"abort": self.abort}
+            state = {"abort": self.abort, "closing": self.closing}
             scope = {"type": "http", "method": method, "state": state}
             self.task = asyncio.create_task(stream(scope, self.receive, self.send))
             await settle()

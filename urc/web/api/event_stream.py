@@ -89,7 +89,8 @@ class EventStream:
             writing = asyncio.ensure_future(self._write(send))
             leaving = asyncio.ensure_future(_left(receive))
             revoked = asyncio.ensure_future(self._revoked.wait())
-            tasks = (writing, leaving, revoked)
+            closing = asyncio.ensure_future(scope["state"]["closing"].wait())
+            tasks = (writing, leaving, revoked, closing)
             try:
                 await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -98,6 +99,8 @@ class EventStream:
                 outcome, *_ = await asyncio.gather(*tasks, return_exceptions=True)
         if leaving.done() and not leaving.cancelled():
             return
+        if closing.done() and not closing.cancelled():
+            self._reason = "the server ends"
         if not isinstance(outcome, TimeoutError):
             # Nothing else is sent. A reader that reads nothing has time to notice the end.
             body = _event("end", {"reason": self._reason})

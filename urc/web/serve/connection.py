@@ -53,11 +53,11 @@ def _stops(data: bytes) -> bool:
 class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
-    A response that never ends finds a function that closes its connection in
-    ``scope["state"]["abort"]``.
+    A response without an end finds two things in ``scope["state"]``: ``closing`` is an event that
+    is set when the server ends, and ``abort`` is a function that closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments, the method `send_400_response`, and the attributes
+        class uses the constructor's arguments, the methods `send_400_response` and `shutdown`, and the attributes
         `conn`, `connections`, `loop` and `transport` of its base class. The tests in
         tests/e2e/test_dashboard_server.py fail when one of these parts changes.
     """
@@ -72,7 +72,13 @@ class HttpConnection(H11Protocol):
         request_s: float = REQUEST_S,
         most: int = CONNECTIONS,
     ) -> None:
-        super().__init__(config, server_state, {**app_state, "abort": self._abort}, _loop)
+        self._closing = asyncio.Event()
+        super().__init__(
+            config,
+            server_state,
+            {**app_state, "abort": self._abort, "closing": self._closing},
+            _loop,
+        )
         self._request_s = request_s
         self._most = most
         self._alarm: asyncio.TimerHandle | None = None
@@ -110,6 +116,11 @@ class HttpConnection(H11Protocol):
     def send_400_response(self, msg: str) -> None:
         """Refuse invalid HTTP; the base class calls this method."""
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
+
+    def shutdown(self) -> None:
+        """Let the response in progress end; the server calls this method when it ends."""
+        super().shutdown()
+        self._closing.set()
 
     def _abort(self) -> None:
         """Close the connection without waiting for a reader that reads nothing."""
