@@ -1,6 +1,7 @@
 """A TLS connection over real sockets, under both event loops: pressure, pauses, handshakes."""
 
 import asyncio
+import contextlib
 import select
 import socket
 import ssl
@@ -300,6 +301,44 @@ def test_unfinished_handshakes_never_keep_others_out(run: Any) -> None:
         await until(lambda: sum(map(closed, held)) >= 44)
 
     run(test, most=16, limit_s=30)
+
+
+def test_a_handshake_in_progress_stays_among_dripping_ones(run: Any) -> None:
+    """Its client has sent a whole message, so it is not the one that goes."""
+
+    async def test(rig: Rig) -> None:
+        inside, outside = ssl.MemoryBIO(), ssl.MemoryBIO()
+        tls = rig.trusted.wrap_bio(inside, outside, server_hostname="127.0.0.1")
+        slow = rig.plain()
+        with contextlib.suppress(ssl.SSLWantReadError):
+            tls.do_handshake()
+        slow.sendall(outside.read())
+        inside.write(await asyncio.to_thread(slow.recv, 65536))
+        for _ in range(60):
+            rig.plain().sendall(b"\x16\x03\x01")
+            await asyncio.sleep(0)
+        await until(lambda: len(rig.handshakes) == 16)
+        tls.do_handshake()
+        tls.write(b"here")
+        slow.sendall(outside.read())
+        await until(lambda: bool(Upper.made) and Upper.made[-1].received == b"here")
+
+    run(test, most=16, limit_s=30)
+
+
+def test_a_first_message_without_end_is_closed(run: Any) -> None:
+    """A client gets no more memory than a handshake needs."""
+
+    async def test(rig: Rig) -> None:
+        line = rig.plain()
+        hello = b"\x16\x03\x01\x40\x00\x01\xff\xff\xff" + bytes(0x4000 - 4)
+        with contextlib.suppress(OSError):
+            for _ in range(200):
+                line.sendall(hello)
+        await until(lambda: len(rig.handshakes) == 0)
+        assert not Upper.made
+
+    run(test, limit_s=30)
 
 
 def test_a_flood_of_handshakes_leaves_time_for_others(run: Any) -> None:

@@ -16,6 +16,8 @@ __all__ = ["READ_BYTES", "TlsConnection"]
 
 READ_BYTES = 64 * 1024
 """Maximum number of decrypted bytes in one call of a protocol."""
+HANDSHAKE_BYTES = 64 * 1024
+"""Maximum number of received bytes that wait for the next step of a handshake."""
 
 
 class TlsConnection(asyncio.Transport, asyncio.Protocol):
@@ -26,20 +28,25 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         tcp: asyncio.Transport,
         context: ssl.SSLContext,
         make: Callable[[], asyncio.Protocol],
+        on_data: Callable[[], None],
         on_end: Callable[[], None],
     ) -> None:
-        """Prepare the handshake; `data_received` begins it.
+        """Prepare the handshake.
 
         Args:
             tcp: an open transport, whose protocol becomes this connection.
             context: certificate and options of the server.
             make: function that returns the upper protocol, called after the handshake.
+            on_data: callback for data of the handshake, which `continue_handshake` processes.
             on_end: callback for the end of the handshake: success, failure or lost connection.
         """
         super().__init__()
         self._tcp = tcp
         self._make = make
+        self._on_data = on_data
         self._on_end = on_end
+        self.has_replied = False
+        """Whether the client has sent a whole first message, so the server has replied."""
         self._context = context
         self._in = ssl.MemoryBIO()
         self._out = ssl.MemoryBIO()
@@ -56,10 +63,12 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Decrypt received bytes."""
         self._in.write(data)
-        if not self._is_ready:
-            self._handshake()
         if self._is_ready:
             self._read()
+        elif self._in.pending > HANDSHAKE_BYTES:
+            self.abort()
+        else:
+            self._on_data()
 
     def eof_received(self) -> bool | None:
         """Close the connection: without a closing message of TLS, the data may be incomplete."""
@@ -87,10 +96,14 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         if self._protocol is not None:
             self._protocol.resume_writing()
 
-    def _handshake(self) -> None:
+    def continue_handshake(self) -> None:
+        """Process the received data of the handshake, with slow cryptography."""
+        if self._is_closing or self._is_ready:
+            return
         try:
             self._tls.do_handshake()
         except ssl.SSLWantReadError:
+            self.has_replied = self.has_replied or self._out.pending > 0
             self._flush()
             return
         except (ssl.SSLError, ssl.CertificateError):
@@ -101,6 +114,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._on_end()
         self._protocol = protocol = self._make()
         protocol.connection_made(self)
+        self._read()
 
     def _read(self) -> None:
         while self._is_reading and not self._is_closing:

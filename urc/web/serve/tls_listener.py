@@ -6,8 +6,9 @@ number, their duration, and their share of the event loop's time.
 
 import asyncio
 import ssl
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 from urc.web.serve.tls_connection import TlsConnection
@@ -15,8 +16,8 @@ from urc.web.serve.tls_connection import TlsConnection
 __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
-"""Maximum number of unfinished handshakes. One more closes the oldest one of the address with the
-most."""
+"""Maximum number of unfinished handshakes. One more closes one of the address with the most: the
+oldest one without a whole message, or else the oldest one."""
 HANDSHAKE_S = 5.0
 """Time limit from the opening of a connection to the end of its handshake, in seconds."""
 SHARE = 0.25
@@ -46,7 +47,7 @@ class Handshakes:
         self._most = most
         self._limit_s = limit_s
         self._open: dict[FirstBytes, asyncio.TimerHandle] = {}
-        self._waiting: deque[FirstBytes] = deque()
+        self._waiting: dict[FirstBytes, None] = {}
         self._free_s = 0.0
         """Time of the event loop's clock at which the next handshake may begin."""
         self._is_timed = False
@@ -62,10 +63,13 @@ class Handshakes:
         if len(self._open) > self._most:
             count = Counter(each.address for each in self._open)
             most = max(count.values())
-            next(each for each in self._open if count[each.address] == most).abort()
+            crowd = [each for each in self._open if count[each.address] == most]
+            # A client that has sent a whole message finishes soon; others may never send one.
+            min(crowd, key=lambda each: each.has_replied).abort()
 
     def remove(self, one: "FirstBytes") -> None:
         """Forget a connection: its handshake has ended, or the connection is lost."""
+        self._waiting.pop(one, None)
         timer = self._open.pop(one, None)
         if timer is not None:
             timer.cancel()
@@ -75,27 +79,27 @@ class Handshakes:
         for one in list(self._open):
             one.abort()
 
-    def begin(self, one: "FirstBytes") -> None:
-        """Process the first message of a handshake now, or later if handshakes took much time."""
-        self._waiting.append(one)
+    def take_turn(self, one: "FirstBytes") -> None:
+        """Continue a handshake now, or later if handshakes took much time."""
+        if one not in self._waiting:
+            self._waiting[one] = None
         if not self._is_timed:
             self._next()
 
     def _next(self) -> None:
-        """Process one waiting message; its duration determines the time of the next one."""
+        """Continue one waiting handshake; the duration determines the time of the next one."""
         self._is_timed = False
         loop = asyncio.get_running_loop()
         if loop.time() < self._free_s:
             self._later(loop)
             return
-        while self._waiting:
-            one = self._waiting.popleft()
-            if one in self._open:  # else it is closed
-                begin_s = loop.time()
-                one.shake()
-                end_s = loop.time()
-                self._free_s = end_s + (end_s - begin_s) * (1 / SHARE - 1)
-                break
+        if self._waiting:
+            one = next(iter(self._waiting))
+            del self._waiting[one]
+            begin_s = loop.time()
+            one.continue_handshake()
+            end_s = loop.time()
+            self._free_s = end_s + (end_s - begin_s) * (1 / SHARE - 1)
         if self._waiting:
             self._later(loop)
 
@@ -117,7 +121,7 @@ class FirstBytes(asyncio.Protocol):
         self._handshakes = handshakes
         self._make = make
         self._tcp: asyncio.Transport | None = None
-        self._begun = b""
+        self._secure: TlsConnection | None = None
         self.address = ""
         """Network address of the client."""
 
@@ -132,35 +136,35 @@ class FirstBytes(asyncio.Protocol):
         """Begin a handshake, or pass plain HTTP on."""
         if self._tcp is None:
             return
-        is_first = not self._begun
-        self._begun += data  # bounded: reading is paused until the turn of this connection
-        if is_first and data[0] == _TLS_HANDSHAKE:
-            self._tcp.pause_reading()
-            self._handshakes.begin(self)
-        elif is_first:
+        next_one: asyncio.Protocol
+        if data[0] == _TLS_HANDSHAKE:
+            next_one = self._secure = TlsConnection(
+                self._tcp,
+                self._handshakes.context(),
+                self._make,
+                partial(self._handshakes.take_turn, self),
+                partial(self._handshakes.remove, self),
+            )
+        else:
             self._handshakes.remove(self)
-            plain = self._make()
-            self._tcp.set_protocol(plain)
-            plain.connection_made(self._tcp)
-            plain.data_received(data)
+            next_one = self._make()
+            next_one.connection_made(self._tcp)
+        self._tcp.set_protocol(next_one)
+        next_one.data_received(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
         self._handshakes.remove(self)
 
-    def shake(self) -> None:
-        """Process the first message of the handshake."""
-        if self._tcp is None or self._tcp.is_closing():
-            return
-        secure = TlsConnection(
-            self._tcp,
-            self._handshakes.context(),
-            self._make,
-            lambda: self._handshakes.remove(self),
-        )
-        self._tcp.set_protocol(secure)
-        self._tcp.resume_reading()
-        secure.data_received(self._begun)
+    @property
+    def has_replied(self) -> bool:
+        """Whether the client has sent a whole first message."""
+        return self._secure is not None and self._secure.has_replied
+
+    def continue_handshake(self) -> None:
+        """Process the received data of the handshake."""
+        if self._secure is not None:
+            self._secure.continue_handshake()
 
     def abort(self) -> None:
         """Close the connection, whose handshake took too long or too much room."""
