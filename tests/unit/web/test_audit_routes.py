@@ -263,3 +263,16 @@ def test_stop_by_request_names_the_person_and_counts_unknown_visitors(tmp_path: 
     assert sum(one.times for one in stops[1:]) == 20
     assert len(stops) <= 4
     assert {(one.who, one.place) for one in stops[1:]} == {("", "testclient")}
+
+
+@pytest.mark.parametrize(
+    "name", ["robot", "who", "what", "text", "since", "until", "before", "last"]
+)
+@pytest.mark.parametrize(
+    "value", ["%00", "%ED%A0%80", "%FF", "%25%5F!", "%D9%A3", "1e999", "'--", ""]
+)
+def test_odd_values_are_a_result_or_one_line(client: TestClient, name: str, value: str) -> None:
+    client.cookies = HERE  # type: ignore[assignment]
+    answer = client.get(f"/api/v1/audit?{name}={value}")
+    assert answer.status_code in (200, 400)
+    assert ("error" in answer.json()) == (answer.status_code == 400)
