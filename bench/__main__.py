@@ -27,6 +27,7 @@ NAMES = (
     "motion_path",
     "motion_cost",
     "motion_stop",
+    "motion_revoked",
     "motion_engine",
     "motion_guard",
     "motion_cuts",

@@ -177,13 +177,30 @@ class Rig:
         self._link().do(*orders)
 
     def drive(
-        self, index: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
+        self,
+        index: int,
+        death: str = "outside",
+        drive_s: float = 0.0,
+        *,
+        has_spare: bool = False,
+        key: str | None = None,
+        cookie: str = "",
     ) -> int:
-        """Let a page drive a robot until the page vanishes; return the page's number."""
+        """Let a page drive a robot until the page vanishes; return the page's number.
+
+        Args:
+            index: number of the robot.
+            death: way of vanishing, as in `bench.rig.operator_process.Plan`.
+            drive_s: duration of driving before, in seconds.
+            has_spare: whether the page has a second connection.
+            key: token of the page; None: the start key.
+            cookie: cookie of a sign-in, in place of a token.
+        """
         self._numbers += 1
+        key = self.server.key if key is None else key
         plan = Plan(
             self._numbers, self.host, self.server.port, f"robot-{index}", death, drive_s,
-            life_s=LIFE_S, key=self.server.key, has_spare=has_spare,
+            life_s=LIFE_S, key="" if cookie else key, cookie=cookie, has_spare=has_spare,
         )  # fmt: skip
         self.operators.start(plan._asdict())
         return self._numbers

@@ -57,7 +57,9 @@ class Plan(NamedTuple):
     command: str = "go"
     argument: str = "t"
     key: str = ""
-    """Start key of the server; "" for a page without a key."""
+    """Start key of the server, or a token; "" for a page without either."""
+    cookie: str = ""
+    """Cookie of a sign-in, ``name=secret``; "" for a page without a cookie."""
     has_spare: bool = False
     """Whether the page also sends held controls on a second connection."""
 
@@ -99,7 +101,8 @@ class Page:
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             f"Sec-WebSocket-Key: {key}\r\n"
         )
-        head += f"Authorization: Bearer {plan.key}\r\n\r\n" if plan.key else "\r\n"
+        head += f"Authorization: Bearer {plan.key}\r\n" if plan.key else ""
+        head += f"Cookie: {plan.cookie}\r\n\r\n" if plan.cookie else "\r\n"
         self.socket.sendall(head.encode())
         answer = b""
         while b"\r\n\r\n" not in answer:
