@@ -5,7 +5,9 @@ person of this server may have the same name. The functions block for some milli
 call them in a thread.
 
 Theory of operation. Each sign-in replaces the grants of the previous one by the grants of the
-present claims. Grants that an administrator gave by hand stay.
+present claims. Grants that an administrator gave by hand stay. All rights of the person end with
+the sign-in, including those of the person's devices and passkeys, and the next sign-in renews them.
+So an account that is blocked at its provider keeps no way in.
 """
 
 import json
@@ -22,6 +24,8 @@ from urc.access.store import LONGEST_NAME, AccessStore
 __all__ = ["ExternalAccount", "admit_account", "admit_named"]
 
 _MOST_NAMESAKES: Final = 100
+_PROXY: Final = "proxy:"
+"""Start of the issuer of people that a proxy has added; addresses of providers start with http."""
 
 
 class ExternalAccount(NamedTuple):
@@ -58,8 +62,11 @@ def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> P
         ).fetchone()
         if row is not None:
             person = _renewed(store, row[0], _grants(row[1]), account.grants)
+            if person.grants:
+                person = _extended(base, person, account.ends_at)
         elif account.grants:
-            person = store.add("person", _free_name(store, account), account.grants, now=now)
+            name = _free_name(store, account)
+            person = store.add("person", name, account.grants, now=now, ends_at=account.ends_at)
         else:
             person = None
         if person is not None:
@@ -70,7 +77,13 @@ def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> P
 
 
 def admit_named(
-    store: AccessStore, name: str, new_grants: Iterable[Grant], now: float
+    store: AccessStore,
+    name: str,
+    new_grants: Iterable[Grant],
+    *,
+    proxy: str,
+    now: float,
+    ends_at: float,
 ) -> Principal:
     """Return the person with a name, and add the person with `new_grants` if there are any.
 
@@ -78,16 +91,23 @@ def admit_named(
         store: the store.
         name: name that a trusted proxy has proven.
         new_grants: grants of a new person; none: the person must exist.
+        proxy: name of the proxy.
         now: UTC time in seconds since 1970.
+        ends_at: UTC time of the end of the sign-in. All rights of a person that a proxy has added
+            end then, too.
 
     Raises:
         AccessError: no person has the name, or the name is invalid.
     """
     grants = tuple(new_grants)
-    with store.transaction():
+    with store.transaction() as base:
         person = principal_named(store.directory(), "person", name)
         if person is None and grants:
-            person = store.add("person", name, grants, now=now)
+            person = store.add("person", name, grants, now=now, ends_at=ends_at)
+            issuer = f"{_PROXY}{proxy}"
+            _keep(base, ExternalAccount(issuer, person.id, name, grants, ends_at), person.id)
+        elif person is not None and _is_of_proxy(base, person.id):
+            person = _extended(base, person, ends_at)
     if person is None:
         raise AccessError(f"no person has the name {name!r}: ask an administrator")
     return person
@@ -102,6 +122,21 @@ def _renewed(
     if grants != person.grants:
         store.set_grants(principal, grants)
     return person._replace(grants=grants)
+
+
+def _extended(base: sqlite3.Connection, person: Principal, ends_at: float) -> Principal:
+    """Let the rights of a person last until `ends_at`, or until a later end that it has already."""
+    ends_at = max(ends_at, person.ends_at or 0.0)
+    base.execute("UPDATE principals SET ends_at = ? WHERE id = ?", (ends_at, person.id))
+    return person._replace(ends_at=ends_at)
+
+
+def _is_of_proxy(base: sqlite3.Connection, principal: str) -> bool:
+    found = base.execute(
+        "SELECT 1 FROM external_accounts WHERE principal = ? AND issuer LIKE ?",
+        (principal, f"{_PROXY}%"),
+    ).fetchone()
+    return found is not None
 
 
 def _keep(base: sqlite3.Connection, account: ExternalAccount, principal: str) -> None:

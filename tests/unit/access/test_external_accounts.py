@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from urc.access.directory import NOBODY, Principal
 from urc.access.external_accounts import ExternalAccount, admit_account, admit_named
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.access.store import AccessStore
@@ -91,16 +92,42 @@ def test_a_removed_person_is_added_again_as_another(store: AccessStore) -> None:
     assert admit_account(store, account("watch"), NOW).id != person.id
 
 
+def test_all_rights_end_with_the_sign_in_at_the_provider(store: AccessStore) -> None:
+    """Else a passkey or a paired phone would outlive an account that the provider has blocked."""
+    person = admit_account(store, account("drive"), NOW)
+    assert person.ends_at == NOW + 60
+    phone = store.add("device", "phone", now=NOW, owner=person.id)
+    keys = [
+        store.open_sign_in(person.id, "passkey", now=NOW)[1],
+        store.open_sign_in(phone.id, "pairing", now=NOW)[1],
+    ]
+    directory = store.directory()
+    assert [directory.identify(key, NOW + 59).person for key in keys] == [person.id] * 2
+    assert [directory.identify(key, NOW + 60) for key in keys] == [NOBODY] * 2
+    admit_account(store, account("drive")._replace(ends_at=NOW + 90), NOW + 50)
+    admit_account(store, account("drive")._replace(ends_at=NOW + 70), NOW + 50)
+    directory = store.directory()
+    assert directory.identify(keys[0], NOW + 89).person == person.id
+    assert directory.identify(keys[0], NOW + 90) == NOBODY
+
+
 def test_a_proxy_names_a_person(store: AccessStore) -> None:
     ann = store.add("person", "Ann", now=NOW)
     store.add("device", "tablet", now=NOW)
-    assert admit_named(store, "ann", (), NOW).id == ann.id
+
+    def named(name: str, *grants: Grant, ends_at: float = NOW + 60) -> Principal:
+        return admit_named(store, name, grants, proxy="gate", now=NOW, ends_at=ends_at)
+
+    assert named("ann").id == ann.id
     for name in ("tablet", "eve", ""):
         with pytest.raises(AccessError, match="no person has the name"):
-            admit_named(store, name, (), NOW)
-    eve = admit_named(store, "eve", [Grant("watch")], NOW)
-    assert (eve.name, eve.grants) == ("eve", (Grant("watch"),))
+            named(name)
+    eve = named("eve", Grant("watch"))
+    assert (eve.name, eve.grants, eve.ends_at) == ("eve", (Grant("watch"),), NOW + 60)
     store.set_grants(eve.id, [Grant("drive")])
-    admit_named(store, "eve", [Grant("watch")], NOW)
+    assert named("Eve", Grant("watch"), ends_at=NOW + 90).ends_at == NOW + 90
     assert grants_of(store, eve.id) == ["drive"], "the grants of a new person only"
-    assert grants_of(store, ann.id) == []
+    named("ann", Grant("watch"))
+    people = store.directory().principals
+    assert (people[ann.id].grants, people[ann.id].ends_at) == ((), None), "a person of this server"
+    assert people[eve.id].ends_at == NOW + 90

@@ -10,7 +10,8 @@ from starlette.testclient import TestClient
 
 from tests.authenticator import Authenticator
 from urc.access.control import AccessControl
-from urc.access.grants import parse_grant
+from urc.access.external_accounts import ExternalAccount, admit_account
+from urc.access.grants import Grant, parse_grant
 from urc.access.store import AccessStore
 from urc.runtime.audit_search import AuditQuery, search
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -187,6 +188,23 @@ def test_a_person_without_a_role_is_not_signed_in(house: House) -> None:
     assert refused.status_code == 403
     assert "'Ann' has no role here" in refused.text
     assert "set-cookie" not in refused.headers
+
+
+def test_the_passkey_of_an_account_ends_with_the_account(house: House) -> None:
+    """A blocked account has no way in past its provider."""
+    now = house.control.now()
+    account = ExternalAccount("https://id.example", "17", "ann", (Grant("watch"),), now + 300)
+    person = admit_account(house.store, account, now)
+    _, secret = house.store.open_sign_in(person.id, "oidc", now=now)
+    house.control.load()
+    with house.browser({house.access.sign_in_cookie: secret}) as browser:
+        assert house.add(browser).status_code == 200
+        assert house.sign_in(browser).status_code == 200
+        house.ahead_s = 300
+        assert browser.get(OWN).status_code == 401
+        refused = house.sign_in(browser)
+    assert refused.status_code == 403
+    assert "the rights of 'ann' have ended" in refused.text
 
 
 def test_failures_make_an_address_wait_and_never_stop(house: House) -> None:

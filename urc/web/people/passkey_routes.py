@@ -88,6 +88,10 @@ class PasskeyRoutes:
             person = self._sign_ins.control.directory.principals.get(passkey.principal)
             if person is None:
                 raise AccessError("the owner of the passkey was removed")
+            if person.ends_at is not None and now >= person.ends_at:
+                raise AccessError(
+                    f"the rights of {person.name!r} have ended: sign in with the identity provider"
+                )
             done = answer(SignedIn(person.name))
             await self._sign_ins.open(request, done, person, "passkey")
         except AccessError as error:

@@ -144,9 +144,12 @@ class ProxyMiddleware:
         place = str(client[0])
 
         def opened() -> tuple[Principal, str]:
-            person = admit_named(store, user, proxy.new_people, now)
+            ends_at = now + _LASTS_S
+            person = admit_named(
+                store, user, proxy.new_people, proxy=proxy.name, now=now, ends_at=ends_at
+            )
             _, secret = store.open_sign_in(
-                person.id, "proxy", now=now, ends_at=now + _LASTS_S, place=place, agent=agent
+                person.id, "proxy", now=now, ends_at=ends_at, place=place, agent=agent
             )
             return person, secret
 
