@@ -150,6 +150,14 @@ async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
         assert any("connection was lost" in text for text in texts)
 
 
+async def test_the_transports_are_known_from_the_start(tmp_path: Path) -> None:
+    """A recording makes its topics from them."""
+    async with carted(tmp_path) as (_, file), served_robot(file) as address:
+        for _ in range(5):
+            async with urc.client.open(address, token=KEY) as robot:
+                assert list(robot.links) == ["wire"]
+
+
 async def test_a_wrong_token_is_told_at_once(tmp_path: Path) -> None:
     """And no token at all."""
     async with carted(tmp_path) as (_, file), served_robot(file) as address:

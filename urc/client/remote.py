@@ -64,6 +64,8 @@ __all__ = ["RemoteRobot", "open"]
 
 _MOST_IMAGES: Final = 64
 _GOODBYE_S: Final = 1.5
+_LINKS_S: Final = 1.0
+"""Maximum wait for the state of the transports, which follows the first message, in seconds."""
 _STOP_POST_S: Final = 3.0
 
 log = logging.getLogger(__name__)
@@ -144,6 +146,7 @@ class RemoteRobot(HubReadings):
         self._name = ""
         self._order: tuple[Signal, ...] = ()
         self._ready = asyncio.Event()
+        self._linked = asyncio.Event()
         self._over: ConnectionLost | None = None
         self._session = ""
         self._next_line: int | None = None
@@ -241,6 +244,9 @@ class RemoteRobot(HubReadings):
             running.result()
         if not self._ready.is_set():
             raise ConnectionLost(f"{self._address.url} did not answer within {timeout_s:g} s")
+        with suppress(TimeoutError):  # a playback may have no links
+            async with asyncio.timeout(_LINKS_S):
+                await self._linked.wait()
 
     def over(self, running: "asyncio.Task[None]") -> None:
         """Record that the connection has ended for good, and wake all readers."""
@@ -291,6 +297,7 @@ class RemoteRobot(HubReadings):
             case LinksMessage():
                 for link in links_of(message, now):
                     self.hub.set_link(link)
+                self._linked.set()
                 self.motion.wake()
             case LogMessage():
                 self._add_lines(message, now)
