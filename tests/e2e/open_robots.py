@@ -17,6 +17,7 @@ from urc.runtime.session import Session
 from urc.testing.entry import ACCESS, KEY
 from urc.web.app import Robot, build_app, serve
 from urc.web.serve.access import Access
+from urc.web.serve.certificates import Certificates
 
 __all__ = ["Cart", "Opening", "cart_file", "carted", "opened", "served_robot", "until"]
 
@@ -147,14 +148,21 @@ async def carted(folder: Path, more: str = "") -> AsyncIterator[tuple[Cart, Path
 
 
 @asynccontextmanager
-async def served_robot(file: Path, *, port: int = 0, access: Access = ACCESS) -> AsyncIterator[str]:
+async def served_robot(
+    file: Path,
+    *,
+    port: int = 0,
+    access: Access = ACCESS,
+    certificates: Certificates | None = None,
+) -> AsyncIterator[str]:
     """Serve the robot of a profile; give the server's address."""
     catalog = built_in_catalog()
     known = load_profile(file, catalog)
     robot = Robot(known, {}, lambda: Session(known, {}, catalog.transports, motion="guarded"))
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({known.name: robot}, access=access, linger_s=0.2)
-    task = asyncio.create_task(serve(app, port=port, on_ready=ready.set_result))
+    app = build_app({known.name: robot}, access=access, linger_s=0.2, certificates=certificates)
+    serving = serve(app, port=port, on_ready=ready.set_result, certificates=certificates)
+    task = asyncio.create_task(serving)
     try:
         async with asyncio.timeout(WAIT_S):
             await asyncio.wait((ready, task), return_when=asyncio.FIRST_COMPLETED)

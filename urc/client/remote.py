@@ -260,7 +260,7 @@ class RemoteRobot(HubReadings):
 
     def _is_connecting(self) -> bool:
         links = self.hub.links.values()
-        return not links or any(one.state == "connecting" and not one.attempts for one in links)
+        return any(one.state == "connecting" and not one.attempts for one in links)
 
     def check_open(self) -> None:
         """Raise `ConnectionLost` if the connection has ended for good."""

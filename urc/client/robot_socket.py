@@ -144,8 +144,9 @@ class RobotSocket:
                 self._line = line
                 writing = asyncio.create_task(self._write(line))
                 try:
-                    async for message in line:
-                        self.take(message)
+                    with suppress(ConnectionClosed):
+                        async for message in line:
+                            self.take(message)
                 finally:
                     writing.cancel()
                     self._line = None
@@ -181,7 +182,8 @@ class RobotSocket:
             return ConnectionLost(f"{where} answered with HTTP {status}")
         if isinstance(error, ssl.SSLCertVerificationError):
             return ConnectionLost(
-                f"the certificate of {where} is not trusted: {error.verify_message}"
+                f"the certificate of {where} is not trusted: {error.verify_message};"
+                " name the file of the server's authority"
             )
         if isinstance(error, TimeoutError):
             return ConnectionLost(f"{where} did not answer within {self._timeout_s:g} s")
