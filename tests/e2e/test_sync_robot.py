@@ -17,6 +17,8 @@ from urc.client.sync import SyncRobot
 from urc.problems import UrcError
 from urc.testing.entry import KEY
 
+pytestmark = pytest.mark.alone
+
 WAIT_S = 30.0
 LATE_S = 0.25
 WRONG = "a-wrong-token"

@@ -1,8 +1,9 @@
 """The interface of a robot for Python programs, with the same meaning in every opening.
 
 Layer 5. `urc.connect` connects a robot in this process, and `urc.client.open` uses a robot of a
-server. Both return this interface, so a program changes from one to the other in one line. The test
-`tests/e2e/test_robot_interface.py` runs the same dialogues against both.
+server. Both return this interface, so a program changes from one to the other in one line. The
+tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same
+dialogues against both.
 """
 
 from collections.abc import AsyncIterator, Callable, Mapping
