@@ -57,9 +57,9 @@ class HttpConnection(H11Protocol):
     is set when the server ends, and ``abort`` is a function that closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments, the methods `send_400_response` and `shutdown`, and the attributes
-        `conn`, `connections`, `loop` and `transport` of its base class. The tests in
-        tests/e2e/test_dashboard_server.py fail when one of these parts changes.
+        class uses the constructor's arguments, the methods `send_400_response` and `shutdown`, and
+        the attributes `conn`, `connections`, `loop` and `transport`. The tests in
+        tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail when a part changes.
     """
 
     def __init__(
@@ -73,12 +73,8 @@ class HttpConnection(H11Protocol):
         most: int = CONNECTIONS,
     ) -> None:
         self._closing = asyncio.Event()
-        super().__init__(
-            config,
-            server_state,
-            {**app_state, "abort": self._abort, "closing": self._closing},
-            _loop,
-        )
+        state = {**app_state, "abort": self._abort, "closing": self._closing}
+        super().__init__(config, server_state, state, _loop)
         self._request_s = request_s
         self._most = most
         self._alarm: asyncio.TimerHandle | None = None
