@@ -53,12 +53,12 @@ def _stops(data: bytes) -> bool:
 class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
-    A response without an end finds two things in ``scope["state"]``: ``closing`` is an event that
-    is set when the server ends, and ``abort`` is a function that closes the connection.
+    The state of a request has two keys for a response without an end. The event ``closing`` is set
+    when the server ends. The function ``abort`` closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments, the methods `send_400_response` and `shutdown`, and
-        the attributes `conn`, `connections`, `loop` and `transport`. The tests in
+        class uses the constructor's arguments, and the methods `send_400_response` and `shutdown`.
+        It also uses the attributes `conn`, `connections`, `loop` and `transport`. The tests in
         tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail when a part changes.
     """
 
