@@ -101,6 +101,8 @@ class AccessMiddleware:
             text = t("Sign-in is off: everyone on this network can drive these robots.")
             current_warnings.set((text,))
         visitor: Visitor = scope["state"]["visitor"]
+        if not visitor.is_known and _has_token(scope):
+            self._access.on_bad_token((scope.get("client") or ("",))[0])
         query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         word = next((value for name, value in query if name == PARAMETER), None)
         sees_audit.set(visitor.may(MAINTAIN_ANYWHERE))
@@ -159,6 +161,14 @@ class AccessMiddleware:
         html = render("door.html.j2", page)
         is_in = url and not is_old
         return HTMLResponse(html, 200 if is_in else 401, _HEADERS if is_in else _REFUSED)
+
+
+def _has_token(scope: Scope) -> bool:
+    """Return whether a request has a token, good or bad."""
+    return any(
+        name == b"authorization" and value[:7].lower() == b"bearer "
+        for name, value in scope["headers"]
+    )
 
 
 def _agent(scope: Scope) -> str:

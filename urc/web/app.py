@@ -56,7 +56,7 @@ from urc.web.page_socket import BrowserClient
 from urc.web.people.proxy_middleware import ProxyMiddleware
 from urc.web.people.ways_in import SignInOptions, WaysIn
 from urc.web.serve.access import Access
-from urc.web.serve.actors import record_admission, stopper_of
+from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
 from urc.web.serve.replies import API, Endpoint, told
@@ -151,6 +151,7 @@ def build_app(
     )
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)
+    access.on_bad_token = partial(record_bad_token, recorder)
 
     def renew(name: str, robot: Robot) -> None:
         routes.renew(name, robot, _latch(data, robot))

@@ -125,6 +125,22 @@ def test_start_key_signs_in_with_a_name_and_wrong_keys_are_counted(tmp_path: Pat
     assert "a-key-of" not in str(found)
 
 
+def test_requests_with_a_bad_token_are_counted(tmp_path: Path) -> None:
+    bad = "canary-token-that-was-revoked"
+    with served(tmp_path, cookies={}) as client:
+        for _ in range(40):
+            client.get("/api/v1/audit", headers={"authorization": f"Bearer {bad}"})
+        client.get("/api/v1/audit", headers={"authorization": "Basic abc"})
+        client.get("/api/v1/audit")
+    failed = entries_of(tmp_path)
+    assert {(one.what, one.way, one.place) for one in failed} == {
+        ("sign-in failed", "token", "testclient")
+    }
+    assert sum(one.times for one in failed) == 40
+    assert len(failed) <= 4
+    assert bad not in str(failed)
+
+
 def test_programs_are_named_by_their_way(tmp_path: Path) -> None:
     with served(tmp_path, cookies={}) as client:
         assert client.get("/api/v1/audit/export", headers=BEARER).status_code == 200

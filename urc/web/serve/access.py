@@ -71,6 +71,9 @@ class Access:
         self.on_admit: Callable[[Identity, str, str], None] = _unrecorded
         """Callback for each use of a start key or code: the new identity, or `NOBODY` for a wrong
         key; the network address; the browser."""
+        self.on_bad_token: Callable[[str], None] = _unheard
+        """Callback for each request with a token that is unknown, over or revoked, with the network
+        address."""
         self._dependents: set[Callable[[], None]] = set()
         self.control.on_change.append(self.recheck)
 
@@ -215,6 +218,10 @@ def _deleted(names: Iterable[str]) -> list[str]:
 
 def _unrecorded(who: Identity, place: str, agent: str) -> None:
     """Ignore the use of a start key, because this server has no audit log."""
+
+
+def _unheard(place: str) -> None:
+    """Ignore a bad token, because this server has no audit log."""
 
 
 def _untagged(_: str) -> Collection[str]:

@@ -10,7 +10,7 @@ from urc.motion.lease import Operator
 from urc.runtime.server_recorder import Actor, ServerRecorder
 from urc.web.serve.visitor import is_loopback, peer_of, visitor_of
 
-__all__ = ["actor_of", "record_admission", "stopper_of"]
+__all__ = ["actor_of", "record_admission", "record_bad_token", "stopper_of"]
 
 
 def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
@@ -65,3 +65,13 @@ def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent:
     else:
         actor = Actor(who.name, who.principal, who.kind, "administer", "key", place, who.sign_in)
         recorder.signed_in(actor, agent)
+
+
+def record_bad_token(recorder: ServerRecorder, place: str) -> None:
+    """Record a request with a token that is unknown, over or revoked; equal requests are counted.
+
+    Args:
+        recorder: writer of the audit entries.
+        place: network address.
+    """
+    recorder.sign_in_failed("token", place, "the token is unknown, over or revoked")
