@@ -42,9 +42,12 @@ class Person:
         return told
 
     def holds(self) -> dict[str, bytes]:
-        """Return every file of the data folder but what repositories said."""
+        """Return every file of the data folder, except the audit log and the kept indexes."""
         return {
             str(file.relative_to(self.folder)): file.read_bytes()
             for file in self.folder.rglob("*")
-            if file.is_file() and "repositories" not in file.parts and file.name != "changing"
+            if file.is_file()
+            and "repositories" not in file.parts
+            and file.name != "changing"
+            and not file.name.startswith("audit.sqlite")
         }

@@ -98,11 +98,13 @@ async def test_a_block_list_from_a_file_stops_the_robot_and_disables_its_package
         await expect(page.locator("main")).to_contain_text(f"is blocked by Keeper: {WHY}")
         assert (await page.goto(f"{address}robots/cart/")).status == 404  # type: ignore[union-attr]
         await urc(data, "repo", "blocks", "import", str(tmp_path / "withdrawn.json"))
-        open_again = page.get_by_role("link", name="Connect")
+        open_again = page.get_by_role("link", name="Connect to Cart", exact=True)
         async with asyncio.timeout(STOP_MOST_S):
             while await open_again.count() == 0:
                 await page.goto(address)
-        await page.goto(f"{address}robots/cart/")
+        answer = await page.goto(f"{address}robots/cart/")
+        assert answer is not None
+        assert answer.status == 200, await page.inner_text("body")
         who = page.locator("[data-who]")
         await expect(who).to_contain_text("Stopped by URC: robots/cart 1.0.0 is blocked by Keeper")
         assert [one for one in cart.heard[count:] if one not in STOPPED] == []

@@ -60,7 +60,7 @@ class BlockWatch:
         """Watch until cancelled.
 
         Args:
-            changed: coroutine function that updates the menu after a change of the lists.
+            changed: coroutine function that calls `enforce` and updates the menu.
         """
         loop = asyncio.get_running_loop()
         asks_at_s = loop.time() + _FIRST_ASK_S
@@ -74,7 +74,6 @@ class BlockWatch:
             if stamp == seen:
                 continue
             try:
-                await self.enforce()
                 await changed()
             except (UrcError, OSError) as error:
                 log.warning("the lists of blocked packages cannot be read: %s", error)

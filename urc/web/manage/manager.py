@@ -180,7 +180,13 @@ class Manager:
 
     async def watch_blocks(self) -> None:
         """Enforce the lists of blocked packages until cancelled."""
-        await self._block_watch.run(self.changed)
+        await self._block_watch.run(self._blocks_changed)
+
+    async def _blocks_changed(self) -> None:
+        """Stop and disable robots with blocked packages, then update the menu."""
+        async with self._changing:  # `park` adds robots, too
+            await self._block_watch.enforce()
+        await self.changed()
 
     async def changed(self) -> None:
         """Update the menu from the installed packages."""
