@@ -84,8 +84,10 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         page = await context.new_page()
         with pytest.raises(Error, match="ERR_CERT_AUTHORITY_INVALID"):
             await page.goto(others)
-        page = await context.new_page()
+        page = await prepare(await context.new_page())
         await page.goto(others.replace("https://", "http://") + "trust")
+        assert await faults(page) == []
+        assert await page.evaluate("document.documentElement.scrollWidth") == 390
         printed = await page.locator("[data-fingerprint] code").all_inner_texts()
         assert " ".join(printed) == shown
         features = await rows(page)

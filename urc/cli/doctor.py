@@ -96,6 +96,7 @@ def _problems(port: int, data: Path) -> Iterator[_Finding]:
     yield _Finding("urc_vendor", is_vendored, text, is_required=False)
     yield _priority()
     yield _clock(data)
+    yield _attempt("authority", lambda: _authority(data), is_required=False)
     yield _attempt("port", lambda: _try_port(port), is_required=False)
 
 
@@ -129,6 +130,23 @@ def _clock(data: Path) -> _Finding:
     warning = clock_warning(data)
     text = warning or "not earlier than any known event"
     return _Finding("clock", not warning, text, is_required=False)
+
+
+def _authority(data: Path) -> str:
+    """Return the state of the local certificate authority."""
+    from cryptography import x509
+
+    from urc.access.authority import AUTHORITY_FOLDER, fingerprint
+
+    file = data / AUTHORITY_FOLDER / "authority.pem"
+    try:
+        root = x509.load_pem_x509_certificate(file.read_bytes())
+    except FileNotFoundError:
+        return "not needed yet: the first server for other machines makes it"
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
+        raise UrcError(f"{file} cannot be used: {reason}") from error
+    return f"{fingerprint(root)}, until {root.not_valid_after_utc:%Y-%m-%d}"
 
 
 def _load_robots() -> str:

@@ -5,6 +5,7 @@ import errno
 import json
 import re
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,7 @@ import jsonschema
 import pytest
 import yaml
 
+from urc.access.authority import CertificateAuthority
 from urc.cli import main as main_module
 from urc.cli import send as send_module
 from urc.cli.demo import has_screen
@@ -267,4 +269,21 @@ def test_doctor_tells_what_is_missing(
         "MISSING robots                No module named 'yaml'",
     ):
         assert line in output.splitlines()
-    assert errors == "urc doctor: 6 of 12 checks failed\n"
+    assert errors == "urc doctor: 6 of 13 checks failed\n"
+
+
+def test_doctor_shows_the_authority(capsys: Output, tmp_path: Path) -> None:
+    """Its fingerprint and its end, to compare with a device; a damaged file is a note."""
+
+    def line() -> str:
+        main(["doctor", "--port", "0", "--data-dir", str(tmp_path)])
+        output, _ = capsys.readouterr()
+        return next(one for one in output.splitlines() if one.split()[1] == "authority")
+
+    assert "ok " in line()
+    assert not (tmp_path / "tls").exists()
+    made = CertificateAuthority(tmp_path / "tls", ["localhost"], datetime.now(UTC))
+    assert f"{made.fingerprint}, until 20" in line()
+    made.file.write_text("nonsense")
+    assert line().startswith("note ")
+    assert "authority.pem cannot be used: expected a certificate in PEM" in line()
