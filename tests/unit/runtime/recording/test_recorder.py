@@ -162,7 +162,7 @@ def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
     with pytest.raises(UrcError, match=r"it contains no profile\.yaml"):
         open_recording(file)
     found = list(open_recording(file, has_profile=True).messages(0))
-    assert b"can no longer be loaded: replay the recording with --profile" in b"".join(
+    assert b"the document is missing; replay the recording with --profile" in b"".join(
         m.data for m in found
     )
 
@@ -262,7 +262,10 @@ async def test_begin_and_end_of_a_recording_are_reported(tmp_path: Path) -> None
             await asyncio.sleep(0.01)
         assert steps == [("started", kept.file.name, "")]
     (file,) = tmp_path.iterdir()
-    assert steps[1:] == [("ended", file.name, "0 messages")]
+    ((step, name, outcome),) = steps[1:]
+    assert (step, name) == ("ended", file.name)
+    # One message, if the name of the file was logged before the end.
+    assert outcome in ("0 messages", "1 messages")
 
 
 @pytest.mark.anyio
