@@ -18,7 +18,16 @@ from urc.web.app import build_app
 from urc.web.serve.rights import ANYONE, ProtectedRoute, ProtectedSocket
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-OPEN_PATHS = {"/healthz", "/api/v1/robots/{name}/stop"}
+OPEN_PATHS = {
+    "/healthz",
+    "/api/v1/robots/{name}/stop",
+    "/api/v1/codes",
+    "/api/v1/guest",
+    "/api/v1/join",
+    "/api/v1/pair",
+    "/api/v1/sign-in",
+    "/api/v1/sign-out",
+}
 """Calls that need no right; a further one is a decision."""
 
 

@@ -32,7 +32,7 @@ from urc.runtime.redaction import secret_texts
 from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
-from urc.web.access_page import AccessMiddleware, Stoppable
+from urc.web.access_page import AccessMiddleware
 from urc.web.api.calls import api_routes
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
@@ -53,7 +53,9 @@ from urc.web.manage.playback_control import move_playback, playback_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
+from urc.web.people.people_routes import PeopleRoutes
 from urc.web.people.proxy_middleware import ProxyMiddleware
+from urc.web.people.sign_in_page import Stoppable
 from urc.web.people.ways_in import SignInOptions, WaysIn
 from urc.web.serve.access import Access
 from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
@@ -147,6 +149,7 @@ def build_app(
         audit=audit,
         recorder=recorder,
         ways_in=WaysIn(access, recorder, sign_in),
+        data=data,
         trust=WidgetTrust.of(trusted),
     )
     access.tags_of = routes.tags_of
@@ -214,7 +217,7 @@ class _Dashboard(Starlette):
     ) -> None:
         self._access = access = routes.access
         self._ways_in = routes.ways_in
-        self._stoppable = routes.stoppable
+        self._people = people = routes.people_routes()
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
         gallery = routes.gallery = Gallery(
@@ -226,7 +229,7 @@ class _Dashboard(Starlette):
         )
         frames = FrameDocuments(routes.modules, files.has_widget, access.frame_code)
         parts = routes.with_calls()
-        endpoints = routes.endpoints()
+        endpoints = routes.endpoints() | people.endpoints()
         for part in parts:
             endpoints |= part.endpoints()
         super().__init__(
@@ -238,6 +241,7 @@ class _Dashboard(Starlette):
                 *api_routes(endpoints),
                 *(route for one in parts for route in one.routes()),
                 *routes.ways_in.routes(),
+                *people.routes(),
                 *gallery.routes(),
                 *files.routes(),
                 *trust.routes(),
@@ -255,7 +259,7 @@ class _Dashboard(Starlette):
     def build_middleware_stack(self) -> ASGIApp:
         """Put the page policy around the whole application, with its error handlers."""
         inner = super().build_middleware_stack()
-        door = AccessMiddleware(inner, self._access, self.routes, self._stoppable)
+        door = AccessMiddleware(inner, self._access, self.routes, self._people.pages)
         policy = Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
         )
@@ -273,6 +277,7 @@ class _Routes:
     robot_calls: RobotCalls
     ways_in: WaysIn
     audit: AuditLog | None = None
+    data: Path | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
     dev: Dev | None = None
@@ -313,6 +318,17 @@ class _Routes:
             **self.recording_calls.endpoints(),
         }
 
+    def people_routes(self) -> PeopleRoutes:
+        """Return the routes of people, devices and sign-ins."""
+        return PeopleRoutes(
+            self.ways_in,
+            stoppable=self.stoppable,
+            robots=self.titles,
+            tags_of=self.tags_of,
+            ways=self.ways,
+            data=self.data,
+        )
+
     def stoppable(self) -> list[Stoppable]:
         """Return all robots that STOP can stop."""
         return [
@@ -320,6 +336,10 @@ class _Routes:
             for name, each in self.robots.items()
             if each.playback is None and can_move(each.profile.driver)
         ]
+
+    def titles(self) -> dict[str, str]:
+        """Return the titles of all robots, by the name in their URL."""
+        return {name: each.profile.title or name for name, each in self.robots.items()}
 
     def tags_of(self, name: str) -> tuple[str, ...]:
         """Return the tags of a robot; () for an unknown robot."""

@@ -41,6 +41,7 @@ from urc.web.manage.wire import (
     StopResult,
     Url,
 )
+from urc.web.people.api_calls import PEOPLE_CALLS
 from urc.web.serve.replies import Endpoint
 from urc.web.serve.rights import (
     ANYONE,
@@ -433,6 +434,20 @@ CALLS: Final[tuple[Call, ...]] = (
         JobDecision,
         "POST",
         errors=(409, 422),
+    ),
+    # People, devices, programs and sign-ins
+    *(
+        Call(
+            one.name,
+            f"/api/v1/{one.path}",
+            one.right,
+            one.summary,
+            one.answer,
+            one.body,
+            "POST" if one.is_post else "GET",
+            errors=(403, 404, 409, 422, 429, 503),
+        )
+        for one in PEOPLE_CALLS
     ),
 )
 

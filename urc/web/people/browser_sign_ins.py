@@ -1,13 +1,14 @@
 """The end of every way to sign in with a browser: limits, audit entries, and the sign-in itself.
 
-Layer 5. Failed attempts of an address make its next attempts wait. STOP is never affected.
+Layer 5. Failed attempts of an address, or for a name, make the next attempts wait. STOP is never
+affected.
 """
 
 import asyncio
 import math
 import time
-from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
 from functools import wraps
 from typing import Any, Final
 
@@ -17,22 +18,23 @@ from starlette.responses import Response
 from urc.access.control import AccessControl
 from urc.access.directory import Identity, Principal, Way
 from urc.access.grants import AccessError
+from urc.access.lifetimes import PERSON
 from urc.access.pending import place_of
 from urc.access.store import AccessStore
 from urc.access.throttle import Throttle
 from urc.runtime.server_recorder import Actor, ServerRecorder
 from urc.web.serve.access import Access
+from urc.web.serve.browser_name import browser_name
 from urc.web.serve.replies import ApiError, told
 from urc.web.serve.visitor import visitor_of
+from urc.web.words import t
 
-__all__ = [
-    "IDLE_S", "LONGEST_S", "BrowserSignIns", "address_of", "agent_of", "answers_refusals",
-]  # fmt: skip
+__all__ = ["BrowserSignIns", "address_of", "agent_of", "answers_refusals"]
 
-LONGEST_S: Final = 7 * 24 * 3600.0
-"""Longest life of a sign-in in a browser, in seconds."""
-IDLE_S: Final = 12 * 3600.0
-"""Longest time without use of a sign-in in a browser, in seconds."""
+HASHES: Final = 2
+"""Most passphrases that are hashed at the same time; each one takes 64 MiB."""
+MOST_WAITING: Final = 32
+"""Most attempts that wait for a hash."""
 _LONGEST_AGENT: Final = 200
 _Handler = Callable[[Any, Request], Awaitable[Response]]
 
@@ -59,6 +61,8 @@ class BrowserSignIns:
         self.recorder = recorder
         self._throttle = throttle or Throttle()
         self._clock = clock
+        self._hashes = asyncio.Semaphore(HASHES)
+        self._waiting = 0
 
     @property
     def control(self) -> AccessControl:
@@ -70,21 +74,54 @@ class BrowserSignIns:
         """The store of people; raise `ApiError` for a server without one."""
         store = self.control.store
         if store is None:
-            raise ApiError(404, "this server keeps no people")
+            raise ApiError(404, t("This server keeps no people."))
         return store
 
-    def check_wait(self, request: Request) -> None:
-        """Raise `ApiError` 429 while attempts of the request's address must wait."""
-        wait_s = self._throttle.wait_s(self._clock(), place_of(address_of(request)))
+    def check_wait(self, request: Request, *names: str) -> None:
+        """Raise `ApiError` 429 while attempts of the request's address, or for a name, must wait.
+
+        Args:
+            request: the attempt.
+            names: further keys of the attempt, such as the name of the person.
+        """
+        wait_s = self._throttle.wait_s(self._clock(), place_of(address_of(request)), *names)
         if wait_s > 0:
             seconds = math.ceil(wait_s)
-            raise ApiError(429, f"too many attempts from this address: wait {seconds} s")
+            raise ApiError(429, t("Too many attempts: wait {seconds} s.", seconds=seconds))
 
-    def failed(self, request: Request, way: Way, error: AccessError) -> None:
-        """Count a failed attempt, and record it."""
+    def failed(
+        self, request: Request, way: Way, error: AccessError, *names: str, person: str = ""
+    ) -> None:
+        """Count a failed attempt, and record it.
+
+        Args:
+            request: the attempt.
+            way: the way to sign in.
+            error: the reason.
+            names: further keys of the attempt, as for `check_wait`.
+            person: id of the person that was tried; "" for an unknown one.
+        """
         place = address_of(request)
-        self._throttle.failed(self._clock(), place_of(place))
-        self.recorder.sign_in_failed(way, place, str(error))
+        self._throttle.failed(self._clock(), place_of(place), *names)
+        found = self.control.directory.principals.get(person)
+        name = found.name if found else ""
+        self.recorder.sign_in_failed(way, place, str(error), name=name, principal=person)
+
+    def succeeded(self, name: str) -> None:
+        """Forget the failed attempts for a name."""
+        self._throttle.succeeded(name)
+
+    @asynccontextmanager
+    async def hashing(self) -> AsyncIterator[None]:
+        """Wait for one of the few places to hash a passphrase; raise `ApiError` 503 if all wait."""
+        if self._waiting >= MOST_WAITING:
+            raise ApiError(503, t("Too many people sign in at this moment: try again."))
+        self._waiting += 1
+        try:
+            async with self._hashes:
+                yield
+        finally:
+            self._waiting -= 1
 
     async def open(
         self,
@@ -108,19 +145,33 @@ class BrowserSignIns:
             AccessError: the person was removed, or has no role.
         """
         if not person.grants:
-            raise AccessError(f"{person.name!r} has no role here: ask an administrator")
+            raise AccessError(t("{name} has no role here: ask an administrator.", name=person.name))
         now = self.control.now()
-        latest = now + LONGEST_S
+        latest = PERSON.ends_at(now)
+        ends = [one for one in (latest, ends_at) if one is not None]
         _, secret = await asyncio.to_thread(
             self.store.open_sign_in, person.id, way, now=now,
-            ends_at=latest if ends_at is None else min(ends_at, latest), idle_s=IDLE_S,
+            ends_at=min(ends, default=None), idle_s=PERSON.idle_s,
             place=address_of(request), agent=agent_of(request),
         )  # fmt: skip
         await self._end_previous(request)
+        return self.admit(request, response, secret)
+
+    def admit(
+        self, request: Request, response: Response, secret: str, *, is_device: bool = False
+    ) -> Identity:
+        """Store an open sign-in in the browser, and record it.
+
+        Args:
+            request: the request.
+            response: response that gets the cookie.
+            secret: the secret of the sign-in, which the directory has already.
+            is_device: whether it is the key of a paired device, which stays after a sign-out.
+        """
         who = self.control.identify(secret)
         is_secure = request.url.scheme == "https"
         for line in self.access.cookies(
-            secret, request.scope["headers"], is_secure=is_secure, is_kept=True
+            secret, request.scope["headers"], is_secure=is_secure, is_kept=True, is_device=is_device
         ):
             response.headers.append("set-cookie", line)
         self.record(who, address_of(request), agent_of(request))
@@ -164,5 +215,5 @@ def address_of(request: Request) -> str:
 
 
 def agent_of(request: Request) -> str:
-    """Return the browser's own name, cut to a length for lists."""
-    return request.headers.get("user-agent", "")[:_LONGEST_AGENT]
+    """Return browser and system of a request in words, such as “Chrome on Android”."""
+    return browser_name(request.headers.get("user-agent", "")[:_LONGEST_AGENT])

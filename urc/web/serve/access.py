@@ -1,8 +1,9 @@
 """Access over HTTP: the identity of each request, from its cookie or its token, never its address.
 
 Layer 5. The address printed by URC contains the start key. A browser sends the key once, and gets a
-sign-in in a cookie that scripts cannot read. Signed-in people and paired devices have a second
-cookie, which is valid after a restart. A program sends its token with each request.
+sign-in in a cookie that scripts cannot read. Signed-in people and guests have a second cookie,
+which is valid after a restart. A paired device has a third one, which stays when its operator signs
+out. A program sends its token with each request.
 """
 
 import asyncio
@@ -24,7 +25,9 @@ PARAMETER: Final = "key"
 START: Final = "urc-start-"
 """Start of the name of the cookie of the local user."""
 SIGN_IN: Final = "urc-sign-in-"
-"""Start of the name of the cookie of people, devices and guests."""
+"""Start of the name of the cookie of people and guests."""
+DEVICE: Final = "urc-device-"
+"""Start of the name of the cookie of a paired device."""
 SECURE: Final = "__Host-"
 """Start of the names of all cookies over TLS (RFC 6265bis, 4.1.3.2)."""
 OLD_COOKIES: Final = 8
@@ -62,7 +65,9 @@ class Access:
         self.cookie = START + self.instance
         store = self.control.store
         self.sign_in_cookie = SIGN_IN + (store.instance() if store else self.instance)
-        """Name of the cookie of people, devices and guests, without the prefix for TLS."""
+        """Name of the cookie of people and guests, without the prefix for TLS."""
+        self.device_cookie = DEVICE + self.sign_in_cookie.removeprefix(SIGN_IN)
+        """Name of the cookie of a paired device, without the prefix for TLS."""
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
         """Secret path prefix of code for frames; needed because a frame has no origin and therefore
         sends no cookies."""
@@ -106,15 +111,28 @@ class Access:
                 who = self.control.identify(word.strip())
                 is_token = who.way == "token"  # a cookie's secret is no token
                 return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=True)
-        # Programs on other ports of a machine may set cookies of the same name: all are tried.
         known = list(_cookies(pairs))
-        for cookie in (self.cookie, self.sign_in_cookie):
-            for stored, secret in known:
-                if stored.removeprefix(SECURE) == cookie:
-                    who = self.control.identify(secret)
-                    if who != NOBODY and who.way != "token":
-                        return Visitor(self, self._seen(who))
-        return Visitor(self)
+        found = (
+            self._holder(known, one)
+            for one in (self.cookie, self.sign_in_cookie, self.device_cookie)
+        )
+        return Visitor(self, self._seen(next((who for who in found if who != NOBODY), NOBODY)))
+
+    def device(self, headers: _Headers) -> Identity:
+        """Return the paired device of a request, even if a person has signed in on it."""
+        return self._holder(list(_cookies(headers)), self.device_cookie)
+
+    def _holder(self, cookies: Iterable[tuple[str, str]], name: str) -> Identity:
+        """Return the identity of the cookies with a name; or `NOBODY`.
+
+        Programs on other ports of a machine may set cookies of the same name: all are tried.
+        """
+        for stored, secret in cookies:
+            if stored.removeprefix(SECURE) == name:
+                who = self.control.identify(secret)
+                if who != NOBODY and who.way != "token":
+                    return who
+        return NOBODY
 
     def _seen(self, who: Identity) -> Identity:
         if who != NOBODY and not self._is_own(who):
@@ -128,7 +146,13 @@ class Access:
         return secret
 
     def cookies(
-        self, secret: str, headers: _Headers, *, is_secure: bool, is_kept: bool = False
+        self,
+        secret: str,
+        headers: _Headers,
+        *,
+        is_secure: bool,
+        is_kept: bool = False,
+        is_device: bool = False,
     ) -> list[str]:
         """Return the ``Set-Cookie`` headers that store a sign-in in the browser.
 
@@ -138,21 +162,28 @@ class Access:
             is_secure: whether the request came over TLS.
             is_kept: whether the sign-in remains valid after a restart; it replaces the cookie of
                 the local user.
+            is_device: whether it is the key of a paired device, which stays after a sign-out.
         """
         how = _attributes(is_secure=is_secure)
         before = SECURE if is_secure else ""
         known = {name for name, _ in _cookies(headers)}
         if is_kept:
-            kept = [f"{before}{self.sign_in_cookie}={secret}; Max-Age={COOKIE_S}; {how}"]
+            name = self.device_cookie if is_device else self.sign_in_cookie
+            kept = [f"{before}{name}={secret}; Max-Age={COOKIE_S}; {how}"]
             return kept + _deleted(known & {self.cookie, SECURE + self.cookie})
         kept = [f"{before}{self.cookie}={secret}; {how}"]
         old = {one for one in known if one.removeprefix(SECURE).startswith(START)}
         old -= {self.cookie, SECURE + self.cookie}
         return kept + (_deleted(old) if len(old) > OLD_COOKIES else [])
 
-    def forgotten(self, headers: _Headers) -> list[str]:
-        """Return the ``Set-Cookie`` headers that delete the sign-ins of a browser."""
-        ours = {self.cookie, self.sign_in_cookie}
+    def forgotten(self, headers: _Headers, *, is_device: bool = False) -> list[str]:
+        """Return the ``Set-Cookie`` headers that delete the sign-ins of a browser.
+
+        Args:
+            headers: headers of the request.
+            is_device: whether to delete the key of the paired device, too.
+        """
+        ours = {self.cookie, self.sign_in_cookie, *([self.device_cookie] if is_device else [])}
         return _deleted({one for one, _ in _cookies(headers) if one.removeprefix(SECURE) in ours})
 
     # Rights

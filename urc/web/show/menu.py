@@ -38,7 +38,7 @@ class Nav:
 
     current: str
     """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
-    ``audit``, or "" for any other page."""
+    ``audit``, ``people``, ``account``, or "" for any other page."""
     ways: NavigationLinks
 
 

@@ -35,6 +35,7 @@ from urc.web.show.interfaces import (
 )
 from urc.web.show.layout import grid_css
 from urc.web.show.outputs import motion_lines
+from urc.web.show.shown_visitor import shown_visitor
 from urc.web.show.visitor_links import sees_audit
 from urc.web.show.warnings import current_warnings
 
@@ -219,4 +220,5 @@ def _pages() -> Environment:
     pages.globals.update(t=words.t, language=words.language.get, languages=words.LANGUAGES)
     pages.globals["warnings"] = current_warnings.get
     pages.globals["sees_audit"] = sees_audit.get
+    pages.globals["visitor"] = shown_visitor.get
     return pages

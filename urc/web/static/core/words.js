@@ -52,7 +52,7 @@ const SENTENCES = [
   mark("the layout was changed"),
   mark("{name}, before a restart"),
   mark("URC, whose record of the last stop cannot be read"),
-  mark("open the address that URC printed when it started: it has the key"),
+  mark("sign in, or open the address that URC printed when it started"),
   mark("screen {n}"),
   mark("screen {n} at {place}"),
   mark("somebody else"),

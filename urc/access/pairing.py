@@ -1,0 +1,151 @@
+"""Codes that work once: a device pairs, or an invited person chooses a passphrase.
+
+Layer 4. Each function is one transaction: after an error, such as a name that is in use, the code
+stays valid. The functions block for some milliseconds.
+"""
+
+import hashlib
+import json
+from typing import Final, NamedTuple
+
+from urc.access.administration import principal_named, replace_passphrase
+from urc.access.directory import Directory, Principal, SignIn, digest_of
+from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.lifetimes import DEVICE, PERSON
+from urc.access.store import AccessStore, Invitation
+
+__all__ = [
+    "UNKNOWN_CODE",
+    "NewSignIn",
+    "Origin",
+    "check_number",
+    "find",
+    "free_name",
+    "join",
+    "pair",
+]
+
+UNKNOWN_CODE: Final = "this code is unknown, was used already, or is too old"
+
+
+class Origin(NamedTuple):
+    """Origin of a request, for the list of sign-ins."""
+
+    place: str = ""
+    """Network address."""
+    agent: str = ""
+    """Browser and system in words."""
+
+
+UNKNOWN_ORIGIN: Final = Origin()
+
+
+class NewSignIn(NamedTuple):
+    """A sign-in that has just begun."""
+
+    principal: Principal
+    sign_in: SignIn
+    secret: str
+
+
+def find(store: AccessStore, code: str, now: float) -> Invitation | None:
+    """Return the invitation of a code, which stays valid; None if the code is unknown or too old.
+
+    Args:
+        store: the store.
+        code: the code.
+        now: UTC time in seconds since 1970.
+    """
+    with store.transaction() as base:
+        row = base.execute(
+            "SELECT kind, name, grants, owner, ends_at FROM invitations"
+            " WHERE digest = ? AND ends_at > ?",
+            (digest_of(code), now),
+        ).fetchone()
+    if row is None:
+        return None
+    kind, name, grants, owner, ends_at = row
+    return Invitation(kind, name, _parsed(grants), owner, ends_at)
+
+
+def pair(
+    store: AccessStore, code: str, name: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
+) -> NewSignIn:
+    """Make a device of the code's invitation, and open its sign-in, which is its key.
+
+    Args:
+        store: the store.
+        code: the code.
+        name: name that was chosen on the device; the invitation's own name comes first.
+        now: UTC time in seconds since 1970.
+        origin: origin of the request.
+
+    Raises:
+        AccessError: the code is unknown, or the name is invalid or in use.
+    """
+    with store.transaction():
+        invitation = _redeemed(store, code, now, "device")
+        wanted = invitation.name or name
+        device = store.add("device", wanted, invitation.grants, now=now, owner=invitation.owner)
+        sign_in, secret = store.open_sign_in(
+            device.id, "pairing", now=now, ends_at=DEVICE.ends_at(now), idle_s=DEVICE.idle_s,
+            place=origin.place, agent=origin.agent,
+        )  # fmt: skip
+    return NewSignIn(device, sign_in, secret)
+
+
+def join(
+    store: AccessStore, code: str, kept: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
+) -> NewSignIn:
+    """Set the passphrase of an invited person, and sign the person in.
+
+    Args:
+        store: the store.
+        code: the code of the invitation.
+        kept: hash of the passphrase.
+        now: UTC time in seconds since 1970.
+        origin: origin of the request.
+
+    Raises:
+        AccessError: the code is unknown, or the person was removed.
+    """
+    with store.transaction():
+        invitation = _redeemed(store, code, now, "person")
+        person = store.directory().principals.get(invitation.owner)
+        if person is None:
+            raise AccessError("that person was removed")
+        replace_passphrase(store, person.id, kept)
+        sign_in, secret = store.open_sign_in(
+            person.id, "passphrase", now=now, ends_at=PERSON.ends_at(now), idle_s=PERSON.idle_s,
+            place=origin.place, agent=origin.agent,
+        )  # fmt: skip
+    return NewSignIn(person, sign_in, secret)
+
+
+def check_number(sign_in: SignIn) -> str:
+    """Return four digits that both screens show after a pairing, such as ``47 19``.
+
+    A person compares them by eye: another device that used the code first has other digits.
+    """
+    number = int.from_bytes(hashlib.sha256(b"urc pairing " + sign_in.digest).digest()[:4], "big")
+    return f"{number // 100 % 100:02} {number % 100:02}"
+
+
+def free_name(directory: Directory, wanted: str) -> str:
+    """Return `wanted`, or a similar name if a device has it already, such as ``Phone 2``."""
+    number, name = 1, wanted
+    while principal_named(directory, "device", name) is not None:
+        number += 1
+        name = f"{wanted} {number}"
+    return name
+
+
+def _redeemed(store: AccessStore, code: str, now: float, kind: str) -> Invitation:
+    found = find(store, code, now)
+    if found is None or found.kind != kind or store.redeem(code, now) is None:
+        raise AccessError(UNKNOWN_CODE)
+    return found
+
+
+def _parsed(texts: str) -> tuple[Grant, ...]:
+    return tuple(parse_grant(each) for each in json.loads(texts))

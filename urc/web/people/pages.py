@@ -1,0 +1,98 @@
+"""The administrator's page of people and devices, and the page of one's own account.
+
+Layer 5. The modules of the pages fetch all data; the pages themselves contain none of it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from urc.web.serve.rights import ADMINISTER, SIGNED_IN, ProtectedRoute
+from urc.web.show.menu import Nav, NavigationLinks
+from urc.web.show.pages import PageHead, render
+from urc.web.words import t
+
+__all__ = ["AccountPage", "PeoplePage", "PeoplePages", "Scope"]
+
+_NO_STORE: Final = {"cache-control": "no-store"}
+
+
+class Scope(NamedTuple):
+    """A choice of robots for a role."""
+
+    value: str
+    """End of a grant: "", ``@cart`` or ``@#lab``."""
+    title: str
+
+
+@dataclass(frozen=True, slots=True)
+class PeoplePage:
+    """Context of ``people.html.j2``."""
+
+    head: PageHead
+    nav: Nav
+    scopes: tuple[Scope, ...]
+    robots: tuple[Scope, ...]
+    """The robots alone; the value is the name in URLs."""
+
+
+@dataclass(frozen=True, slots=True)
+class AccountPage:
+    """Context of ``account.html.j2``."""
+
+    head: PageHead
+    nav: Nav
+
+
+class PeoplePages:
+    """The routes of the pages."""
+
+    def __init__(
+        self,
+        ways: NavigationLinks,
+        robots: Callable[[], Mapping[str, str]],
+        tags_of: Callable[[str], tuple[str, ...]],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            ways: navigation links of this server.
+            robots: function that returns the titles of all robots, by name in URLs.
+            tags_of: function that returns the tags of a robot.
+        """
+        self._ways = ways
+        self._robots = robots
+        self._tags_of = tags_of
+
+    def routes(self) -> list[ProtectedRoute]:
+        """Return the routes."""
+        return [
+            ProtectedRoute("/people", self.people, ADMINISTER),
+            ProtectedRoute("/account", self.account, SIGNED_IN),
+        ]
+
+    async def people(self, request: Request) -> Response:
+        """Show the administrator's page."""
+        robots = self._robots()
+        tags = sorted({tag for name in robots for tag in self._tags_of(name)})
+        scopes = (
+            Scope("", t("all robots")),
+            *(Scope(f"@{name}", title) for name, title in robots.items()),
+            *(Scope(f"@#{tag}", t("robots with the tag {tag}", tag=tag)) for tag in tags),
+        )
+        page = PeoplePage(
+            PageHead(request.state.nonce, t("People")),
+            Nav("people", self._ways),
+            scopes,
+            tuple(Scope(name, title) for name, title in robots.items()),
+        )
+        return HTMLResponse(render("people.html.j2", page), headers=_NO_STORE)
+
+    async def account(self, request: Request) -> Response:
+        """Show the page of the visitor's own account."""
+        head = PageHead(request.state.nonce, t("Your account"))
+        html = render("account.html.j2", AccountPage(head, Nav("account", self._ways)))
+        return HTMLResponse(html, headers=_NO_STORE)

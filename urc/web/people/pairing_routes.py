@@ -1,0 +1,174 @@
+"""Routes of codes that work once: a device pairs, or an invited person chooses a passphrase.
+
+Layer 5. The code is in the fragment of the page's address, so no log of a server contains it. The
+page sends the code in a body. A code has 128 random bits, and attempts are limited all the same.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Final
+from urllib.parse import quote
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.access.grants import AccessError
+from urc.access.pairing import UNKNOWN_CODE, Origin, check_number, find, free_name, join, pair
+from urc.access.passphrases import hash_of
+from urc.access.store import Invitation, parse_name
+from urc.web.people.browser_sign_ins import BrowserSignIns, address_of, agent_of, answers_refusals
+from urc.web.people.messages import (
+    CodeInfo,
+    CodeRequest,
+    JoinRequest,
+    PairRequest,
+    PairResult,
+    RobotLink,
+    SignInResult,
+)
+from urc.web.people.pairings import Pairings
+from urc.web.serve.actors import actor_of
+from urc.web.serve.replies import ApiError, Endpoint, answer, body_of
+from urc.web.serve.rights import WATCH
+from urc.web.serve.visitor import Visitor
+from urc.web.words import t
+
+__all__ = ["PairingRoutes"]
+
+MOST_LINKS: Final = 8
+"""Most robots that the page of a new device lists; with more, it links to the menu."""
+
+
+class PairingRoutes:
+    """The routes for new devices and invited people."""
+
+    def __init__(
+        self,
+        sign_ins: BrowserSignIns,
+        pairings: Pairings,
+        robots: Callable[[], Mapping[str, str]],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            sign_ins: the sign-ins of all browsers.
+            pairings: the codes that administrators wait for.
+            robots: function that returns the titles of all robots, by name in URLs.
+        """
+        self._sign_ins = sign_ins
+        self._pairings = pairings
+        self._robots = robots
+
+    def endpoints(self) -> dict[str, Endpoint]:
+        """Return the endpoints, by the name of their call."""
+        return {
+            "codes": self.look,
+            "pair": self.pair,
+            "join": self.join,
+        }
+
+    @answers_refusals
+    async def look(self, request: Request) -> Response:
+        """Return the right that a code gives; the code stays valid."""
+        said = await body_of(request, CodeRequest)
+        found = await self._invitation(request, said.code)
+        directory = self._sign_ins.control.directory
+        owner = directory.principals.get(found.owner)
+        is_device = found.kind == "device"
+        grants = owner.grants if owner is not None else found.grants
+        return answer(
+            CodeInfo(
+                kind=found.kind,
+                name=found.name if is_device or owner is None else owner.name,
+                suggested=free_name(directory, agent_of(request) or "Browser"),
+                owner=owner.name if owner is not None and is_device else "",
+                roles=tuple(map(str, grants)),
+                ends_at=found.ends_at,
+            )
+        )
+
+    @answers_refusals
+    async def pair(self, request: Request) -> Response:
+        """Make this browser a device with a key of its own."""
+        sign_ins = self._sign_ins
+        said = await body_of(request, PairRequest)
+        found = await self._invitation(request, said.code)
+        name = found.name or _valid(said.name)
+        begun = await asyncio.to_thread(
+            pair,
+            sign_ins.store,
+            said.code,
+            name,
+            now=sign_ins.control.now(),
+            origin=_origin(request),
+        )
+        await sign_ins.control.reload()
+        robots = self._links(begun.secret)
+        done = answer(PairResult(begun.principal.name, check_number(begun.sign_in), robots))
+        sign_ins.admit(request, done, begun.secret, is_device=True)
+        self._pairings.paired(said.code, begun)
+        sign_ins.recorder.paired(
+            actor_of(request), "code used", name=begun.principal.name, device=begun.principal.id
+        )
+        return done
+
+    @answers_refusals
+    async def join(self, request: Request) -> Response:
+        """Set the passphrase of an invited person, who is signed in then."""
+        sign_ins = self._sign_ins
+        said = await body_of(request, JoinRequest)
+        found = await self._invitation(request, said.code)
+        person = sign_ins.control.directory.principals.get(found.owner)
+        if found.kind != "person" or person is None:
+            raise ApiError(403, t("This code is unknown, was used already, or is too old."))
+        try:
+            async with sign_ins.hashing():
+                kept = await asyncio.to_thread(hash_of, said.passphrase, name=person.name)
+        except AccessError as error:
+            raise ApiError(422, str(error)) from None
+        begun = await asyncio.to_thread(
+            join,
+            sign_ins.store,
+            said.code,
+            kept,
+            now=sign_ins.control.now(),
+            origin=_origin(request),
+        )
+        await sign_ins.control.reload()
+        done = answer(SignInResult(person.name))
+        who = sign_ins.admit(request, done, begun.secret)
+        actor = actor_of(request)._replace(name=who.name, principal=who.principal, kind="person")
+        sign_ins.recorder.access_changed(actor, "people join", name=person.name)
+        return done
+
+    async def _invitation(self, request: Request, code: str) -> Invitation:
+        """Return the invitation of a code; count and report an unknown code."""
+        sign_ins = self._sign_ins
+        sign_ins.check_wait(request)
+        found = await asyncio.to_thread(find, sign_ins.store, code, sign_ins.control.now())
+        if found is None:
+            sign_ins.failed(request, "pairing", AccessError(UNKNOWN_CODE))
+            raise ApiError(403, t("This code is unknown, was used already, or is too old."))
+        return found
+
+    def _links(self, secret: str) -> tuple[RobotLink, ...]:
+        """Return the robots that the holder of a new sign-in may open; () for many robots."""
+        access = self._sign_ins.access
+        visitor = Visitor(access, access.control.identify(secret))
+        found = [
+            RobotLink(title, f"/robots/{quote(name, safe='')}/")
+            for name, title in self._robots().items()
+            if visitor.may(WATCH, name)
+        ]
+        return tuple(found) if len(found) <= MOST_LINKS else ()
+
+
+def _valid(name: str) -> str:
+    try:
+        return parse_name(name)
+    except AccessError as error:
+        raise ApiError(422, str(error)) from None
+
+
+def _origin(request: Request) -> Origin:
+    return Origin(address_of(request), agent_of(request))

@@ -1,0 +1,42 @@
+"""The name of a browser and its system, for lists of sign-ins.
+
+Layer 5. Pure. The name is what the browser says about itself, so it proves nothing.
+"""
+
+from typing import Final
+
+__all__ = ["browser_name"]
+
+# The first match counts: most browsers also name the browsers that they resemble.
+_BROWSERS: Final = (
+    ("Edg", "Edge"),
+    ("OPR/", "Opera"),
+    ("SamsungBrowser", "Samsung Internet"),
+    ("Firefox/", "Firefox"),
+    ("FxiOS", "Firefox"),
+    ("CriOS", "Chrome"),
+    ("Chrome/", "Chrome"),
+    ("Safari/", "Safari"),
+    ("curl/", "curl"),
+    ("python", "Python"),
+)
+_SYSTEMS: Final = (
+    ("iPhone", "iPhone"),
+    ("iPad", "iPad"),
+    ("Android", "Android"),
+    ("CrOS", "ChromeOS"),
+    ("Windows", "Windows"),
+    ("Mac OS X", "macOS"),
+    ("Linux", "Linux"),
+)
+
+
+def browser_name(agent: str) -> str:
+    """Return browser and system in words, such as “Chrome on Android”; "" if both are unknown.
+
+    Args:
+        agent: the ``User-Agent`` header.
+    """
+    browser = next((name for mark, name in _BROWSERS if mark in agent), "")
+    system = next((name for mark, name in _SYSTEMS if mark in agent), "")
+    return f"{browser} on {system}" if browser and system else browser or system
