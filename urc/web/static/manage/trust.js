@@ -56,7 +56,7 @@ function features(isKept) {
   return [
     encryption(),
     feature(t("Tilt sensors"), isSecureContext && "DeviceOrientationEvent" in globalThis),
-    feature(t("Gamepad"), isSecureContext && "getGamepads" in navigator),
+    feature(t("Gamepad"), "getGamepads" in navigator),
     feature(t("Screen stays on"), "wakeLock" in navigator),
     feature(t("Clipboard"), "clipboard" in navigator),
     feature(t("Installing as an app"), isKept, hasWorkers ? t(NEEDS_TRUST) : ""),
