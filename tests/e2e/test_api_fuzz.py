@@ -3,7 +3,6 @@
 ``URC_THOROUGH=1`` tries many more requests.
 """
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -15,7 +14,7 @@ from tests.e2e.processes import UrcProcess
 from tests.effort import IS_THOROUGH, examples
 
 OPERATIONS: Final[dict[str, Any]] = dict(operations())
-EACH: Final = 60 if IS_THOROUGH else 3
+EACH: Final = 60 if IS_THOROUGH else 2
 """Requests of each kind and call from one visitor."""
 VISITORS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "nobody": ((), ()),
@@ -73,21 +72,30 @@ def test_no_request_of_an_administrator_breaks_the_server(
     assert is_sound(server)
 
 
-@pytest.mark.parametrize("who", VISITORS)
-def test_no_visitor_gets_an_answer_beyond_its_right(who: str, server: ApiServer) -> None:
-    """Every call, by every kind of visitor."""
-    grants, commands = VISITORS[who]
-    headers = {}
-    if who != "nobody":
+@pytest.fixture(scope="module")
+def visitors(server: ApiServer) -> dict[str, FuzzVisitor]:
+    """All visitors, with their tokens."""
+    found = {}
+    for who, (grants, commands) in VISITORS.items():
+        if who == "nobody":
+            found[who] = FuzzVisitor({})
+            continue
         program, token = server.token(*grants, commands=commands, is_known=bool(grants))
         headers = {"authorization": f"Bearer {token}"}
+        found[who] = FuzzVisitor(headers, grants, commands)
         if who == "a removed token":
             server.remove(program, token)
-            grants = ()
-    visitor = FuzzVisitor(headers, grants, commands)
-    statuses: Counter[int] = Counter()
-    for name, operation in OPERATIONS.items():
-        statuses += fuzzed(name, operation, server.address.rstrip("/"), visitor, EACH)
-    assert sum(statuses.values()) > len(OPERATIONS)
-    assert statuses[401] + statuses[403] > 0
+            found[who] = FuzzVisitor(headers)
+    return found
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+@pytest.mark.parametrize("who", VISITORS)
+def test_no_visitor_gets_an_answer_beyond_its_right(
+    who: str, name: str, server: ApiServer, visitors: dict[str, FuzzVisitor]
+) -> None:
+    """Every call, by every kind of visitor."""
+    address = server.address.rstrip("/")
+    statuses = fuzzed(name, OPERATIONS[name], address, visitors[who], EACH)
+    assert sum(statuses.values()) >= 1
     assert is_sound(server)
