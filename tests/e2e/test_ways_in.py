@@ -62,7 +62,7 @@ async def stranger(page: Page, address: str) -> None:
     await page.goto(f"{address}static/favicon.svg")  # the page hands in the start key by itself
     await page.context.clear_cookies()
     await page.goto(address)
-    await expect(page.locator("h1")).to_have_text("Open the printed address")
+    await expect(page.locator("h1")).to_have_text("Sign in")
 
 
 def is_refused(text: str) -> bool:
@@ -85,26 +85,37 @@ async def test_a_passkey_is_added_and_signs_in(
     await page.goto(address)
     session, phone = await with_authenticator(page)
     assert await call(page, "obstacle()") == ""
-    made = await call(page, "addPasskey('Ann’s phone')")
-    assert isinstance(made, dict), made
-    assert (made["name"], made["host"]) == ("Ann’s phone", "localhost")
-    again = await call(page, "addPasskey('again')")
-    assert again == "This device has a passkey already."
+    await page.goto(f"{address}account")
+    part = page.locator("[data-passkeys]")
+    await expect(part).to_contain_text("No passkeys yet.")
+    await part.get_by_label("Name of the new passkey").fill("Ann’s phone")
+    await part.get_by_role("button", name="Add a passkey").click()
+    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey is added.")
+    await expect(part.get_by_label("Name of the passkey")).to_have_value("Ann’s phone")
+    await expect(part.locator(".urc-row")).to_contain_text("localhost")
+    await part.get_by_role("button", name="Add a passkey").click()
+    already = "This device has a passkey already."
+    await expect(page.locator("[data-said]")).to_contain_text(already)
     found = await session.send("WebAuthn.getCredentials", {"authenticatorId": phone})
     (kept,) = found["credentials"]
     assert (kept["isResidentCredential"], kept["rpId"]) == (True, "localhost")
 
     await stranger(page, address)
-    assert await call(page, "signInWithPasskey()") == "Ann"
-    await page.goto(address)
+    await page.get_by_role("button", name="Sign in with a passkey").click()
     await expect(page.get_by_role("link", name="Tello").first).to_be_visible()
-    (line,) = await call(page, "ownPasskeys()")  # type: ignore[misc]
-    assert line["used_at"] > line["created_at"]
 
-    assert await call(page, f"removePasskey({json.dumps(line['id'])})") == []
+    await page.goto(f"{address}account")
+    await expect(part.locator(".urc-row")).to_contain_text("last use")
+    await part.get_by_label("Name of the passkey").fill("Old phone")
+    await part.get_by_label("Name of the passkey").press("Enter")
+    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey has a new name.")
+    await part.get_by_role("button", name="Remove Old phone").click()
+    await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
+    await expect(part).to_contain_text("No passkeys yet.")
     await stranger(page, address)
-    refused = await call(page, "signInWithPasskey()")
-    assert refused == "this server does not know the passkey: it may have been removed"
+    await page.get_by_role("button", name="Sign in with a passkey").click()
+    refused = "this server does not know the passkey: it may have been removed"
+    await expect(page.locator("[data-way-said]")).to_contain_text(refused)
 
 
 async def test_a_copied_passkey_is_refused(
@@ -222,7 +233,7 @@ async def test_an_account_of_a_provider_signs_in(
 
         async def sign_in(name: str) -> None:
             await stranger(page, address)
-            await call(page, "signInWithProvider()")
+            await page.get_by_role("button", name="Sign in with Lab").click()
             await page.wait_for_url(f"{issuer}/**")
             await page.get_by_role("button", name=name).click()
 
@@ -242,7 +253,7 @@ async def test_an_account_of_a_provider_signs_in(
         await sign_in("18")
         await expect(page.locator(".urc-fault")).to_contain_text("'eve' has no role here")
         await page.get_by_role("link", name="Back to the sign-in").click()
-        await expect(page.locator("h1")).to_have_text("Open the printed address")
+        await expect(page.locator("h1")).to_have_text("Sign in")
 
 
 def test_a_proxy_names_people_by_its_secret(urc_process: Start, tmp_path: Path) -> None:

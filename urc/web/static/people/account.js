@@ -6,12 +6,14 @@ import { t } from "../core/words.js";
 import { part } from "../live/badge.js";
 import { rolesText, sayer } from "./code.js";
 import { PeopleDialog } from "./dialogs.js";
+import { passkeysPart } from "./passkeys.js";
 import { principalRow, quiet, signInRow } from "./rows.js";
 
 const root = part(document, "[data-account]");
 const say = sayer(root);
 const dialog = new PeopleDialog(/** @type {HTMLDialogElement} */ (part(root, "[data-dialog]")));
 const change = /** @type {HTMLFormElement} */ (part(root, "[data-change]"));
+const passkeys = part(root, "[data-passkeys]");
 const out = /** @type {HTMLButtonElement} */ (part(root, "[data-out]"));
 
 async function refresh() {
@@ -28,7 +30,7 @@ async function refresh() {
   part(root, "[data-shift]").hidden = !isPerson && account.kind !== "device";
   part(root, "[data-passphrase]").hidden = !isPerson;
   part(root, "[data-current]").hidden = !account.hasPassphrase;
-  part(root, "[data-passkeys]").dataset["isPerson"] = String(isPerson);
+  if (isPerson && passkeys.hidden) passkeysPart(passkeys, dialog, say);
   part(root, "[data-devices]").hidden = !isPerson;
   /** @type {import("./rows.js").Principal[]} */
   const devices = account.devices;

@@ -1,5 +1,5 @@
 // @ts-check
-/** The sign-in with name and passphrase, or with an identity provider. */
+/** The sign-in with name and passphrase. */
 import { ask, reason } from "../core/api_client.js";
 import { ready } from "../core/dom.js";
 import { t } from "../core/words.js";
@@ -42,10 +42,4 @@ form.addEventListener("submit", (event) => {
   event.preventDefault();
   void signIn();
 });
-document.querySelector("[data-provider]")?.addEventListener("click", () => {
-  ask("/sign-in/oidc", {}).then(
-    ({ url }) => location.assign(url),
-    (error) => say(reason(error), "bad"),
-  );
-});
-ready(document);
+ready(form);
