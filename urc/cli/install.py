@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         change.commit(plan)
     if lock_file is not None and pinned is None:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
-    audit_packages("install", [plan.lock])
+    audit_packages("install", plan.told)
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
         print(f"{used} remains in use; the settings of the robot select the version")

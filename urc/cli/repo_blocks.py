@@ -4,12 +4,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
 
 if TYPE_CHECKING:
     from urc.packages.block_store import BlockStore
     from urc.packages.blocks import Block, BlockFile
     from urc.packages.index_head import IndexSigner
+
+_AUDITED_MOST = 20
+"""Maximum number of entries of a list in the audit log."""
 
 __all__ = ["block", "blocks", "unblock"]
 
@@ -76,6 +80,7 @@ def blocks(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
             _export(Path(folder), Path(file), codec)
         case ["forget", key]:
             known.forget(key.rstrip("="))
+            audit_packages("blocks forget", [key])
             print(
                 f"forgot the block lists of {key}; a repository with this key sends its list again"
             )
@@ -103,7 +108,9 @@ def _import(known: "BlockStore", file: Path, fingerprint: str) -> None:
         found = read_block_file(opened.read(BLOCK_FILE_BYTES + 1), str(file))
     _check_trust(known, found, file, fingerprint.rstrip("="))
     known.keep(found.signature, found.number, found.listed, str(file.resolve()))
-    count = len(found.listed.blocks)
+    subjects = [one.subject for one in found.listed.blocks]
+    audit_packages("blocks import", [str(found.signature), *subjects[:_AUDITED_MOST]])
+    count = len(subjects)
     print(printable(f"{file}: {count} blocked packages, signed by {found.signature}"))
     _tell_hits()
 

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
 
 __all__ = ["key", "unsigned"]
@@ -31,6 +32,7 @@ def key(arguments: argparse.Namespace) -> int:
         case ["forget", name]:
             with open_store().changing() as change:
                 change.forget_key(parse_key(name))
+            audit_packages("key forget", [name])
             print(f"deleted the pinned key of {name}; the next installation pins a new key")
         case _:
             raise Misuse("expected 'urc repo key' with new NAME, show, list or forget PACKAGE")
@@ -46,10 +48,12 @@ def unsigned(arguments: argparse.Namespace) -> int:
         case ["add", name]:
             with open_store().changing() as change:
                 change.waive(parse_key(name))
+            audit_packages("unsigned add", [name])
             print(f"{name} is accepted without a signature, until a signed version is installed")
         case ["remove", name]:
             with open_store().changing() as change:
                 change.end_waiver(parse_key(name))
+            audit_packages("unsigned remove", [name])
             print(f"{name} requires a signature again")
         case ["list"]:
             for name in open_store().state().waived:

@@ -101,7 +101,7 @@ def _update(
             print(f"{old} stays")
             return False
         change.replace(old, plan)
-    audit_packages("update", [plan.lock])
+    audit_packages("update", plan.told)
     print(f"updated {old.root} to {plan.lock.version}; undo with 'urc update --back {old.root}'")
     return True
 

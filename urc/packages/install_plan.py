@@ -27,3 +27,15 @@ class InstallPlan(NamedTuple):
     """Packages that the user accepts without a signature in this installation."""
     remarks: Mapping[str, str] = {}
     """Remarks of repositories about withdrawals and origins, by digest."""
+
+    @property
+    def told(self) -> list[str]:
+        """The package with its version, and each package without a signature, for the audit log."""
+        return [
+            str(self.lock),
+            *(
+                f"{name} {pin.version} without a signature"
+                for name, pin in self.lock.packages.items()
+                if name in self.waived and pin.sha256 not in self.signatures
+            ),
+        ]

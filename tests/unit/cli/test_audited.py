@@ -5,7 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.packages.made import package
 from urc.cli.audited import audit_access, audit_packages
+from urc.cli.main import main
+from urc.packages.blocks import Block, BlockList, sign_blocks
+from urc.packages.index_head import IndexSigner
+from urc.packages.signature import new_signer
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_check import check
 from urc.runtime.audit_entry import AuditEntry
@@ -50,3 +55,33 @@ def test_log_that_cannot_be_written_is_told(file: Path, capsys: pytest.CaptureFi
     file.mkdir()
     audit_packages("remove", ["drivers/puppet 1.0.0"])
     assert capsys.readouterr().err.startswith("urc: the audit log has no entry about this: ")
+
+
+def test_each_change_of_trust_is_recorded(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Waivers and block lists decide about the packages that may move a robot."""
+    monkeypatch.setenv("URC_DATA_DIR", str(tmp_path))
+    maintainer = new_signer("Anna", tmp_path / "anna.pem")
+    listed = BlockList("0" * 32, (Block("It turns the wrong way.", "drivers/rover"),))
+    (tmp_path / "blocked.json").write_bytes(
+        sign_blocks(listed, 1, IndexSigner(maintainer)).to_bytes()
+    )
+    bundle = tmp_path / "dial.zip"
+    bundle.write_bytes(package("widget", "dial").data)
+    for words in (
+        ("repo", "unsigned", "add", "widgets/lamp"),
+        ("repo", "unsigned", "remove", "widgets/lamp"),
+        ("repo", "blocks", "import", str(tmp_path / "blocked.json"),
+         "--signed-by", maintainer.fingerprint),
+        ("repo", "blocks", "forget", maintainer.fingerprint),
+        ("install", str(bundle), "--yes", "--allow-unsigned", "dial"),
+    ):  # fmt: skip
+        assert main(words) == 0
+    assert [(one.command, json.loads(one.arguments)["packages"]) for one in entries_of(file)] == [
+        ("unsigned add", ["widgets/lamp"]),
+        ("unsigned remove", ["widgets/lamp"]),
+        ("blocks import", [str(maintainer), "drivers/rover"]),
+        ("blocks forget", [maintainer.fingerprint]),
+        ("install", ["widgets/dial 1.0.0", "widgets/dial 1.0.0 without a signature"]),
+    ]

@@ -220,7 +220,7 @@ class Jobs:
         else:
             job.state = "done"
             job.line = phrase("installed {package}", package=planned.plan.lock)
-        job.planned = planned._replace(plan=planned.plan._replace(archives={}))
+        job.planned = planned._replace(plan=plan._replace(archives={}))
         return job
 
     async def planned(self) -> Job | None:

@@ -288,7 +288,7 @@ class ManageRoutes:
         )
         if job.planned is not None:
             command = "install" if job.planned.old is None else "update"
-            self._record(request, command, [str(job.planned.plan.lock)], job.state)
+            self._record(request, command, job.planned.plan.told, job.state)
         return answer(job.news())
 
     @_api
