@@ -263,8 +263,10 @@ async def test_new_keys_are_fetched_at_most_once_a_minute(provider: FakeProvider
 
 async def test_claims_of_the_account_complete_the_token(provider: FakeProvider) -> None:
     del provider.claims["groups"]
-    provider.more = {"sub": "17", "groups": ["drivers"], "nonce": "x"}
-    assert (await House(provider).account()).grants == (Grant("drive"),)
+    provider.more = {"sub": "17", "groups": ["drivers"], "preferred_username": "eve"}
+    account = await House(provider).account()
+    assert account.grants == (Grant("drive"),)
+    assert account.name == "ann", "signed claims count more"
     provider.more["sub"] = "18"
     assert (await House(provider).account()).grants == ()
 
