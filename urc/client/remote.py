@@ -304,7 +304,7 @@ class RemoteRobot(HubReadings):
             case ProgressMessage():
                 for progress in progress_of(message):
                     self.hub.set_progress(progress)
-            case ErrorMessage():
+            case ErrorMessage(code="bad-message"):  # other errors repeat the reason for closing
                 log.warning("%s: %s", self._address.url, message.message)
             case _ if isinstance(message, ControlMessage):
                 self.motion.handle(message)

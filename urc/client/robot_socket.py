@@ -195,7 +195,10 @@ class RobotSocket:
     def _closed(self, line: ClientConnection) -> ConnectionLost:
         code, reason = line.close_code, printable(line.close_reason or "")
         if code == CLOSE_NOT_LET_IN:
-            return AccessDenied(reason or "the server does not accept the token")
+            # The server's own text is for people with a browser.
+            return AccessDenied(
+                f"{self.address.url} does not accept the token: it is unknown, removed or over"
+            )
         fault = ConnectionLost(self._final or reason or "the server closed the connection")
         fault.is_final = bool(self._final) or code in _FOR_GOOD
         return fault
