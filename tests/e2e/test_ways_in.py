@@ -14,6 +14,7 @@ from urllib.request import Request, urlopen
 import pytest
 from playwright.async_api import Browser, CDPSession, Page, expect
 
+from tests.e2e.axe import faults, prepare
 from tests.e2e.command_line import TIMEOUT_S
 from tests.e2e.conftest import PageMaker
 from tests.e2e.keys import signed_in
@@ -116,6 +117,29 @@ async def test_a_passkey_is_added_and_signs_in(
     await page.get_by_role("button", name="Sign in with a passkey").click()
     refused = "this server does not know the passkey: it may have been removed"
     await expect(page.locator("[data-way-said]")).to_contain_text(refused)
+
+
+@pytest.mark.needs("axe")
+async def test_passkeys_are_usable_without_sight_or_pointer(
+    urc_process: Start, tmp_path: Path, new_page: PageMaker
+) -> None:
+    address = start(urc_process, tmp_path)
+    page = await prepare(await new_page("phone"))
+    new_page.allow(page, is_refused)
+    await signed_in(page.context, address, tmp_path, "Ann", "watch")
+    await page.goto(f"{address}account")
+    await with_authenticator(page)
+    name = page.get_by_label("Name of the new passkey")
+    await name.fill("")
+    await name.press("Enter")
+    await expect(page.locator("[data-said]")).to_contain_text("Enter a name for the passkey.")
+    await expect(name).to_be_focused()
+    await name.fill("phone")
+    await name.press("Enter")
+    await expect(page.get_by_label("Name of the passkey")).to_have_value("phone")
+    assert await faults(page) == []
+    await stranger(page, address)
+    assert await faults(page) == []
 
 
 async def test_a_copied_passkey_is_refused(
