@@ -129,6 +129,37 @@ async def filled(server: PeopleServer) -> None:
     await server.add("Käthe Müller-Lüdenscheidt von Hohenfels", "drive@#lab", "watch")
 
 
+async def test_a_shared_tablet_changes_its_operator_in_two_taps(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """The sign-in page opens with two taps; the robot stops, and the next person drives."""
+    tablet = await new_page(size="tablet")
+    new_page.allow(tablet, is_refusal)
+    wire = Wire(lease_s=CALM_LEASE_S)
+    async with people_server(tmp_path, wire) as server:
+        for name in ("Ann", "Ben"):
+            await server.add(name, "drive", passphrase=PASSPHRASE)
+        url = f"{server.address}robots/puppet/"
+        await tablet.goto(url)
+        await sign_in(tablet, "Ann")
+        await tablet.locator("[data-verb=take]").tap()
+        controls = tablet.locator("[data-controls]")
+        await expect(controls).to_have_attribute("data-state", "mine")
+
+        await tablet.get_by_role("button", name="This device").tap()
+        await tablet.locator("[data-change-operator]").tap()
+        await sign_in(tablet, "Ben")
+        await tablet.wait_for_url(url)
+        await tablet.locator("[data-verb=take]").tap()
+        await expect(controls).to_have_attribute("data-state", "mine")
+        names = {
+            server.access.control.directory.principals[one.principal].name
+            for one in server.access.control.directory.sign_ins.values()
+            if one.way == "passphrase"
+        }
+        assert names == {"Ben"}
+
+
 @pytest.mark.needs("axe")
 @pytest.mark.parametrize("size", ["phone", "desktop"])
 async def test_the_pages_have_no_faults_of_accessibility(

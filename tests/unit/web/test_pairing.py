@@ -162,6 +162,20 @@ def test_a_guest_watches_one_robot_until_the_link_ends(door: Door) -> None:
         assert guest.get("/robots/puppet/").status_code == 401
 
 
+def test_a_guest_who_signs_out_ends_the_link_for_no_other_guest(door: Door) -> None:
+    with door.browser(cookies=door.signed_in("Ann", "administer")) as admin:
+        _, made = post(admin, "guests/add", name="Visitors", robot="puppet", hours=1)
+        secret = made["link"].partition("#")[2]
+        first, second = door.other(admin), door.other(admin)
+        for guest in (first, second):
+            assert post(guest, "guest", code=secret)[0] == 200
+        (shared,) = first.get("/api/v1/account").json()["signIns"]
+        assert post(first, "account/sign-ins/end", id=shared["id"])[0] == 409
+        assert post(first, "sign-out")[0] == 200
+        assert first.get("/robots/puppet/").status_code == 401
+        assert second.get("/robots/puppet/").status_code == 200
+
+
 def test_a_secret_of_a_sign_in_is_no_guest_link(door: Door) -> None:
     cookies = door.signed_in("Ann", "administer")
     with door.browser() as browser:

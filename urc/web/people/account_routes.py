@@ -165,6 +165,8 @@ class AccountRoutes:
     async def end(self, request: Request) -> Response:
         """End a sign-in of the visitor."""
         said = await body_of(request, SignInChoice)
+        if visitor_of(request).identity.kind == "guest":
+            raise ApiError(409, t("Other guests may use the same link."))
         found = self._control.directory.sign_ins.get(said.id)
         if found is None or found.principal not in self._own(visitor_of(request).identity):
             raise ApiError(404, t("This sign-in has ended already."))

@@ -70,6 +70,8 @@ class RobotPage:
 
     head: PageHead
     title: str
+    url: str
+    """Path of the page, for the way back from the sign-in page."""
     socket: str
     """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]
@@ -149,6 +151,7 @@ def robot_page(
             grid_css=grid_css(interface, slots),
         ),
         title=profile.title,
+        url=url,
         socket=f"/ws?robot={place}{watch}",
         interfaces=choices(profile, interface, url, watch),
         tabs=tabs,
