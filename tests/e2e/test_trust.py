@@ -6,7 +6,6 @@ No flag ignores certificates: the authority is imported as the page says.
 import asyncio
 import os
 import subprocess
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -23,7 +22,6 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard
 from tests.e2e.keys import headers_for
 from tests.e2e.processes import UrcProcess
-from tests.e2e.test_pairing import LONGEST_S, code_on
 from urc.access.authority import fingerprint
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -135,44 +133,6 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         page = await context.new_page()
         with pytest.raises(Error, match="ERR_CERT_AUTHORITY_INVALID"):
             await page.goto(others)
-
-
-@pytest.mark.needs("chromium", "headless-shell", "certutil")
-async def test_a_phone_scans_the_code_pairs_and_drives_over_tls(
-    new_page: PageMaker, urc_process: Start, tmp_path: Path
-) -> None:
-    """The administrator is on the server's own computer; the phone trusts the authority."""
-    data, home = tmp_path / "data", tmp_path / "home"
-    home.mkdir()
-    process = urc_process(
-        "serve", "robots/tello.yaml", "--simulate", "--host", "0.0.0.0", "--port", "0",
-        "--data-dir", str(data),
-    )  # fmt: skip
-    near = (await process.wait_for_async(r"^dashboard (http://127\.0\.0\.1:\d+/)"))[1]
-    others = (await process.wait_for_async(r"^for others (https://\S+)"))[1]
-    if urlsplit(others).hostname == "127.0.0.1":
-        pytest.skip("this machine has no network")
-    (home / "authority.crt").write_bytes((data / "tls" / "authority.pem").read_bytes())
-    words = "certutil -d sql:$HOME/.pki/nssdb -A -t C,, -n urc -i authority.crt"
-    await asyncio.to_thread(typed, home, f"mkdir -p $HOME/.pki/nssdb && {words}")
-
-    admin = await new_page()
-    await admin.goto(f"{near}people")
-    await admin.locator("[data-add=device] [type=submit]").click()
-    link = await code_on(admin)
-    assert link.startswith(f"{others}pair#")
-    async with person(home) as context:
-        phone = await context.new_page()
-        await phone.goto("about:blank")
-        began_s = time.monotonic()
-        await phone.goto(link)
-        await phone.get_by_role("button", name="Pair this device").tap()  # 1
-        await phone.get_by_role("link", name="Connect to").tap()  # 2
-        await phone.locator("[data-verb=take]").tap()  # 3
-        await expect(phone.locator("[data-controls]")).to_have_attribute("data-state", "mine")
-        took_s = time.monotonic() - began_s
-        assert phone.url == f"{others}robots/tello/"
-    assert took_s < LONGEST_S
 
 
 @pytest.mark.needs("headless-shell")
