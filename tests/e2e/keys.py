@@ -20,7 +20,7 @@ from urc.access.grants import parse_grant
 from urc.access.store import AccessStore
 from urc.testing.entry import ACCESS, HERE
 
-__all__ = ["enter", "entering", "headers_for", "known_here", "learn", "signed_in"]
+__all__ = ["enter", "entering", "headers_for", "known_here", "learn", "signed_in", "without_key"]
 
 _PRINTED = re.compile(r"(dashboard )(https?://[^/\s]+)/\?key=(\S+)")
 _NOTICED_S = 30
@@ -66,6 +66,11 @@ def entering(page: Page) -> None:
     setattr(page, "goto", opened)  # noqa: B010 - a method, for this page alone
 
 
+def without_key(context: BrowserContext) -> None:
+    """Let a browser hand in no start key by itself."""
+    _own_browsers.add(context)
+
+
 async def signed_in(
     context: BrowserContext, address: str, data: Path, name: str, *grants: str
 ) -> None:
@@ -73,7 +78,7 @@ async def signed_in(
 
     The browser hands in no start key, because it is the person's own.
     """
-    _own_browsers.add(context)
+    without_key(context)
     with closing(AccessStore(data)) as store:
         now = time.time()
         person = store.add("person", name, [parse_grant(one) for one in grants], now=now)

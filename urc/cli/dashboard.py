@@ -129,6 +129,7 @@ async def _serve(
         if is_interrupted(robot_options.data):
             complain("urc: 'urc restore' was interrupted; run it again with --replace")
         access = access_for(robot_options.data, is_open=place.is_open)
+        access.clock_check = partial(clock_warning, robot_options.data)
         certificates = await certificates_of(
             place.tls, place.host, place.allowed_hosts, robot_options.data
         )

@@ -5,7 +5,7 @@ reaches only the routes whose right is `ANYONE`, among them STOP and the files o
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.responses import HTMLResponse
@@ -23,7 +23,7 @@ from urc.web.serve.rights import (
     ProtectedRoute,
     turn_away,
 )
-from urc.web.serve.visitor import Visitor
+from urc.web.serve.visitor import Visitor, is_loopback
 from urc.web.show.shown_visitor import ShownVisitor, shown_visitor
 from urc.web.show.visitor_links import sees_audit
 from urc.web.show.warnings import current_warnings
@@ -75,9 +75,7 @@ class AccessMiddleware:
             scope["state"]["is_code"] = True
             await self._app({**scope, "path": code}, receive, send)
             return
-        if self._access.anonymous is not None:
-            text = t("Sign-in is off: everyone on this network can drive these robots.")
-            current_warnings.set((text,))
+        current_warnings.set(tuple(self._warnings(scope)))
         visitor: Visitor = scope["state"]["visitor"]
         if not visitor.is_known and _has_token(scope):
             self._access.on_bad_token((scope.get("client") or ("",))[0])
@@ -100,6 +98,16 @@ class AccessMiddleware:
         keeps_people = self._access.control.store is not None
         name = t("This computer") if visitor.is_local else visitor.identity.name
         return ShownVisitor(name, keeps_people and visitor.may(ADMINISTER), keeps_people)
+
+    def _warnings(self, scope: Scope) -> Iterator[str]:
+        """Yield the warnings of each page: the server's, and those of this connection."""
+        if self._access.anonymous is not None:
+            yield t("Sign-in is off: everyone on this network can drive these robots.")
+        client = scope.get("client") or ("",)
+        if scope["scheme"] in ("http", "ws") and not is_loopback(client[0]):
+            yield t("This connection is not encrypted: others on the network can read it.")
+        if self._access.clock_warning:
+            yield self._access.clock_warning
 
     def _is_for_all(self, scope: Scope) -> bool:
         return any(one.matches(scope)[0] is Match.FULL for one in self._open)

@@ -203,3 +203,31 @@ def test_only_the_holder_of_the_key_may_force(
     ):
         said = next(said for _ in range(20) if (said := line.receive_json())["t"] == "lease")
     assert said["forces"] is forces
+
+
+@pytest.mark.parametrize(
+    ("access", "host", "warnings"),
+    [
+        (OPEN, "192.168.1.9", ["Sign-in is off", "This connection is not encrypted"]),
+        (OPEN, "127.0.0.1", ["Sign-in is off"]),
+        (ACCESS, "192.168.1.9", ["This connection is not encrypted"]),
+        (ACCESS, "127.0.0.1", []),
+    ],
+)
+def test_each_page_warns_of_missing_protection(
+    access: Access, host: str, warnings: list[str]
+) -> None:
+    """On the menu, and on the page of the door."""
+    with at(access, host=host) as browser:
+        text = browser.get("/").text
+    shown = re.findall(r'urc-server-warning" role="alert">.*?</span> ([^:]+):', text)
+    assert shown == warnings
+
+
+def test_each_page_shows_a_wrong_clock() -> None:
+    access = Access(key=KEY)
+    access.clock_check = lambda: "the clock is behind"
+    app = build_app(robots(), access=access)
+    with TestClient(app, base_url=ADDRESS) as browser:
+        while "the clock is behind" not in browser.get("/").text:
+            pass

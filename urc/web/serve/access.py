@@ -35,6 +35,8 @@ OLD_COOKIES: Final = 8
 cookies are deleted."""
 COOKIE_S: Final = 400 * 24 * 3600
 """Lifetime of the cookie of a sign-in, in seconds; the server decides when the sign-in ends."""
+CLOCK_S: Final = 60.0
+"""Time between two checks of the clock, in seconds."""
 RECHECK_S: Final = 1.0
 """Longest time between two looks of a socket at its rights, in seconds."""
 _Headers = Iterable[tuple[bytes, bytes]]
@@ -77,6 +79,10 @@ class Access:
         """Callback for each use of a start key or code: the new identity, or `NOBODY` for a wrong
         key; the network address; the browser."""
         self.on_bad_token: Callable[[str], None] = _unheard
+        self.clock_check: Callable[[], str] = _right_clock
+        """Function that returns a warning about a wrong clock, or ""; it may block."""
+        self.clock_warning = ""
+        """The last result of `clock_check`, which each page shows."""
         """Callback for each request with a token that is unknown, over or revoked, with the network
         address."""
         self._dependents: set[Callable[[], None]] = set()
@@ -217,9 +223,16 @@ class Access:
         """
         async with asyncio.TaskGroup() as group:
             group.create_task(self.control.watch())
+            group.create_task(self._watch_clock())
             while True:
                 await asyncio.sleep(RECHECK_S)
                 self.recheck()
+
+    async def _watch_clock(self) -> None:
+        """Check the clock now and each minute: a network may set it at any time."""
+        while True:
+            self.clock_warning = await asyncio.to_thread(self.clock_check)
+            await asyncio.sleep(CLOCK_S)
 
     @contextmanager
     def followed(self, recheck: Callable[[], None]) -> Iterator[None]:
@@ -253,6 +266,11 @@ def _unrecorded(who: Identity, place: str, agent: str) -> None:
 
 def _unheard(place: str) -> None:
     """Ignore a bad token, because this server has no audit log."""
+
+
+def _right_clock() -> str:
+    """Return "", because nothing is known about the clock."""
+    return ""
 
 
 def _untagged(_: str) -> Collection[str]:
