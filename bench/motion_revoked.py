@@ -16,7 +16,7 @@ from bench.rig.revocations import REVOCATIONS, REVOKED_BOUND_MS, RevocationRig
 
 __all__ = ["run"]
 
-EACH, EACH_IF_FULL = 40, 1000
+EACH, EACH_IF_FULL = 40, 250
 ROBOTS = 20
 BIN_MS = 20
 MOST_BOUTS = 3
