@@ -198,12 +198,14 @@ class RobotCalls:
             else:
                 live = await opened(service, peer, stack)
                 session = stack.enter_context(self.sessions.temporary(service, live, peer))
+            controls, operator = service.controls, session.operator
+            stack.enter_context(self._followed(lambda: controls.recheck(operator)))
             run = CommandRequest(
                 0, wanted, asked.arguments, self._confirmation(session, asked, wanted), asked.stops
             )
             timeout_s = asked.timeout_s or (LONGEST_TIMEOUT_S if known.steps else None)
             outcome = await service.commands.run(
-                session.operator, run, session.live.session, timeout_s=timeout_s
+                operator, run, session.live.session, timeout_s=timeout_s
             )
             if outcome.code:
                 raise _failure(outcome, session, wanted)

@@ -6,14 +6,16 @@ one outcome and one entry in the audit log.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Final, NamedTuple, Protocol
 
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Replied
+from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock
-from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused
+from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused, role_refusal
 from urc.runtime.session import CommandFailed
 from urc.web.drive.control_service import ControlService, OperatorSession
 from urc.web.drive.two_person import TwoPersonRule
@@ -37,6 +39,9 @@ class CommandTarget(Protocol):
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
+
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Pause, step, continue or end a sequence."""
 
 
 class CommandOutcome(NamedTuple):
@@ -82,9 +87,10 @@ class CommandRunner:
         try:
             people = await self._confirmed(operator, asked)
             async with asyncio.timeout(limit_s):
-                replied = await target.command(
-                    asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
-                )
+                with self._ended_with_right(operator, asked.command, target):
+                    replied = await target.command(
+                        asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
+                    )
         except asyncio.CancelledError:
             recorder = self._controls.recorder
             text = "nobody waited for the answer"
@@ -107,6 +113,29 @@ class CommandRunner:
         """Record the refusal of a command before anything is sent, and return it."""
         self._controls.recorder.refused(operator.client, asked.command, message, self._clock.now())
         return CommandOutcome(code=code, message=message, is_ours=True)
+
+    @contextmanager
+    def _ended_with_right(
+        self, operator: OperatorSession, command: str, target: CommandTarget
+    ) -> Iterator[None]:
+        """End a sequence as soon as its operator loses the right to run it."""
+        known = self._controls.once.driver.commands.get(command)
+        if known is None or not known.steps:
+            yield
+            return
+
+        def check() -> None:
+            reason = role_refusal(operator.client, known.role)
+            if reason:
+                target.pull(command, "abort")
+                recorder = self._controls.recorder
+                recorder.ran(operator.client, command, {}, f"ended, because {reason}")
+
+        operator.on_role.add(check)
+        try:
+            yield
+        finally:
+            operator.on_role.discard(check)
 
     def _limit_s(self, command: str) -> float | None:
         known = self._controls.once.driver.commands.get(command)

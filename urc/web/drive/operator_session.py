@@ -45,6 +45,8 @@ class OperatorSession:
         """The present rights; `client` has the rights of the last look."""
         self.wake = wake
         self.heartbeat: int | None = None
+        self.on_role: set[Callable[[], None]] = set()
+        """Callbacks after each change of the role in `client`."""
         self.notices: dict[str, str] = {}
         """Newest notice about each control or verb, by name."""
         self.seen = -1
