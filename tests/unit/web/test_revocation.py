@@ -7,8 +7,14 @@ import pytest
 from tests.unit.web.test_client import FakeLine
 from tests.unit.web.test_controls import Scene as ControlsScene
 from tests.unit.web.test_controls import scene as controls_scene
+from urc.model.driver import Command
+from urc.model.payload import WriteSpec
 from urc.model.role import Role
+from urc.model.sequence import WaitStep
+from urc.protocol.events import Replied
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
+from urc.runtime.command_failed import CommandFailed
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.drive.operator_session import OperatorSession
@@ -16,7 +22,7 @@ from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.page_socket import SIGNED_OUT, BrowserClient
 from urc.web.wire import messages as wire
-from urc.wire.client_messages import Stop
+from urc.wire.client_messages import CommandRequest, Drive, Stop, Verb
 
 pytestmark = pytest.mark.anyio
 
@@ -132,3 +138,69 @@ async def test_the_page_of_a_revoked_visitor_closes_with_the_reason() -> None:
     assert line.of_type("error")[-1]["message"] == SIGNED_OUT
     assert line.closed == (wire.CLOSE_NOT_LET_IN, SIGNED_OUT)
     running.cancel()
+
+
+@pytest.mark.parametrize("verb", ["take", "ask", "force", "reset"])
+async def test_a_token_for_other_commands_neither_takes_the_controls_nor_resets_stop(
+    verb: Verb,
+) -> None:
+    async with controls_scene() as it:
+        rights = Rights("maintain")
+        rights.commands = ("lights",)
+        operator = it.controls.add_page(SocketPeer(rights=rights), lambda: None)
+        if verb == "reset":
+            it.controls.stop("Ann")
+        it.controls.handle(operator, Drive(verb))
+        state = it.controls.controller.lease.state
+        assert state.holder is None
+        assert state.latched_by == ("Ann" if verb == "reset" else "")
+        assert any("token" in str(message.get("message")) for message in it.read(operator))
+
+
+async def test_a_token_for_a_held_command_takes_the_controls_and_resets_no_stop() -> None:
+    async with controls_scene() as it:
+        rights = Rights()
+        rights.commands = ("drive",)
+        operator = it.controls.add_page(SocketPeer(rights=rights), lambda: None)
+        it.say(operator, "take")
+        it.tick(operator, 0.5)
+        assert it.backend.texts == ["drive speed=0.5"]
+        it.controls.stop("Ann")
+        it.say(operator, "reset")
+        assert it.controls.controller.lease.state.latched_by == "Ann"
+
+
+@pytest.mark.parametrize("left", ["watch", None])
+async def test_a_sequence_ends_with_the_right_of_its_operator(left: Role | None) -> None:
+    """A sequence sends commands for minutes; a removed tablet must not move the robot on."""
+    clock, rights = FakeClock(), Rights()
+    started, over = asyncio.Event(), asyncio.Event()
+    tour = Command("tour", "wire", WriteSpec("text"), steps=(WaitStep(1.0),))
+    robot = FakeRobot(dashboard_profile(commands={"tour": tour}), clock)
+    audit: list[AuditEntry] = []
+    recorder = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
+    service = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, recorder=recorder)
+    operator = service.controls.add_page(SocketPeer(rights=rights), lambda: None)
+
+    class Target:
+        """A session with a sequence that lasts until it is ended."""
+
+        async def command(self, name: str, *_: object, **__: object) -> Replied:
+            started.set()
+            await over.wait()
+            raise CommandFailed("ended", "the sequence was ended")
+
+        def pull(self, sequence: str, what: str) -> None:
+            assert (sequence, what) == ("tour", "abort")
+            over.set()
+
+    asked = CommandRequest(1, "tour")
+    running = asyncio.create_task(service.commands.run(operator, asked, Target()))
+    await started.wait()
+    service.controls.recheck(operator)
+    assert not over.is_set()
+    rights.now = left
+    service.controls.recheck(operator)
+    assert (await running).code == "ended"
+    assert operator.on_role == set()
+    assert any("ended, because" in entry.outcome for entry in audit)

@@ -195,6 +195,8 @@ class ControlService:
                 operator.forget(command)
                 self.controller.release(operator.client.id, command)
         self.controller.change(operator.client)
+        for report in tuple(operator.on_role):
+            report()
         operator.seen = -1  # the lease message tells the page its rights
         operator.wake()
 
@@ -302,14 +304,25 @@ class ControlService:
 
     def _drive(self, operator: OperatorSession, said: wire.Drive) -> None:
         now = self._clock.now()
-        with self.recorder.caused_by(operator.client):
-            reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
+        reason = self._scope_refusal(operator, said.verb)
+        if not reason:
+            with self.recorder.caused_by(operator.client):
+                reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
         if reason:
             operator.notice(said.verb, wire.encode_refused(said.verb, "", reason))
             self.recorder.refused(operator.client, said.verb, reason, now)
         elif said.verb == "reset":
             self.once.reset()
         self._set_expiry()
+
+    def _scope_refusal(self, operator: OperatorSession, verb: wire.Verb) -> str:
+        """Return the reason why a token for single commands does not permit a request, or ""."""
+        may_give = operator.rights.may_give
+        if verb not in ("take", "ask", "force", "reset") or may_give(""):
+            return ""
+        if verb != "reset" and any(map(may_give, self.commands)):
+            return ""
+        return OUT_OF_SCOPE if verb != "reset" else "a token for single commands cannot reset STOP"
 
     def _thin(self, operator: OperatorSession, tick: wire.Tick) -> None:
         now = self._clock.now()

@@ -154,7 +154,7 @@ class PeerRights(Protocol):
         """Return the present role; None if the peer has no right any more."""
 
     def may_give(self, command: str) -> bool:
-        """Return whether the peer's token permits a command."""
+        """Return whether the peer's token permits a command; "": whether it permits all."""
 
 
 class FixedRights(NamedTuple):

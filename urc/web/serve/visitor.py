@@ -26,7 +26,7 @@ class VisitorRights(Protocol):
         """Return the highest present role of `who` at any robot."""
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether the scope of a token contains a command."""
+        """Return whether the scope of a token contains a command; "": all commands."""
 
     def is_local(self, who: Identity) -> bool:
         """Return whether `who` is the local user, with a sign-in that has not ended."""
@@ -85,9 +85,15 @@ class Visitor:
         return self._rights.may_give(self.identity, command)
 
     def may(self, right: Right, robot: str = "") -> bool:
-        """Return whether the visitor has a right now, at `robot` if the right is for one robot."""
+        """Return whether the visitor has a right now, at `robot` if the right is for one robot.
+
+        A token for single commands maintains and administers nothing: its role only admits it to
+        its commands.
+        """
         if right.role is None:
             return True
+        if includes(right.role, "maintain") and not self.may_give(""):
+            return False
         if right.is_local:
             return self.is_local
         if right.scope == "anywhere":
