@@ -121,7 +121,7 @@ def test_a_cookie_is_out_of_reach_of_scripts_and_of_other_sites() -> None:
     (secure,) = access.cookies("word", [], is_secure=True)
     assert secure == f"__Host-{plain}; Secure"
     assert access.visitor(
-        headers(f"__Host-{access.cookie}", str(access.admit(access.key)))
+        headers(f"__Host-{access.cookie}", str(access.admit(access.key))), is_secure=True
     ).is_local
 
 
@@ -152,6 +152,20 @@ def test_another_cookie_of_the_same_name_does_not_hide_ours(said: str) -> None:
     access = Access()
     text = said.format(name=access.cookie, secret=access.admit(access.key))
     assert access.visitor([(b"cookie", text.encode())]).is_local
+
+
+def test_over_tls_a_cookie_of_another_server_signs_nobody_in(access: Access) -> None:
+    """Another port of the host can set any cookie but one with the prefix ``__Host-``.
+
+    Otherwise, a person would act in the name of the owner of that cookie.
+    """
+    _, secret = person(access, "drive")
+    _, foreign = person(access, "watch")
+    name = access.sign_in_cookie
+    assert not access.visitor(headers(name, foreign), is_secure=True).is_known
+    both = [(b"cookie", f"{name}={foreign}; __Host-{name}={secret}".encode())]
+    assert access.visitor(both, is_secure=True).role("cart") == "drive"
+    assert access.visitor(both).role("cart") == "watch"
 
 
 def test_the_number_of_local_browsers_is_bounded() -> None:

@@ -278,6 +278,14 @@ async def test_requests(
     assert len(names) == len(set(names))
 
 
+async def test_a_body_with_two_lengths_is_refused_and_ends_the_connection() -> None:
+    """A web server in front that reads the other length would see a smuggled request."""
+    two = (("content-length", "4"), ("transfer-encoding", "chunked"))
+    start = (await ask(HOST, OURS, *two, method="POST"))[0]
+    assert start["status"] == 400
+    assert (b"connection", b"close") in start["headers"]
+
+
 async def test_an_allowed_upgrade_reaches_the_application() -> None:
     """With our host and our origin, the upgrade is the application's business."""
     sent = await ask(HOST, OURS, kind="websocket")

@@ -22,6 +22,7 @@ from urc.access.external_accounts import admit_named
 from urc.access.grants import AccessError
 from urc.access.proxies import ProxiedRequest, TrustedProxy, without_proxy_headers
 from urc.web.people.browser_sign_ins import BrowserSignIns
+from urc.web.serve.access import SECURE
 from urc.web.serve.connection_quota import is_stop
 from urc.web.serve.policy import REFUSAL_HEADERS
 
@@ -81,23 +82,25 @@ class ProxyMiddleware:
                     await _refuse(send, f"The proxy {found.proxy.name} was not believed: {error}")
                     return
             else:
-                scope["headers"] = self._as_person(found.headers, secret)
+                is_secure = scope["scheme"] in ("https", "wss")
+                scope["headers"] = self._as_person(found.headers, secret, is_secure=is_secure)
         await self._app(scope, receive, send)
 
     def _as_person(
-        self, headers: Sequence[tuple[bytes, bytes]], secret: str
+        self, headers: Sequence[tuple[bytes, bytes]], secret: str, *, is_secure: bool
     ) -> list[tuple[bytes, bytes]]:
         """Return the headers with the person's sign-in in place of the browser's own ones."""
         access = self._sign_ins.access
         names = (access.cookie, access.sign_in_cookie)
-        ours = {each.encode() for name in names for each in (name, f"__Host-{name}")}
+        ours = {each.encode() for name in names for each in (name, SECURE + name)}
         kept = []
         for name, value in headers:
             if name == b"cookie":
                 parts = [part.strip() for part in value.split(b";")]
                 value = b"; ".join(one for one in parts if one.partition(b"=")[0] not in ours)
             kept.append((name, value))
-        return [*kept, (b"cookie", f"{access.sign_in_cookie}={secret}".encode())]
+        before = SECURE if is_secure else ""
+        return [*kept, (b"cookie", f"{before}{access.sign_in_cookie}={secret}".encode())]
 
     async def _secret(self, scope: Scope, found: ProxiedRequest, proxy: TrustedProxy) -> str:
         user = " ".join(found.user.split())

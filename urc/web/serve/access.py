@@ -108,8 +108,14 @@ class Access:
 
     # Identities
 
-    def visitor(self, headers: _Headers) -> Visitor:
-        """Return the visitor of a request from its headers, with names in lower case."""
+    def visitor(self, headers: _Headers, *, is_secure: bool = False) -> Visitor:
+        """Return the visitor of a request.
+
+        Args:
+            headers: headers of the request, with names in lower case.
+            is_secure: whether the request came over TLS. Then only cookies with `SECURE` count:
+                other servers under the same host name cannot set them.
+        """
         pairs = list(headers)
         for name, value in pairs:
             scheme, _, word = value.decode("latin-1").partition(" ")
@@ -119,14 +125,10 @@ class Access:
                 return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=True)
         known = list(_cookies(pairs))
         found = (
-            self._holder(known, one)
+            self._holder(known, SECURE + one if is_secure else one)
             for one in (self.cookie, self.sign_in_cookie, self.device_cookie)
         )
         return Visitor(self, self._seen(next((who for who in found if who != NOBODY), NOBODY)))
-
-    def device(self, headers: _Headers) -> Identity:
-        """Return the paired device of a request, even if a person has signed in on it."""
-        return self._holder(list(_cookies(headers)), self.device_cookie)
 
     def _holder(self, cookies: Iterable[tuple[str, str]], name: str) -> Identity:
         """Return the identity of the cookies with a name; or `NOBODY`.
@@ -134,7 +136,7 @@ class Access:
         Programs on other ports of a machine may set cookies of the same name: all are tried.
         """
         for stored, secret in cookies:
-            if stored.removeprefix(SECURE) == name:
+            if stored == name:
                 who = self.control.identify(secret)
                 if who != NOBODY and who.way != "token":
                     return who

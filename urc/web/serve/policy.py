@@ -210,7 +210,9 @@ class Policy:
         nonce = secrets.token_urlsafe(16)
         state = scope.setdefault("state", {})
         state["nonce"] = nonce
-        state["visitor"] = self._access.visitor(scope["headers"])
+        state["visitor"] = self._access.visitor(
+            scope["headers"], is_secure=scope["scheme"] in ("https", "wss")
+        )
         answer = _Answer(scope, send, nonce)
         refusal = self._refusal(scope)
         if refusal is not None:
@@ -241,6 +243,9 @@ class Policy:
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")
+        if lengths and _values(scope, b"transfer-encoding"):
+            # Another web server in front may take the rest of the body for the next request.
+            return 400, "A request has either a length or a transfer encoding."
         if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):
             return 413, f"A request may carry at most {BODY_BYTES} bytes."
         return None
@@ -304,6 +309,8 @@ class _Answer:
             (b"content-length", str(len(body)).encode()),
             (b"cache-control", b"no-store"),
         ]
+        if status == 400:
+            headers.append((b"connection", b"close"))  # RFC 9112, section 6.1
         await self.send({"type": f"{prefix}.start", "status": status, "headers": headers})
         await self._send({"type": f"{prefix}.body", "body": body})
 
