@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from tests.unit.web.test_client import FakeLine
+from urc.access.directory import NOBODY, Identity
 from urc.model.driver import Command
 from urc.model.exchange import Confirm
 from urc.model.payload import WriteSpec
@@ -42,11 +43,12 @@ class Screens:
         self.lines: list[FakeLine] = []
         self._tasks: list[asyncio.Task[None]] = []
 
-    async def come(self, role: Role = "drive") -> FakeLine:
+    async def come(self, role: Role = "drive", who: Identity = NOBODY) -> FakeLine:
         """Let one more look."""
         line = FakeLine()
         self.lines.append(line)
-        client = BrowserClient(line, self.service, line, SocketPeer(rights=FixedRights(role)))
+        peer = SocketPeer(identity=who, rights=FixedRights(role))
+        client = BrowserClient(line, self.service, line, peer)
         self._tasks.append(asyncio.create_task(client.serve()))
         await settle()
         return line
@@ -168,6 +170,24 @@ async def test_a_second_screen_says_yes() -> None:
         assert it.robot.confirmed_by == [("screen 1", "screen 2")]
         assert [line.of_type("asked")[0]["n"] for line in (asker, other)] == [asked["n"]] * 2
         assert it.audit[-1].outcome == "done; confirmed by screen 1, screen 2"
+
+
+async def test_a_token_is_no_second_person() -> None:
+    """Otherwise, one person with a token would approve the own command."""
+    async with screens() as it:
+        asker = await it.come(who=Identity("p1", "s1", "Ann", "person", "passphrase", "p1"))
+        program = await it.come(who=Identity("p2", "s2", "script", "program", "token", "p2"))
+        other = await it.come(who=Identity("p3", "s3", "Ben", "person", "passphrase", "p3"))
+        await run(asker, "beam")
+        await settle()
+        assert program.of_type("ask") == []
+        answer = {"t": "agree", "n": other.of_type("ask")[0]["n"], "yes": True}
+        program.say(answer)
+        await settle()
+        assert it.robot.commands == []
+        other.say(answer)
+        await settle()
+        assert it.audit[-1].outcome == "done; confirmed by screen 1, screen 3"
 
 
 @pytest.mark.parametrize("who", ["asker", "other", "nobody"])

@@ -1,8 +1,9 @@
 """The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. All pages and devices of one person count as one, and cannot approve their own command. The
-local user is one person, too. On a server without sign-in, each page of an unknown visitor counts
-as one person. The number of pending questions and the wait for an answer are limited.
+Layer 5. All pages and devices of one person count as one, and cannot approve their own command. A
+program is no person, so a token approves nothing. The local user is one person, too. On a server
+without sign-in, each page of an unknown visitor counts as one person. The number of pending
+questions and the wait for an answer are limited.
 
 A token from the server represents a confirmation. A token is valid only once and for a few seconds,
 on one page, and for one command with unchanged arguments. A replayed, changed or delayed
@@ -165,7 +166,7 @@ class TwoPersonRule:
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or not includes(operator.client.role, "drive"):
             return
-        is_second = _is_another_person(operator, one.asker)
+        is_second = _is_second(operator, one.asker)
         if not said.yes and (is_second or operator is one.asker):
             one.answer.set_result(None)
         elif said.yes and is_second:
@@ -173,7 +174,7 @@ class TwoPersonRule:
 
     def _send(self, operator: OperatorSession, one: _Question) -> None:
         may_approve = includes(operator.client.role, "drive")
-        may_approve = may_approve and _is_another_person(operator, one.asker)
+        may_approve = may_approve and _is_second(operator, one.asker)
         if not may_approve and operator is not one.asker:
             return
         text = wire.encode_ask(
@@ -188,10 +189,13 @@ class TwoPersonRule:
         operator.notice(f"ask {one.number}", text)
 
 
-def _is_another_person(one: OperatorSession, other: OperatorSession) -> bool:
-    if one.client.person and other.client.person:
-        return one.client.person != other.client.person
-    return one is not other
+def _is_second(one: OperatorSession, asker: OperatorSession) -> bool:
+    """Return whether `one` is a person other than the asker."""
+    if one.client.kind == "program":
+        return False
+    if one.client.person and asker.client.person:
+        return one.client.person != asker.client.person
+    return one is not asker
 
 
 def _meant(command: str, arguments: Mapping[str, Reading]) -> bytes:
