@@ -21,13 +21,30 @@ from urc.access.directory import Directory, Kind, Principal, SignIn, Way, digest
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.private_files import make_private
 
-__all__ = ["FILE", "AccessStore", "Invitation", "MOST_INVITATIONS", "MOST_SIGN_INS", "parse_name"]
+__all__ = [
+    "FILE",
+    "MOST_CODES_OF_ONE",
+    "MOST_DEVICES_OF_ONE",
+    "MOST_INVITATIONS",
+    "MOST_SIGN_INS",
+    "MOST_SIGN_INS_OF_ONE",
+    "AccessStore",
+    "Invitation",
+    "parse_name",
+]
 
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
 """Most sign-ins and tokens; the least recently used sign-in is closed for a new one."""
 MOST_PRINCIPALS: Final = 5000
 MOST_INVITATIONS: Final = 1000
+MOST_SIGN_INS_OF_ONE: Final = 100
+"""Most sign-ins of one person; the least recently used one is closed for a new one. One person
+therefore cannot end the sign-ins of others."""
+MOST_CODES_OF_ONE: Final = 8
+"""Most valid codes for devices of one person; a new code replaces the oldest."""
+MOST_DEVICES_OF_ONE: Final = 50
+"""Most paired devices of one person."""
 LONGEST_NAME: Final = 64
 _VERSION: Final = 1
 _BUSY_S: Final = 5.0
@@ -174,6 +191,11 @@ class AccessStore:
             (count,) = self._base.execute("SELECT count(*) FROM principals").fetchone()
             if count >= MOST_PRINCIPALS:
                 raise AccessError(f"there are {count} people, devices and programs; remove some")
+            (count,) = self._base.execute(
+                "SELECT count(*) FROM principals WHERE owner = ? AND owner <> ''", (owner,)
+            ).fetchone()
+            if count >= MOST_DEVICES_OF_ONE:
+                raise AccessError(f"this person has {count} devices; remove some")
             try:
                 self._insert("principals", row)
             except sqlite3.IntegrityError:
@@ -252,6 +274,11 @@ class AccessStore:
                 "DELETE FROM sign_ins WHERE ends_at <= ? OR used_at + idle_s <= ?", (now, now)
             )
             self._base.execute(
+                "DELETE FROM sign_ins WHERE id IN (SELECT id FROM sign_ins WHERE principal = ?"
+                " AND way <> 'token' ORDER BY used_at DESC LIMIT -1 OFFSET ?)",
+                (principal, MOST_SIGN_INS_OF_ONE - 1),
+            )
+            self._base.execute(
                 "DELETE FROM sign_ins WHERE id IN (SELECT id FROM sign_ins WHERE way <> 'token'"
                 " ORDER BY used_at DESC LIMIT -1 OFFSET ?)",
                 (MOST_SIGN_INS - 1,),
@@ -289,6 +316,12 @@ class AccessStore:
         code = secrets.token_urlsafe(16)
         with self._change():
             self._base.execute("DELETE FROM invitations WHERE ends_at <= ?", (now,))
+            self._base.execute(
+                "DELETE FROM invitations WHERE digest IN (SELECT digest FROM invitations"
+                " WHERE kind = 'device' AND owner = ? AND owner <> ''"
+                " ORDER BY ends_at DESC, rowid DESC LIMIT -1 OFFSET ?)",
+                (invitation.owner, MOST_CODES_OF_ONE - 1),
+            )
             (count,) = self._base.execute("SELECT count(*) FROM invitations").fetchone()
             if count >= MOST_INVITATIONS:
                 raise AccessError(f"{count} codes are valid; wait until some have ended")

@@ -8,7 +8,13 @@ import pytest
 
 from urc.access.directory import NOBODY, Identity
 from urc.access.grants import AccessError, Grant
-from urc.access.store import AccessStore, Invitation
+from urc.access.store import (
+    MOST_CODES_OF_ONE,
+    MOST_DEVICES_OF_ONE,
+    MOST_SIGN_INS_OF_ONE,
+    AccessStore,
+    Invitation,
+)
 
 NOW = 1_000_000.0
 DRIVE = (Grant("drive"),)
@@ -177,3 +183,34 @@ def test_a_passphrase_belongs_to_one_person(store: AccessStore) -> None:
     assert store.passphrase_of("ANN") == (who.principal, "other")
     store.remove(who.principal)
     assert store.passphrase_of("ann") == ("", None)
+
+
+def test_one_person_ends_no_sign_ins_of_others(store: AccessStore) -> None:
+    """The oldest sign-in of the same person gives way, long before the file is full."""
+    who, key = signed_in(store, "Ben")
+    mine, first = signed_in(store)
+    newest = [
+        store.open_sign_in(mine.principal, "passphrase", now=NOW + number / 10)[1]
+        for number in range(1, MOST_SIGN_INS_OF_ONE + 1)
+    ]
+    left = store.directory()
+    assert left.identify(first, NOW) == NOBODY
+    assert all(left.identify(secret, NOW).principal == mine.principal for secret in newest)
+    assert left.identify(key, NOW) == who
+
+
+def test_one_person_takes_few_codes_and_devices(store: AccessStore) -> None:
+    """Otherwise, a person who only watches could keep administrators from pairing."""
+    who, _ = signed_in(store)
+    codes = [
+        store.invite(Invitation("device", "", (), who.principal, NOW + 60 + number), now=NOW)
+        for number in range(MOST_CODES_OF_ONE + 1)
+    ]
+    free = [store.invite(Invitation("device", "", DRIVE, "", NOW + 60)) for _ in codes]
+    assert [number for number, code in enumerate(codes) if not store.redeem(code, NOW)] == [0]
+    assert all(store.redeem(code, NOW) for code in free)
+    for number in range(MOST_DEVICES_OF_ONE):
+        store.add("device", f"phone {number}", now=NOW, owner=who.principal)
+    with pytest.raises(AccessError, match="50 devices"):
+        store.add("device", "one more", now=NOW, owner=who.principal)
+    store.add("device", "tablet", DRIVE, now=NOW)

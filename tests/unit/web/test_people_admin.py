@@ -1,12 +1,16 @@
 """People, devices, tokens and sign-ins over HTTP, for administrators and for oneself."""
 
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from tests.unit.web.people import PASSPHRASE, Door, post
+from urc.access.throttle import FREE
 from urc.runtime.audit_search import AuditQuery, search
 from urc.web.people.account_routes import FRESH_S
+from urc.web.people.browser_sign_ins import HASHES
 
 
 @pytest.fixture
@@ -68,6 +72,22 @@ def test_a_token_is_shown_once_and_works(door: Door) -> None:
         assert one["commands"] == ["goto"]
         assert post(ann, "people/remove", id=one["id"])[0] == 200
         assert program.get(path, headers=bearer).status_code == 401
+
+
+def test_a_token_for_single_commands_administers_and_maintains_nothing(door: Door) -> None:
+    """Otherwise, it would make itself a token for all commands."""
+    with door.browser(cookies=door.signed_in("Ann", "administer")) as admin:
+        for number, commands in enumerate((["beep"], [])):
+            _, made = post(
+                admin, "tokens/add", name=f"t{number}", roles=["administer"], commands=commands
+            )
+            program = door.other(admin)
+            program.headers["authorization"] = f"Bearer {made['token']}"
+            refused = 403 if commands else 200
+            said = {"name": f"u{number}", "roles": ["administer"]}
+            assert program.post("/api/v1/tokens/add", json=said).status_code == refused
+            assert program.get("/api/v1/audit").status_code == refused
+            assert program.get("/api/v1/robots/puppet/controls").status_code == 200
 
 
 def test_a_token_needs_a_role(door: Door) -> None:
@@ -156,6 +176,24 @@ def test_a_new_passphrase_needs_the_present_one_and_ends_other_sign_ins(door: Do
         assert (ben.get("/").status_code, other.get("/").status_code) == (200, 401)
         assert post(other, "sign-in", name="Ben", passphrase=PASSPHRASE)[0] == 403
         assert post(other, "sign-in", name="Ben", passphrase=new)[0] == 200
+
+
+def test_guesses_at_the_same_time_wait_like_others(door: Door) -> None:
+    """Each guess takes its turn, and looks at the failures of the guesses before."""
+    door.add("Ben", "drive", passphrase=PASSPHRASE)
+    with door.browser() as ben:
+        assert post(ben, "sign-in", name="Ben", passphrase=PASSPHRASE)[0] == 200
+        cookies = dict(ben.cookies)
+        path, new = "account/passphrase", "four quiet words here"
+
+        def guess(number: int) -> int:
+            thief = door.other(ben, cookies=cookies)
+            return int(post(thief, path, current=f"guess {number}", passphrase=new)[0])
+
+        with ThreadPoolExecutor(20) as pool:
+            found = Counter(pool.map(guess, range(20)))
+        assert found[403] <= FREE + HASHES
+        assert found[429] == 20 - found[403]
 
 
 def test_a_passer_by_sets_no_first_passphrase(door: Door) -> None:

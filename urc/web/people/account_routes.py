@@ -118,6 +118,8 @@ class AccountRoutes:
         sign_ins.check_wait(request, key)
         store = sign_ins.store
         async with sign_ins.hashing():
+            # Other attempts may have failed while this one waited for its turn.
+            sign_ins.check_wait(request, key)
             _, before = await asyncio.to_thread(store.passphrase_of, who.name)
             if before is None:
                 self._check_fresh(who)
