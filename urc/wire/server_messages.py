@@ -203,6 +203,8 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """Whether the page may take the lease from another page without its consent."""
     spare: str
     """Secret key for the redundant socket of the page; "" for watchers."""
+    role: Role | None = None
+    """Role of the page at the robot; None without any right."""
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):

@@ -70,6 +70,7 @@ async def test_a_look_at_withdrawn_rights_stops_the_robot_at_once(left: Role | N
         assert it.controls.controller.lease.state.holder is None
         (lease,) = it.read(operator)
         assert lease["drives"] is False
+        assert lease["role"] == left
 
 
 async def test_a_tick_after_the_withdrawal_moves_nothing_even_without_a_look() -> None:

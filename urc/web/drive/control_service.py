@@ -66,6 +66,7 @@ class ControlService:
         )
         self._driver = driver
         self._roles = _roles(driver)
+        self._has_roles = _has_roles(driver)
         self._clock = clock
         self._file = file
         self._hub: Hub | None = None
@@ -102,6 +103,7 @@ class ControlService:
                 operator.forget(command)
             operator.paces.clear()
         self._driver, self._file, self._roles = driver, file, _roles(driver)
+        self._has_roles = _has_roles(driver)
         self.once.driver = driver
         self._heed(file)
         self.controller = self._controller(driver, kept)
@@ -211,9 +213,9 @@ class ControlService:
     def changes(self, operator: OperatorSession) -> list[str]:
         """Return the messages that the page has not received yet."""
         texts: list[str] = []
-        is_told = self.controller.can_move or not includes(
-            operator.client.role, "drive"
-        )  # a watcher gives no commands
+        # The lease names the role of the page, on which its buttons depend.
+        is_told = self.controller.can_move or self._has_roles
+        is_told = is_told or not includes(operator.client.role, "drive")
         if is_told and operator.seen != self._number:
             operator.seen = self._number
             controller, now = self.controller, self._clock.now()
@@ -481,6 +483,11 @@ class ControlService:
 def _roles(driver: Driver) -> dict[str, Role]:
     """Return the role that each held command needs, by name."""
     return {name: one.role for name, one in driver.commands.items() if one.hold is not None}
+
+
+def _has_roles(driver: Driver) -> bool:
+    """Return whether a command needs a higher role than ``drive``."""
+    return any(one.role != "drive" for one in driver.commands.values())
 
 
 def _unread(entry: AuditEntry) -> None:

@@ -57,6 +57,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "refusal": HELD if needs_holding(driver, name) and not is_held else "",
         "isHeld": is_held,
         "moves": command is not None and _moves(command, given),
+        "role": command.role if command is not None else "drive",
         "mayMove": command is not None and command.moves,
         "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
         "title": (command and command.title) or "",

@@ -78,6 +78,7 @@ def encode_lease(
             drives=includes(you.role, "drive"),
             forces=includes(you.role, "maintain"),
             spare=spare if includes(you.role, "drive") else "",
+            role=you.role,
         )
     )
 

@@ -20,6 +20,8 @@ import { ANY, Control, HeldControl } from "./held_control.js";
 import { Gamepads } from "./gamepad.js";
 import { said, t } from "../core/words.js";
 
+/** Roles in order of increasing rights. */
+const ROLES = ["watch", "drive", "maintain", "administer"];
 const TICK_MS = 50;
 /** Time limit for the grant of the controls. */
 const ASK_MS = 1500;
@@ -157,6 +159,18 @@ export class Input {
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return "";
+  }
+
+  /**
+   * Why the role of this page is too low for a command; "" if it suffices, or is not known yet.
+   *
+   * @param {import("../core/types.js").Role} [needed]
+   */
+  lacks(needed = "drive") {
+    const { lease } = this.drive;
+    if (needed === "drive" || !lease?.drives) return "";
+    const isEnough = ROLES.indexOf(lease.role ?? "watch") >= ROLES.indexOf(needed);
+    return isEnough ? "" : t("this needs the role {role}", { role: needed });
   }
 
   /**

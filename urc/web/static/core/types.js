@@ -142,6 +142,10 @@
  * @property {boolean} drives Whether this page may drive.
  * @property {boolean} forces Whether it may take the controls from another page.
  * @property {string} spare Key for the redundant socket; "" if it may have none.
+ * @property {Role | null} role Role of this page at the robot.
+ *
+ * @typedef {"watch" | "drive" | "maintain" | "administer"} Role Rights at a robot; each role includes
+ *   the rights of the previous roles.
  *
  * @typedef {object} Hand Present input of a held control.
  * @property {"pointer" | "keys" | "pad" | "stay"} kind stay: the pointer was released, and the control

@@ -36,7 +36,7 @@
  * @property {(wish: import("../core/types.js").PendingValue) => void} drive
  * @property {() => void} wake requests an animation frame
  * @property {() => void} again requests one for widgets alone
- * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
  * @property {Store} store
@@ -320,9 +320,10 @@ export class Cell {
     /** @type {Record<string, Outlet>} */
     const found = Object.create(null);
     const { input } = this.doors;
-    for (const [name, { line, refusal, isAnswered, isHeld, moves }] of this.outputs) {
+    for (const [name, { line, refusal, isAnswered, isHeld, moves, role }] of this.outputs) {
       const shared = refusal || store.hindrance(line, isHeld);
-      const reason = shared || (isHeld ? input.refusal() : input.hindrance(moves));
+      const own = isHeld ? input.refusal() : input.hindrance(moves);
+      const reason = shared || own || input.lacks(role);
       found[name] = { isReady: reason === "", reason, isAnswered };
     }
     return found;

@@ -63,6 +63,7 @@ const FREE = {
   confirmed: false,
   drives: true,
   forces: true,
+  role: "maintain",
   spare: "",
 };
 

@@ -22,6 +22,7 @@
  * @property {string} line The transport that the command needs; "" if it is opened for each command.
  * @property {string} refusal Why a widget can never run it, or "".
  * @property {boolean} isHeld Whether it is a held command.
+ * @property {import("../core/types.js").Role} [role] Role that the command needs.
  * @property {boolean} [moves] Whether it always starts autonomous motion.
  * @property {boolean} [mayMove] Whether it starts motion with some arguments.
  * @property {number} leaseMs Time for which motion outlives the last tick, in milliseconds.
