@@ -284,5 +284,6 @@ def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
     for name, value in headers:
         if name == b"cookie":
             for part in value.decode("latin-1").split(";"):
-                key, _, word = part.strip().partition("=")
+                # Only spaces of ASCII: the filter of proxies must find the same names.
+                key, _, word = part.strip(" \t").partition("=")
                 yield key, word
