@@ -10,10 +10,12 @@ import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from bench.rig.deaths import Rig
+from tests.e2e.verdict import judged
 from urc.access.grants import Grant
 from urc.access.store import AccessStore
 
@@ -24,6 +26,8 @@ SIEGE_S = 8.0
 SETTLED_S = 1.0
 ATTACKER = ("127.0.0.2", 0)
 WATCHERS = 4
+LATE_MS = 100.0
+"""Delay of the machine that makes a siege invalid, in milliseconds."""
 
 pytestmark = [
     pytest.mark.alone,
@@ -96,7 +100,8 @@ class Siege:
                         f"Cookie: {self.cookies[number % len(self.cookies)]}",
                     )
                 )
-                self.deaf += b" 101 " in await reader.readline()
+                is_open = b" 101 " in await reader.readline()
+                self.deaf += is_open
                 writer.transport.pause_reading()  # type: ignore[attr-defined]
                 await asyncio.Event().wait()
             finally:
@@ -132,12 +137,21 @@ class Siege:
                 task.cancel()
 
 
-async def test_the_paired_operator_drives_on(rig: Rig, tmp_path: Path) -> None:
-    store = AccessStore(tmp_path / "data")
-    operator = cookie_of(store, "Tablet in the lab", "drive")
-    watchers = [cookie_of(store, f"Watcher {number}", "watch") for number in range(WATCHERS)]
-    store.close()
-    await asyncio.sleep(SETTLED_S)
+class Trial(NamedTuple):
+    """The result of one siege."""
+
+    is_good: bool
+    late_ms: float
+    """Longest delay of the machine, in milliseconds."""
+
+    @property
+    def is_excused(self) -> bool:
+        """Whether the machine was too busy for the ticks of a page."""
+        return not self.is_good and self.late_ms > LATE_MS
+
+
+async def besieged(rig: Rig, operator: str, watchers: list[str]) -> Trial:
+    """Let a paired operator drive during a siege; return whether no stop reached the robot."""
     number = rig.drive(0, cookie=operator)
     await asyncio.to_thread(rig.operators.await_told, "dying", number)
     await asyncio.sleep(SETTLED_S)
@@ -145,8 +159,20 @@ async def test_the_paired_operator_drives_on(rig: Rig, tmp_path: Path) -> None:
     began_ns = time.monotonic_ns()
     await siege.run(SIEGE_S)
     heard = rig.robots.since(0, began_ns)
-    assert siege.refused > 0
-    assert siege.deaf > 0
-    assert len(heard) > SIEGE_S * 5, "the operator drove all the time"
-    assert [one.text for one in heard if one.text == "M 0"] == []
+    late_ms = rig.late_ms(began_ns, time.monotonic_ns())
     rig.operators.kill(number)
+    assert siege.refused > 0
+    assert siege.deaf > DEAF / 2
+    has_moved = len(heard) > SIEGE_S * 5
+    return Trial(has_moved and all(one.text != "M 0" for one in heard), late_ms)
+
+
+async def test_the_paired_operator_drives_on(rig: Rig, tmp_path: Path) -> None:
+    store = AccessStore(tmp_path / "data")
+    operator = cookie_of(store, "Tablet in the lab", "drive")
+    watchers = [cookie_of(store, f"Watcher {number}", "watch") for number in range(WATCHERS)]
+    store.close()
+    await asyncio.sleep(SETTLED_S)
+    trials: list[Trial] = []
+    while not judged(trials, 1):
+        trials.append(await besieged(rig, operator, watchers))
