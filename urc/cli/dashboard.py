@@ -179,6 +179,7 @@ async def _serve(
             port=place.port,
             on_ready=ready,
             certificates=certificates,
+            allowed_hosts=place.allowed_hosts,
         )
     return 0
 

@@ -26,6 +26,7 @@ async def joined(socket: WebSocket) -> None:
     await socket.close()
 
 
+NAMES = ("robot.local",)
 APP = Starlette(
     routes=[
         WebSocketRoute("/ws", joined),
@@ -50,13 +51,15 @@ def client(app: ASGIApp, base: str, peer: str = "192.168.4.7") -> TestClient:
     ],
 )
 def test_plain_pages_are_redirected_to_https(path: str, place: str) -> None:
-    answer = client(TlsPort(APP), "http://robot.local:8080").get(f"http://robot.local:8080{path}")
+    answer = client(TlsPort(APP, NAMES), "http://robot.local:8080").get(
+        f"http://robot.local:8080{path}"
+    )
     assert (answer.status_code, answer.headers["location"]) == (307, place)
     assert answer.headers["cache-control"] == "no-store"
 
 
 def test_a_plain_request_that_changes_something_gets_one_line() -> None:
-    plain = client(TlsPort(APP), "http://robot.local:8080")
+    plain = client(TlsPort(APP, NAMES), "http://robot.local:8080")
     answer = plain.post("/api/v1/robots/cart/commands")
     assert answer.status_code == 403
     assert answer.text == "This port requires HTTPS: use an address that begins with https://\n"
@@ -74,22 +77,28 @@ def test_a_plain_request_that_changes_something_gets_one_line() -> None:
     ],
 )  # fmt: skip
 def test_stop_and_what_a_device_needs_before_trust_are_plain(method: str, path: str) -> None:
-    plain = client(TlsPort(APP), "http://192.168.4.1:8080")
+    plain = client(TlsPort(APP, NAMES), "http://192.168.4.1:8080")
     assert plain.request(method, path).text == f"http {path}"
 
 
 def test_everything_else_needs_both_ends_on_this_machine() -> None:
     """A client's address alone is no proof: a router may translate it."""
-    assert client(TlsPort(APP), "http://127.0.0.1:8080", "127.0.0.1").get("/").status_code == 200
-    assert client(TlsPort(APP), "http://[::1]:8080", "::ffff:127.0.0.1").get("/").status_code == 200
+    assert (
+        client(TlsPort(APP, NAMES), "http://127.0.0.1:8080", "127.0.0.1").get("/").status_code
+        == 200
+    )
+    assert (
+        client(TlsPort(APP, NAMES), "http://[::1]:8080", "::ffff:127.0.0.1").get("/").status_code
+        == 200
+    )
     for base, peer in (
         ("http://127.0.0.1:8080", "192.168.4.7"), ("http://192.168.4.1:8080", "127.0.0.1"),
     ):  # fmt: skip
-        assert client(TlsPort(APP), base, peer).get("/").status_code == 307
+        assert client(TlsPort(APP, NAMES), base, peer).get("/").status_code == 307
 
 
 def test_https_reaches_the_application() -> None:
-    secure = client(TlsPort(APP), "https://robot.local:8080")
+    secure = client(TlsPort(APP, NAMES), "https://robot.local:8080")
     assert secure.get("/robots/cart/").text == "https /robots/cart/"
     with secure.websocket_connect("wss://robot.local:8080/ws") as socket:
         assert socket.receive_text() == "wss"
@@ -114,3 +123,17 @@ def test_a_socket_of_a_public_name_is_secure() -> None:
     headers = {"host": "robots.example"}
     with client(app, "http://127.0.0.1").websocket_connect("/ws", headers=headers) as socket:
         assert socket.receive_text() == "wss"
+
+
+@pytest.mark.parametrize("host", ["evil.example", "robot.local.evil.example", "-"])
+def test_a_foreign_host_is_not_redirected(host: str) -> None:
+    """A page of that host would follow it, and its address would look as if it were URC's."""
+    plain = client(TlsPort(APP, NAMES), "http://robot.local:8080")
+    answer = plain.get("/robots/cart/", headers={"host": host})
+    assert answer.status_code in (403, 421)
+    assert "location" not in answer.headers
+
+
+def test_an_address_of_the_machine_is_redirected() -> None:
+    plain = client(TlsPort(APP), "http://192.168.4.1:8080")
+    assert plain.get("/").headers["location"] == "https://192.168.4.1:8080/"

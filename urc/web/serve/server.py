@@ -51,6 +51,7 @@ async def serve(
     request_s: float = REQUEST_S,
     connections: int = CONNECTIONS,
     certificates: Certificates | None = None,
+    allowed_hosts: Iterable[str] = (),
     handshakes: Handshakes | None = None,
 ) -> None:
     """Serve `app` until SIGINT, SIGTERM or cancellation, then close within 3 seconds.
@@ -65,6 +66,7 @@ async def serve(
         connections: maximum number of open connections; beyond this number, new connections get
             status 503.
         certificates: certificates of HTTPS; None for plain HTTP.
+        allowed_hosts: names of this machine that plain HTTP redirects to HTTPS, besides its own.
         handshakes: limits of unfinished handshakes; None for the usual limits.
 
     Raises:
@@ -76,7 +78,7 @@ async def serve(
     if certificates is not None:
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)
-        app = TlsPort(app)
+        app = TlsPort(app, allowed_hosts)
     config = uvicorn.Config(
         app,
         loop="none",

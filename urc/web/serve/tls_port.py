@@ -15,7 +15,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from urc._addresses import unmapped
 from urc.web.serve.connection_quota import is_stop
-from urc.web.serve.policy import REFUSAL_HEADERS, Authority, parse_host
+from urc.web.serve.policy import (
+    REFUSAL_HEADERS,
+    Authority,
+    is_host_allowed,
+    own_names,
+    parse_host,
+)
 
 __all__ = ["BehindProxy", "TlsPort"]
 
@@ -30,8 +36,15 @@ _PLAIN = re.compile(
 class TlsPort:
     """The middleware of a port with TLS."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, allowed_hosts: Iterable[str] = ()) -> None:
+        """Prepare.
+
+        Args:
+            app: the application.
+            allowed_hosts: names to redirect, besides addresses and the names of this machine.
+        """
         self._app = app
+        self._names = own_names() | {one.lower().removesuffix(".") for one in allowed_hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward the request, or redirect it to HTTPS."""
@@ -41,7 +54,7 @@ class TlsPort:
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": "use wss"})
         else:
-            await _redirect(scope)(scope, receive, send)
+            await _redirect(scope, self._names)(scope, receive, send)
 
 
 class BehindProxy:
@@ -82,7 +95,7 @@ def _is_near(place: tuple[str, int | None] | None) -> bool:
         return False
 
 
-def _redirect(scope: Scope) -> ASGIApp:
+def _redirect(scope: Scope, names: frozenset[str]) -> ASGIApp:
     """Return the response to a plain request that needs HTTPS."""
     host = _host(scope)
     headers = {name.decode(): value.decode() for name, value in REFUSAL_HEADERS}
@@ -90,6 +103,8 @@ def _redirect(scope: Scope) -> ASGIApp:
     if host is None or scope["method"] not in ("GET", "HEAD"):
         text = "This port requires HTTPS: use an address that begins with https://\n"
         return PlainTextResponse(text, 403, headers)
+    if not is_host_allowed(host, names):
+        return PlainTextResponse("This server accepts no requests to that host.\n", 421, headers)
     port = "" if host.port is None else f":{host.port}"
     query = scope["query_string"].decode("latin-1")
     path = "/" + quote(scope["path"].lstrip("/")) + (f"?{query}" if query else "")
