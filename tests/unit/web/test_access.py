@@ -9,7 +9,15 @@ from urc.access.control import LOCAL_SIGN_INS, AccessControl
 from urc.access.grants import parse_grant
 from urc.access.store import AccessStore
 from urc.web.serve.access import Access
-from urc.web.serve.rights import ADMINISTER, DRIVE, LOCAL, MAINTAIN_SERVER, SIGNED_IN, WATCH
+from urc.web.serve.rights import (
+    ADMINISTER,
+    DRIVE,
+    FRESH_S,
+    LOCAL,
+    MAINTAIN_SERVER,
+    SIGNED_IN,
+    WATCH,
+)
 from urc.web.serve.visitor import Visitor
 
 URL = "http://127.0.0.1:8080/"
@@ -207,6 +215,20 @@ def test_rights_are_read_at_each_question(access: Access) -> None:
     store.remove(ann.identity.principal)
     access.control.load()
     assert not ann.may(SIGNED_IN)
+
+
+def test_a_sign_in_is_fresh_for_some_minutes(
+    access: Access, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The local user and programs have no second sign-in."""
+    ann, _ = person(access, "maintain")
+    _, token = person(access, "maintain", way="token")
+    program = access.visitor([(b"authorization", f"Bearer {token}".encode())])
+    local = admitted(access, access.address(URL))
+    assert ann.is_fresh
+    later = access.control.now() + FRESH_S + 1
+    monkeypatch.setattr(access.control, "now", lambda: later)
+    assert (ann.is_fresh, program.is_fresh, local.is_fresh) == (False, True, True)
 
 
 def test_sockets_look_at_their_rights_after_each_change(access: Access) -> None:

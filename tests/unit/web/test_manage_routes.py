@@ -21,6 +21,7 @@ from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
 from urc.web.manage.catalogue import PackageCatalog
 from urc.web.manage.upload_source import given_source
+from urc.web.serve.rights import FRESH_S
 
 ADDRESS = "http://localhost:8080"
 
@@ -114,6 +115,19 @@ def test_a_person_with_the_role_maintain_may(tmp_path: Path) -> None:
         path = client.post("/api/v1/packages/add", json={"path": "/etc/passwd"})
         assert path.status_code == 403
         assert "full path" not in client.get("/interfaces").text
+
+
+def test_a_sign_in_of_long_ago_changes_no_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tablet that was left signed in does not suffice."""
+    stock(tmp_path)
+    with served(tmp_path, cookies=person("Mio", "maintain")) as client:
+        later = OPEN.control.now() + FRESH_S + 1
+        monkeypatch.setattr(OPEN.control, "now", lambda: later)
+        kept = client.post("/api/v1/packages/remove", json={"package": "wide", "yes": True})
+    assert kept.status_code == 403
+    assert "this needs a sign-in of the last 5 minutes" in kept.json()["error"]
 
 
 def test_only_pages_of_ours_have_repositories_asked(

@@ -49,7 +49,9 @@ from urc.web.serve.rights import (
     LOCAL,
     MAINTAIN,
     MAINTAIN_ANYWHERE,
+    MAINTAIN_FRESH,
     MAINTAIN_SERVER,
+    MAINTAIN_SERVER_FRESH,
     SIGNED_IN,
     WATCH,
     ProtectedRoute,
@@ -292,7 +294,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "settings",
         f"{_ROBOT}/settings",
-        MAINTAIN,
+        MAINTAIN_FRESH,
         "Test the settings with the robot, then store and use them immediately.",
         SettingsAnswer,
         SettingsAsked,
@@ -333,7 +335,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "repositories_add",
         "/api/v1/repositories",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Add a repository, which must respond.",
         ResultLine,
         Url,
@@ -343,7 +345,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "repositories_remove",
         "/api/v1/repositories/remove",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Forget a repository.",
         ResultLine,
         Url,
@@ -353,7 +355,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_install",
         "/api/v1/packages/install",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Start a job that downloads a package with its dependencies and lists its permissions.",
         JobNews,
         InstallRequest,
@@ -364,7 +366,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_add",
         "/api/v1/packages/add",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Start a job for a package given by its path in a repository or on this machine.",
         JobNews,
         Add,
@@ -375,7 +377,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_upload",
         "/api/v1/packages/upload",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Start a job for an uploaded package, bundle or interface.yaml in the request body.",
         JobNews,
         bytes,
@@ -387,7 +389,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_update",
         "/api/v1/packages/update",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Start a job that downloads a newer version of a package and lists the changes.",
         JobNews,
         InstallRequest,
@@ -398,7 +400,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_back",
         "/api/v1/packages/back",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Restore the version of a package before its last update.",
         RemovedPackages,
         InstallRequest,
@@ -408,7 +410,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "packages_remove",
         "/api/v1/packages/remove",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Remove a package; without yes, only list the packages that would be removed.",
         RemovedPackages,
         InstallRequest,
@@ -418,7 +420,7 @@ CALLS: Final[tuple[Call, ...]] = (
     Call(
         "job_agree",
         "/api/v1/job/agree",
-        MAINTAIN_SERVER,
+        MAINTAIN_SERVER_FRESH,
         "Install the planned package after its approval.",
         JobNews,
         JobDecision,

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from urc.web.manage.wire import ResultLine
 from urc.web.people import messages as told
-from urc.web.serve.rights import ADMINISTER, ANYONE, SIGNED_IN, Right
+from urc.web.serve.rights import ADMINISTER, ADMINISTER_FRESH, ANYONE, SIGNED_IN, Right
 
 __all__ = ["PEOPLE_CALLS", "PeopleCall"]
 
@@ -78,10 +78,10 @@ PEOPLE_CALLS: Final = (
     _list("guests", ADMINISTER, "All guests.", told.PrincipalList),
     _list("sign-ins", ADMINISTER, "All sign-ins, the most recently used first.", told.SignInList),
     _list("pairings/{id}", SIGNED_IN, "State of a pairing.", told.PairingState),
-    PeopleCall("people/add", ADMINISTER, "Add a person.", ResultLine, told.AddPerson),
+    PeopleCall("people/add", ADMINISTER_FRESH, "Add a person.", ResultLine, told.AddPerson),
     PeopleCall(
         "people/invite",
-        ADMINISTER,
+        ADMINISTER_FRESH,
         "Make a link with which a person chooses a passphrase.",
         told.SecretLink,
         told.PrincipalChoice,
@@ -95,7 +95,7 @@ PEOPLE_CALLS: Final = (
     ),
     PeopleCall(
         "people/roles",
-        ADMINISTER,
+        ADMINISTER_FRESH,
         "Replace the rights of a person, device or program.",
         ResultLine,
         told.RolesRequest,
@@ -116,17 +116,21 @@ PEOPLE_CALLS: Final = (
     ),
     PeopleCall(
         "devices/pair",
-        ADMINISTER,
+        ADMINISTER_FRESH,
         "Make a code that pairs one device.",
         told.PairingCode,
         told.PairingRequest,
     ),
     PeopleCall(
-        "tokens/add", ADMINISTER, "Add a program with a token.", told.NewToken, told.TokenRequest
+        "tokens/add",
+        ADMINISTER_FRESH,
+        "Add a program with a token.",
+        told.NewToken,
+        told.TokenRequest,
     ),
     PeopleCall(
         "guests/add",
-        ADMINISTER,
+        ADMINISTER_FRESH,
         "Make a link with which guests watch one robot.",
         told.SecretLink,
         told.GuestRequest,

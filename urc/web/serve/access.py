@@ -10,6 +10,7 @@ import asyncio
 import secrets
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from math import inf
 from typing import Final
 from urllib.parse import quote
 
@@ -208,6 +209,11 @@ class Access:
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether the scope of a token contains a command."""
         return self.control.directory.may_give(who, command)
+
+    def signed_in_s(self, who: Identity) -> float:
+        """Return the time since the sign-in of `who`, in seconds; infinite without a sign-in."""
+        sign_in = self.control.directory.sign_ins.get(who.sign_in)
+        return self.control.now() - sign_in.created_at if sign_in else inf
 
     def is_local(self, who: Identity) -> bool:
         """Return whether `who` is the local user, with a sign-in that has not ended."""

@@ -17,12 +17,16 @@ from urc.web.words import t
 
 __all__ = [
     "ADMINISTER",
+    "ADMINISTER_FRESH",
     "ANYONE",
     "DRIVE",
+    "FRESH_S",
     "LOCAL",
     "MAINTAIN",
     "MAINTAIN_ANYWHERE",
+    "MAINTAIN_FRESH",
     "MAINTAIN_SERVER",
+    "MAINTAIN_SERVER_FRESH",
     "SIGNED_IN",
     "WATCH",
     "ProtectedRoute",
@@ -43,6 +47,8 @@ class Right(NamedTuple):
     ``anywhere``: for at least one robot."""
     is_local: bool = False
     """Whether only the local user has the right."""
+    is_fresh: bool = False
+    """Whether people must have signed in within the last `FRESH_S` seconds."""
 
     @property
     def refusal(self) -> str:
@@ -54,6 +60,9 @@ class Right(NamedTuple):
         return t("This needs the role {role}.", role=self.role)
 
 
+FRESH_S: Final = 300.0
+"""Time after a sign-in in which people change packages, settings and rights, in seconds. A tablet
+that was left signed in does not suffice."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 WATCH: Final = Right("watch")
@@ -61,7 +70,10 @@ DRIVE: Final = Right("drive")
 MAINTAIN: Final = Right("maintain")
 MAINTAIN_ANYWHERE: Final = Right("maintain", "anywhere")
 MAINTAIN_SERVER: Final = Right("maintain", "server")
+MAINTAIN_FRESH: Final = Right("maintain", is_fresh=True)
+MAINTAIN_SERVER_FRESH: Final = Right("maintain", "server", is_fresh=True)
 ADMINISTER: Final = Right("administer", "server")
+ADMINISTER_FRESH: Final = Right("administer", "server", is_fresh=True)
 LOCAL: Final = Right("administer", "server", is_local=True)
 
 
@@ -70,6 +82,10 @@ class RightHolder(Protocol):
 
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor has a right now."""
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the visitor has signed in within the last `FRESH_S` seconds."""
 
 
 class ProtectedRoute(Route):
@@ -90,6 +106,10 @@ class ProtectedRoute(Route):
         """Call the endpoint; raise `HTTPException` 403 without the right."""
         if not _may(scope, self.right):
             raise HTTPException(403, self.right.refusal)
+        if self.right.is_fresh and not scope["state"]["visitor"].is_fresh:
+            minutes = round(FRESH_S / 60)
+            text = t("Sign in again: this needs a sign-in of the last {n} minutes.", n=minutes)
+            raise HTTPException(403, text)
         await super().handle(scope, receive, send)
 
 

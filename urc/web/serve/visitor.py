@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection
 from urc.access.directory import NOBODY, Identity
 from urc.model.role import Role, includes
 from urc.web.feed.client_socket import SocketPeer
-from urc.web.serve.rights import Right
+from urc.web.serve.rights import FRESH_S, Right
 
 __all__ = ["Visitor", "VisitorRights", "is_loopback", "peer_of", "visitor_of"]
 
@@ -27,6 +27,9 @@ class VisitorRights(Protocol):
 
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether the scope of a token contains a command; "": all commands."""
+
+    def signed_in_s(self, who: Identity) -> float:
+        """Return the time since the sign-in of `who`, in seconds."""
 
     def is_local(self, who: Identity) -> bool:
         """Return whether `who` is the local user, with a sign-in that has not ended."""
@@ -61,6 +64,16 @@ class Visitor:
     def is_local(self) -> bool:
         """Whether the visitor is the local user now."""
         return self._rights.is_local(self.identity)
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether the visitor has signed in within the last `FRESH_S` seconds.
+
+        The local user and programs have no second sign-in, so they always count as fresh.
+        """
+        if self.is_local or self.identity.way == "token":
+            return True
+        return self._rights.signed_in_s(self.identity) <= FRESH_S
 
     @property
     def client(self) -> str:
