@@ -30,14 +30,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the backup, also while a server is running."""
     from urc import __version__
     from urc._folders import data_folder
-    from urc.runtime.backup_archive import Manifest, parts_in, write_backup
+    from urc.runtime.backup_archive import BackupManifest, parts_in, write_backup
 
     data, file = arguments.data or data_folder(), arguments.file
     if file.exists() and not arguments.replace:
         raise UrcError(f"{file} exists already; --replace replaces the file")
     if not parts_in(data)[0]:
         raise UrcError(f"{data} has nothing to back up; select another folder with --data-dir")
-    written, unknown = write_backup(data, file, Manifest(1, __version__, time.time()))
+    written, unknown = write_backup(data, file, BackupManifest(1, __version__, time.time()))
     audit_access(data, "backup", file=file.name)
     size = max(1, file.stat().st_size >> 10)
     print(f"{file}: {len(written)} files, {size} KiB; keep it like a key, because it contains keys")

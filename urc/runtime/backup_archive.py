@@ -27,7 +27,7 @@ from urc.problems import UrcError
 __all__ = [
     "BackupError",
     "BackupReader",
-    "Manifest",
+    "BackupManifest",
     "opened_backup",
     "parts_in",
     "write_backup",
@@ -70,7 +70,7 @@ class BackupError(UrcError):
     """A backup that cannot be written, read or restored."""
 
 
-class Manifest(msgspec.Struct, frozen=True):
+class BackupManifest(msgspec.Struct, frozen=True):
     """The description of a backup."""
 
     format: Annotated[int, msgspec.Meta(ge=1)]
@@ -109,7 +109,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
     return sorted(parts), sorted(unknown)
 
 
-def write_backup(data: Path, file: Path, manifest: Manifest) -> tuple[list[str], list[str]]:
+def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
     """Write a backup of a data folder, and return the written and the unknown files.
 
     The archive appears complete or not at all, and is readable only to its owner.
@@ -263,11 +263,11 @@ class BackupReader:
         if left:
             raise BackupError(f"{self._name}: {one.path!r} has another size than declared")
 
-    def _manifest(self, entry: zipfile.ZipInfo) -> Manifest:
+    def _manifest(self, entry: zipfile.ZipInfo) -> BackupManifest:
         try:
             with self._archive.open(entry) as opened:
                 data = opened.read(_MANIFEST_BYTES)
-            manifest = msgspec.json.decode(data, type=Manifest)
+            manifest = msgspec.json.decode(data, type=BackupManifest)
         except (msgspec.DecodeError, OSError, *_DAMAGE):
             raise BackupError(f"{self._name}: the description of the backup is damaged") from None
         if manifest.format != 1:

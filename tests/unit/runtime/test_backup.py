@@ -21,7 +21,7 @@ from urc.packages.signature import fingerprint
 from urc.runtime import backup_archive, data_restore
 from urc.runtime.backup_archive import (
     BackupError,
-    Manifest,
+    BackupManifest,
     opened_backup,
     parts_in,
     write_backup,
@@ -29,7 +29,7 @@ from urc.runtime.backup_archive import (
 from urc.runtime.data_restore import check_target, is_interrupted, restore
 from urc.runtime.running_servers import RunningServer, announced
 
-MADE = Manifest(1, "0.1.0", 1_000_000.0)
+MADE = BackupManifest(1, "0.1.0", 1_000_000.0)
 BLOB = f"packages/blobs/{'0a' * 32}.zip"
 
 
