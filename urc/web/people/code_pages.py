@@ -13,13 +13,13 @@ from urc.web.serve.rights import ANYONE, ProtectedRoute
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["CodePage", "CodePages"]
+__all__ = ["OneTimeCodePage", "CodePages"]
 
 _NO_STORE: Final = {"cache-control": "no-store"}
 
 
 @dataclass(frozen=True, slots=True)
-class CodePage:
+class OneTimeCodePage:
     """Context of ``pair.html.j2``, ``join.html.j2`` and ``guest.html.j2``."""
 
     head: PageHead
@@ -40,5 +40,5 @@ class CodePages:
             "join": t("Choose a passphrase"),
             "guest": t("Watch as a guest"),
         }[name]
-        page = CodePage(PageHead(request.state.nonce, title))
+        page = OneTimeCodePage(PageHead(request.state.nonce, title))
         return HTMLResponse(render(f"{name}.html.j2", page), headers=_NO_STORE)

@@ -15,12 +15,12 @@ from urc.web.show.menu import Nav, NavigationLinks
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["AccountPage", "PeoplePage", "PeoplePages", "Scope"]
+__all__ = ["AccountPage", "PeoplePage", "PeoplePages", "GrantScope"]
 
 _NO_STORE: Final = {"cache-control": "no-store"}
 
 
-class Scope(NamedTuple):
+class GrantScope(NamedTuple):
     """A choice of robots for a role."""
 
     value: str
@@ -34,8 +34,8 @@ class PeoplePage:
 
     head: PageHead
     nav: Nav
-    scopes: tuple[Scope, ...]
-    robots: tuple[Scope, ...]
+    scopes: tuple[GrantScope, ...]
+    robots: tuple[GrantScope, ...]
     """The robots alone; the value is the name in URLs."""
 
 
@@ -79,15 +79,15 @@ class PeoplePages:
         robots = self._robots()
         tags = sorted({tag for name in robots for tag in self._tags_of(name)})
         scopes = (
-            Scope("", t("all robots")),
-            *(Scope(f"@{name}", title) for name, title in robots.items()),
-            *(Scope(f"@#{tag}", t("robots with the tag {tag}", tag=tag)) for tag in tags),
+            GrantScope("", t("all robots")),
+            *(GrantScope(f"@{name}", title) for name, title in robots.items()),
+            *(GrantScope(f"@#{tag}", t("robots with the tag {tag}", tag=tag)) for tag in tags),
         )
         page = PeoplePage(
             PageHead(request.state.nonce, t("People")),
             Nav("people", self._ways),
             scopes,
-            tuple(Scope(name, title) for name, title in robots.items()),
+            tuple(GrantScope(name, title) for name, title in robots.items()),
         )
         return HTMLResponse(render("people.html.j2", page), headers=_NO_STORE)
 
