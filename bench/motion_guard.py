@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.harness import Result
-from bench.motion_engine import repeated, said
 from bench.rig.engine import EngineRig
+from bench.trials import repeated, said
 
 __all__ = ["run"]
 

@@ -7,6 +7,7 @@ pages continue to send ticks.
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -77,14 +78,14 @@ class RevocationRig(Rig):
         if kind == "token":
             program = store.add("program", name, drives, now=now)
             sign_in, secret = store.open_sign_in(program.id, "token", now=now)
-            return _Holder(secret, "", lambda: store.close_sign_in(sign_in.id), (program.id,))
+            return _Holder(secret, "", partial(store.close_sign_in, sign_in.id), (program.id,))
         person = store.add("person", name, drives, now=now)
-        holder, revoke = person, lambda: store.remove(person.id)
+        holder, revoke = person, partial(store.remove, person.id)
         if kind == "device":
             holder = store.add("device", name, now=now, owner=person.id)
-            revoke = lambda: store.remove(holder.id)  # noqa: E731 - one of three equal forms
+            revoke = partial(store.remove, holder.id)
         elif kind == "role":
-            revoke = lambda: store.set_grants(person.id, [Grant("watch")])  # noqa: E731
+            revoke = partial(store.set_grants, person.id, [Grant("watch")])
         _, secret = store.open_sign_in(holder.id, "pairing", now=now)
         return _Holder("", f"urc-sign-in-{store.instance()}={secret}", revoke, (person.id,))
 

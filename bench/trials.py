@@ -1,0 +1,51 @@
+"""Repetition and results of trials that measure the time until a robot stops."""
+
+from collections.abc import Callable, Sequence
+from math import inf
+
+from bench.figures import distribution, tell
+from bench.harness import Result
+from bench.rig.deaths import Trial
+
+__all__ = ["repeated", "said"]
+
+MOST_BOUTS = 3
+"""Maximum number of rounds of trials on a busy machine, as a multiple of the required number."""
+
+
+def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:
+    """Repeat rounds until enough trials are valid, or the maximum number of rounds is reached."""
+    trials: list[Trial] = []
+    for _ in range(MOST_BOUTS * wanted // robot_count):
+        trials += bout()
+        if sum(not one.is_excused for one in trials) >= wanted:
+            break
+    return trials
+
+
+def said(figure: str, cause: str, trials: Sequence[Trial], wanted: int, bin_ms: float) -> Result:
+    """Print the result for one cause of a stop, and compare the slowest stop with the limit."""
+    counted = [one for one in trials if not one.is_excused]
+    tell(
+        {
+            "figure": figure,
+            "cause": cause,
+            "trials": len(counted),
+            "broken": sum(not one.is_good for one in counted),
+            "faults": sorted({one.fault for one in counted if one.fault}),
+            "excused": len(trials) - len(counted),
+            **distribution([one.stop_ms for one in counted], bin_ms),
+        }
+    )
+    is_whole = len(counted) >= wanted and not any(one.fault for one in counted)
+    slowest = max((one.stop_ms for one in counted), default=inf) if is_whole else inf
+    bound_ms = trials[0].bound_ms
+    return Result(
+        name=f"motion stop after {cause}: slowest of {len(counted)} / {bound_ms:g} ms",
+        ratio=round(slowest / bound_ms, 3),
+        goal=1.0,
+        baseline_ms=bound_ms,
+        subject_ms=round(slowest, 1),
+        spread=1.0,
+        rounds=len(counted),
+    )
