@@ -13,7 +13,7 @@ ROW = re.compile(
 
 
 def test_the_policy_says_how_to_report() -> None:
-    """Privately, by the repository's advisories; no address that nobody reads."""
+    """Reports go to the private advisories of the repository, not to an e-mail address."""
     for heading in ("Supported versions", "Report a vulnerability", "Response"):
         assert f"## {heading}\n" in POLICY
     assert "“Report a vulnerability”" in POLICY

@@ -44,7 +44,7 @@ def test_each_named_test_exists(row: str) -> None:
 
 @pytest.mark.parametrize("row", [one for one in ROWS if not one.startswith("T")])
 def test_each_requirement_has_a_state_of_the_list(row: str) -> None:
-    """What is missing is named."""
+    """A state other than done names the missing part."""
     assert re.fullmatch(r"done|open|partly: \*.+\*", ROWS[row][-2])
 
 

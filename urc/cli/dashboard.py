@@ -140,19 +140,10 @@ async def _serve(
             on_ready(addresses)
 
         factory = RobotFactory(robot_options)
-        robots: dict[str, Robot] = {}
-        for profile in profiles:
-            robot = _first(factory, profile)
-            if faulty is not None:
-                # Emulated from the start, even without a viewer.
-                emulated_robot = EmulatedRobot(robot.profile, robot.settings)
-                stack.enter_context(faulty.watch(profile.name, emulated_robot))
-                redirected = await stack.enter_async_context(
-                    stand_in(robot.profile, robot.settings, emulated_robot)
-                )
-                robot = _robot(place, None, redirected, robot.settings)
-                robot = replace(robot, glimpse=partial(_seen, emulated_robot), is_emulated=True)
-            robots[profile.name] = robot
+        robots = {
+            profile.name: await _robot_at_start(stack, factory, place, profile, faulty)
+            for profile in profiles
+        }
         if faulty is not None:
             faulty.begin(faults)
             await stack.enter_async_context(_listening(faulty))
@@ -182,6 +173,26 @@ async def _serve(
             allowed_hosts=place.allowed_hosts,
         )
     return 0
+
+
+async def _robot_at_start(
+    stack: AsyncExitStack,
+    factory: RobotFactory,
+    place: DashboardAddress,
+    profile: Profile,
+    faulty: FaultInjector | None,
+) -> Robot:
+    """Return the robot of a profile; with `faulty`, emulated from the start, without a viewer."""
+    robot = _first(factory, profile)
+    if faulty is None:
+        return robot
+    emulated_robot = EmulatedRobot(robot.profile, robot.settings)
+    stack.enter_context(faulty.watch(profile.name, emulated_robot))
+    redirected = await stack.enter_async_context(
+        stand_in(robot.profile, robot.settings, emulated_robot)
+    )
+    robot = _robot(place, None, redirected, robot.settings)
+    return replace(robot, glimpse=partial(_seen, emulated_robot), is_emulated=True)
 
 
 @asynccontextmanager

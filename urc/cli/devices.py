@@ -15,6 +15,8 @@ from urc.cli.identities import (
     minutes_of,
     named,
     record,
+    remove,
+    rename,
     roles_in,
     roles_text,
     run_action,
@@ -22,7 +24,7 @@ from urc.cli.identities import (
     words_of,
 )
 from urc.cli.output import complain
-from urc.problems import UrcError, printable
+from urc.problems import UrcError
 
 if TYPE_CHECKING:
     from urc.access.store import AccessStore
@@ -127,22 +129,12 @@ def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Give a device another name."""
-    old, new = words_of(arguments, "devices", "NAME", "NEW")
-    device = named(store, "device", old)
-    store.rename(device.id, new)
-    record(store, "devices rename", name=device.name, new=new)
-    print(printable(f"renamed {device.name} to {new}"))
-    return 0
+    return rename(store, "device", arguments, "devices")
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Remove a device; its key is worthless from now on."""
-    (name,) = words_of(arguments, "devices", "NAME")
-    device = named(store, "device", name)
-    store.remove(device.id)
-    record(store, "devices remove", name=device.name)
-    print(printable(f"removed {device.name}: this device must be paired again"))
-    return 0
+    return remove(store, "device", arguments, "devices", ": this device must be paired again")
 
 
 _ACTIONS = {

@@ -166,6 +166,28 @@ def change_roles(
     return 0
 
 
+def rename(store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str) -> int:
+    """Run ``rename``: give a person or device another name."""
+    old, new = words_of(arguments, verb, "NAME", "NEW")
+    principal = named(store, kind, old)
+    store.rename(principal.id, new)
+    record(store, f"{verb} rename", name=principal.name, new=new)
+    print(printable(f"renamed {principal.name} to {new}"))
+    return 0
+
+
+def remove(
+    store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str, result: str
+) -> int:
+    """Run ``remove``: remove a person, device or program; `result` is the rest of the message."""
+    (name,) = words_of(arguments, verb, "NAME")
+    principal = named(store, kind, name)
+    store.remove(principal.id)
+    record(store, f"{verb} remove", name=principal.name)
+    print(printable(f"removed {principal.name}{result}"))
+    return 0
+
+
 def roles_text(grants: Iterable["Grant"]) -> str:
     """Return grants as text, such as ``drive@#lab, watch``."""
     return ", ".join(map(str, grants)) or "no role"

@@ -17,6 +17,8 @@ from urc.cli.identities import (
     minutes_of,
     named,
     record,
+    remove,
+    rename,
     roles_in,
     roles_text,
     run_action,
@@ -136,22 +138,12 @@ def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Give a person another name."""
-    old, new = words_of(arguments, "people", "NAME", "NEW")
-    person = named(store, "person", old)
-    store.rename(person.id, new)
-    record(store, "people rename", name=person.name, new=new)
-    print(printable(f"renamed {person.name} to {new}"))
-    return 0
+    return rename(store, "person", arguments, "people")
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Remove a person with all devices and sign-ins."""
-    (name,) = words_of(arguments, "people", "NAME")
-    person = named(store, "person", name)
-    store.remove(person.id)
-    record(store, "people remove", name=person.name)
-    print(printable(f"removed {person.name}, with all sign-ins and devices"))
-    return 0
+    return remove(store, "person", arguments, "people", ", with all sign-ins and devices")
 
 
 def _passphrase(store: "AccessStore", arguments: argparse.Namespace) -> int:

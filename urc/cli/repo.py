@@ -72,6 +72,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="search: print one JSON line per package"
     )
+    _add_publisher_arguments(parser)
+    add_host(parser)
+    parser.add_argument(
+        "--port",
+        type=port,
+        default=_PORT,
+        help=f"serve: port; 0 selects a free port (default: {_PORT})",
+    )
+
+
+def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of those who publish packages: keys, upload tokens and reasons."""
     parser.add_argument("--name", metavar="TEXT", help="index, serve: title of the repository")
     parser.add_argument(
         "--tokens",
@@ -109,13 +121,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--signed-by",
         metavar="SHA256:…",
         help="blocks import: trust the key with this fingerprint",
-    )
-    add_host(parser)
-    parser.add_argument(
-        "--port",
-        type=port,
-        default=_PORT,
-        help=f"serve: port; 0 selects a free port (default: {_PORT})",
     )
 
 

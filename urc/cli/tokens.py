@@ -12,8 +12,8 @@ from urc.cli.identities import (
     ends_at,
     iso,
     local_time,
-    named,
     record,
+    remove,
     roles_in,
     roles_text,
     run_action,
@@ -21,7 +21,6 @@ from urc.cli.identities import (
     words_of,
 )
 from urc.cli.output import complain
-from urc.problems import printable
 
 if TYPE_CHECKING:
     from urc.access.store import AccessStore
@@ -131,12 +130,7 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Remove a program with its token."""
-    (name,) = words_of(arguments, "tokens", "NAME")
-    program = named(store, "program", name)
-    store.remove(program.id)
-    record(store, "tokens remove", name=program.name)
-    print(printable(f"removed {program.name}: its token is invalid"))
-    return 0
+    return remove(store, "program", arguments, "tokens", ": its token is invalid")
 
 
 def _commands(text: str) -> list[str]:

@@ -360,6 +360,7 @@ class _Routes:
         secrets = secret_texts(robot.profile, robot.settings)
         self.stations[name].controls.recorder.hide(secrets)
         self.stations[name].replace(robot, latch)
+        self.access.recheck()  # grants may be for a tag that the new document lacks
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:

@@ -1,4 +1,4 @@
-"""The drill of the block list: a driven robot stops, although nobody at the page lets go."""
+"""The drill of the block list: a robot stops while its operator still holds the stick."""
 
 import asyncio
 import time

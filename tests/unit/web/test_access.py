@@ -20,6 +20,8 @@ from urc.web.serve.rights import (
 )
 from urc.web.serve.visitor import Visitor
 
+pytestmark = pytest.mark.anyio
+
 URL = "http://127.0.0.1:8080/"
 
 
@@ -229,6 +231,17 @@ def test_a_sign_in_is_fresh_for_some_minutes(
     later = access.control.now() + FRESH_S + 1
     monkeypatch.setattr(access.control, "now", lambda: later)
     assert (ann.is_fresh, program.is_fresh, local.is_fresh) == (False, True, True)
+
+
+async def test_commands_of_an_open_page_count_as_use(access: Access) -> None:
+    """A page that drives for a day must not lose its right while it drives."""
+    ann, _ = person(access, "drive")
+    store, later = access.control.store, access.control.now() + 3600
+    assert store is not None
+    access.control._utc = lambda: later
+    assert ann.may_give("drive")
+    await access.control._record_use()
+    assert store.directory().sign_ins[ann.identity.sign_in].used_at == later
 
 
 def test_sockets_look_at_their_rights_after_each_change(access: Access) -> None:

@@ -19,6 +19,7 @@ from urc.packages.install import plan_file
 from urc.packages.package import Package, pack_folder
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
+from urc.testing.entry import OPEN
 
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "rover"
 BEFORE = (ATTACK / "driver.yaml").read_text(encoding="utf-8").replace("-speed", "speed")
@@ -248,3 +249,15 @@ def test_what_a_package_uses_by_itself_is_agreed_to_apart(tmp_path: Path) -> Non
         assert refused.status_code == 422
         assert "its own access to this machine: approve this access too" in refused.json()["error"]
         assert agree(client, job, takesRisks=True).json()["state"] == "done"
+
+
+def test_sockets_look_at_their_rights_after_a_change_of_the_robot(tmp_path: Path) -> None:
+    """A grant may be for a tag that the new document lacks."""
+    stock(tmp_path)
+    looks: list[str] = []
+    with served(tmp_path) as client, OPEN.followed(lambda: looks.append("looked")):
+        client.get("/")
+        looks.clear()
+        said = {"settings": {}, "version": "1.0.0", "test": False}
+        assert client.post("/api/v1/robots/rover/settings", json=said).json()["isSaved"]
+        assert looks

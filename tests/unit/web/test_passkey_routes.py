@@ -18,8 +18,8 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
-from urc.web.people.passkey_routes import FRESH_S
 from urc.web.serve.access import Access
+from urc.web.serve.rights import FRESH_S
 
 ADDRESS = "http://localhost:8080"
 OURS = {"origin": ADDRESS}
@@ -129,7 +129,7 @@ def test_only_fresh_people_add_passkeys(house: House) -> None:
         house.ahead_s = FRESH_S + 1
         refused = browser.post(f"{OWN}/options")
         assert refused.status_code == 403
-        assert "sign out and in first" in refused.text
+        assert "this needs a sign-in of the last 5 minutes" in refused.text
         assert browser.post(f"{OWN}/add", json={"response": {}}).status_code == 403
         assert browser.get(OWN).status_code == 200
 

@@ -9,8 +9,8 @@ import pytest
 from tests.unit.web.people import PASSPHRASE, Door, post
 from urc.access.throttle import FREE
 from urc.runtime.audit_search import AuditQuery, search
-from urc.web.people.account_routes import FRESH_S
 from urc.web.people.browser_sign_ins import HASHES
+from urc.web.serve.rights import FRESH_S
 
 
 @pytest.fixture

@@ -29,13 +29,12 @@ from urc.web.people.messages import (
 )
 from urc.web.serve.actors import actor_of
 from urc.web.serve.replies import ApiError, Endpoint, answer, body_of
+from urc.web.serve.rights import stale_text
 from urc.web.serve.visitor import visitor_of
 from urc.web.words import t
 
 __all__ = ["AccountRoutes"]
 
-FRESH_S = 600.0
-"""Time after a sign-in in which a first passphrase is set, in seconds."""
 LINK_OVER = "this link is unknown or has ended"
 
 
@@ -121,8 +120,8 @@ class AccountRoutes:
             # Other attempts may have failed while this one waited for its turn.
             sign_ins.check_wait(request, key)
             _, before = await asyncio.to_thread(store.passphrase_of, who.name)
-            if before is None:
-                self._check_fresh(who)
+            if before is None and not visitor_of(request).is_fresh:
+                raise ApiError(403, stale_text())
             if before is not None and not await asyncio.to_thread(matches, said.current, before):
                 reason = AccessError("the present passphrase is wrong")
                 sign_ins.failed(request, "passphrase", reason, key, person=who.principal)
@@ -176,12 +175,6 @@ class AccountRoutes:
         await self._control.end_sign_in(said.id)
         self._sign_ins.recorder.revoked(actor, "sign-in", name=actor.name, agent=found.agent)
         return answer(ResultLine(t("the sign-in has ended")))
-
-    def _check_fresh(self, who: Identity) -> None:
-        """Raise `ApiError` unless the sign-in is new: a passer-by must not set a passphrase."""
-        began = self._control.directory.sign_ins[who.sign_in].created_at
-        if self._control.now() - began > FRESH_S:
-            raise ApiError(403, t("Sign in again, then set a passphrase within ten minutes."))
 
     def _own(self, who: Identity) -> set[str]:
         """Return the ids of a person and its devices; of a device or guest, only its own id."""

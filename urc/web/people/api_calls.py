@@ -7,7 +7,14 @@ from typing import Final, NamedTuple
 
 from urc.web.manage.wire import ResultLine
 from urc.web.people import messages as told
-from urc.web.serve.rights import ADMINISTER, ADMINISTER_FRESH, ANYONE, SIGNED_IN, Right
+from urc.web.serve.rights import (
+    ADMINISTER,
+    ADMINISTER_FRESH,
+    ANYONE,
+    SIGNED_IN,
+    SIGNED_IN_FRESH,
+    Right,
+)
 
 __all__ = ["PEOPLE_CALLS", "PeopleCall"]
 
@@ -145,7 +152,10 @@ PEOPLE_CALLS: Final = (
         told.PassphraseRequest,
     ),
     PeopleCall(
-        "account/devices/pair", SIGNED_IN, "Make a code that pairs an own device.", told.PairingCode
+        "account/devices/pair",
+        SIGNED_IN_FRESH,
+        "Make a code that pairs an own device.",
+        told.PairingCode,
     ),
     PeopleCall(
         "account/devices/remove",

@@ -1,11 +1,10 @@
 """Routes of passkeys: sign-in with one, and adding, naming and removing one's own.
 
-Layer 5. Only people have passkeys. A passkey is added within ten minutes after a sign-in, so a
-passer-by at a shared tablet cannot add one to the operator.
+Layer 5. Only people have passkeys. A passkey needs a fresh sign-in, so a passer-by at a
+shared tablet cannot add one to the operator.
 """
 
 import asyncio
-from typing import Final
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -26,13 +25,10 @@ from urc.web.people.wire import (
 from urc.web.serve.actors import actor_of
 from urc.web.serve.policy import parse_host
 from urc.web.serve.replies import ApiError, answer, body_of
-from urc.web.serve.rights import ANYONE, SIGNED_IN, ProtectedRoute
+from urc.web.serve.rights import ANYONE, SIGNED_IN, SIGNED_IN_FRESH, ProtectedRoute
 from urc.web.serve.visitor import visitor_of
 
-__all__ = ["FRESH_S", "PasskeyRoutes"]
-
-FRESH_S: Final = 600.0
-"""Time after a sign-in in which passkeys are added, in seconds."""
+__all__ = ["PasskeyRoutes"]
 
 
 class PasskeyRoutes:
@@ -57,8 +53,8 @@ class PasskeyRoutes:
             ),
             ProtectedRoute("/sign-in/passkey", self.sign_in, ANYONE, methods=["POST"]),
             ProtectedRoute(own, self.listed, SIGNED_IN),
-            ProtectedRoute(f"{own}/options", self.options, SIGNED_IN, methods=["POST"]),
-            ProtectedRoute(f"{own}/add", self.add, SIGNED_IN, methods=["POST"]),
+            ProtectedRoute(f"{own}/options", self.options, SIGNED_IN_FRESH, methods=["POST"]),
+            ProtectedRoute(f"{own}/add", self.add, SIGNED_IN_FRESH, methods=["POST"]),
             ProtectedRoute(f"{own}/rename", self.rename, SIGNED_IN, methods=["POST"]),
             ProtectedRoute(f"{own}/remove", self.remove, SIGNED_IN, methods=["POST"]),
         ]
@@ -110,7 +106,6 @@ class PasskeyRoutes:
     @answers_refusals
     async def options(self, request: Request) -> Response:
         """Return the options of a new passkey."""
-        self._check_fresh(request)
         found = await asyncio.to_thread(
             self._passkeys.registration, _person(request), _party(request), address_of(request)
         )
@@ -119,7 +114,6 @@ class PasskeyRoutes:
     @answers_refusals
     async def add(self, request: Request) -> Response:
         """Add a passkey to the person."""
-        self._check_fresh(request)
         said = await body_of(request, PasskeyAnswer)
         passkey = await asyncio.to_thread(
             self._passkeys.register, _person(request), _party(request), said.response, said.name,
@@ -152,18 +146,6 @@ class PasskeyRoutes:
         if self._known is None:
             raise ApiError(404, "this server keeps no people, so it has no passkeys")
         return self._known
-
-    def _check_fresh(self, request: Request) -> None:
-        """Raise `ApiError` if the sign-in of a person is too old for a new passkey."""
-        _person(request)
-        control = self._sign_ins.control
-        sign_in = control.directory.sign_ins[visitor_of(request).identity.sign_in]
-        if control.now() - sign_in.created_at > FRESH_S:
-            minutes = round(FRESH_S / 60)
-            raise ApiError(
-                403, f"sign out and in first: passkeys are added within {minutes} minutes after"
-                " a sign-in",
-            )  # fmt: skip
 
     def _record(self, request: Request, command: str, name: str) -> None:
         self._sign_ins.recorder.access_changed(actor_of(request), command, passkey=name)

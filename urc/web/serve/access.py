@@ -38,8 +38,6 @@ COOKIE_S: Final = 400 * 24 * 3600
 """Lifetime of the cookie of a sign-in, in seconds; the server decides when the sign-in ends."""
 CLOCK_S: Final = 60.0
 """Time between two checks of the clock, in seconds."""
-RECHECK_S: Final = 1.0
-"""Longest time between two looks of a socket at its rights, in seconds."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
@@ -207,8 +205,8 @@ class Access:
         return self.control.best_role(who) or self.anonymous
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether the scope of a token contains a command."""
-        return self.control.directory.may_give(who, command)
+        """Return whether the scope of a token contains a command; a command is a use."""
+        return self.control.directory.may_give(self._seen(who), command)
 
     def signed_in_s(self, who: Identity) -> float:
         """Return the time since the sign-in of `who`, in seconds; infinite without a sign-in."""
@@ -225,16 +223,10 @@ class Access:
     # Sockets
 
     async def run(self) -> None:
-        """Follow changes by other processes and sign-ins that end by themselves, until cancelled.
-
-        Even without a change, all sockets look at their rights once a second.
-        """
+        """Follow changes by other processes, ends of sign-ins and the clock, until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self.control.watch())
             group.create_task(self._watch_clock())
-            while True:
-                await asyncio.sleep(RECHECK_S)
-                self.recheck()
 
     async def _watch_clock(self) -> None:
         """Check the clock now and each minute: a network may set it at any time."""

@@ -28,11 +28,13 @@ __all__ = [
     "MAINTAIN_SERVER",
     "MAINTAIN_SERVER_FRESH",
     "SIGNED_IN",
+    "SIGNED_IN_FRESH",
     "WATCH",
     "ProtectedRoute",
     "ProtectedSocket",
     "Right",
     "RightHolder",
+    "stale_text",
     "turn_away",
 ]
 
@@ -65,6 +67,7 @@ FRESH_S: Final = 300.0
 that was left signed in does not suffice."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
+SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
 WATCH: Final = Right("watch")
 DRIVE: Final = Right("drive")
 MAINTAIN: Final = Right("maintain")
@@ -107,9 +110,7 @@ class ProtectedRoute(Route):
         if not _may(scope, self.right):
             raise HTTPException(403, self.right.refusal)
         if self.right.is_fresh and not scope["state"]["visitor"].is_fresh:
-            minutes = round(FRESH_S / 60)
-            text = t("Sign in again: this needs a sign-in of the last {n} minutes.", n=minutes)
-            raise HTTPException(403, text)
+            raise HTTPException(403, stale_text())
         await super().handle(scope, receive, send)
 
 
@@ -126,6 +127,12 @@ class ProtectedSocket(WebSocketRoute):
             await super().handle(scope, receive, send)
         else:
             await turn_away(receive, send, self.right.refusal)
+
+
+def stale_text() -> str:
+    """Return the message to a visitor whose sign-in is too old."""
+    minutes = round(FRESH_S / 60)
+    return t("Sign in again: this needs a sign-in of the last {n} minutes.", n=minutes)
 
 
 async def turn_away(receive: Receive, send: Send, reason: str) -> None:

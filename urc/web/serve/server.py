@@ -79,7 +79,23 @@ async def serve(
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)
         app = TlsPort(app, allowed_hosts)
-    config = uvicorn.Config(
+    server = _Server(_config(app, connection))
+    try:
+        with _ending(server), OWN_DOORS.kept(listener), _renewed(certificates, handshakes):
+            running = asyncio.ensure_future(server.serve(sockets=[listener]))
+            await _until_ready(server, running)
+            if on_ready and server.started:
+                scheme = "http" if certificates is None else "https"
+                place, real_port = listener.getsockname()[:2]
+                on_ready(reachable_urls(place, real_port, scheme)[0])
+            await _follow(server, running)
+    finally:
+        listener.close()
+
+
+def _config(app: ASGIApp, connection: Callable[..., asyncio.Protocol]) -> uvicorn.Config:
+    """Return the configuration of the HTTP server."""
+    return uvicorn.Config(
         app,
         loop="none",
         http=cast("type[asyncio.Protocol]", connection),
@@ -97,18 +113,6 @@ async def serve(
         timeout_graceful_shutdown=GRACE_S,
         h11_max_incomplete_event_size=HEADER_BYTES,
     )
-    server = _Server(config)
-    try:
-        with _ending(server), OWN_DOORS.kept(listener), _renewed(certificates, handshakes):
-            running = asyncio.ensure_future(server.serve(sockets=[listener]))
-            await _until_ready(server, running)
-            if on_ready and server.started:
-                scheme = "http" if certificates is None else "https"
-                place, real_port = listener.getsockname()[:2]
-                on_ready(reachable_urls(place, real_port, scheme)[0])
-            await _follow(server, running)
-    finally:
-        listener.close()
 
 
 def _first_bytes(
