@@ -12,7 +12,8 @@ the connection, even if URC closes the connection. A will that repeats a stop is
 import asyncio
 import logging
 import socket
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from paho.mqtt.client import MQTT_CLEAN_START_FIRST_ONLY, Client, MQTTMessage
@@ -313,7 +314,7 @@ class _Session:
         elif code == "Keep alive timeout":
             self._lose(f"the broker has not replied for {2 * KEEPALIVE_S} s")
         else:
-            self._lose(HUNG_UP)
+            self._lose(self._client.fault or HUNG_UP)
 
     def _lose(self, reason: str) -> None:
         """Wake all waiting tasks with the reason why the connection ended."""
@@ -341,6 +342,8 @@ class _Client(Client):
         )
         self._options = options
         self._given = line
+        self.fault = ""
+        """The system's reason for the end of the connection, which paho only logs."""
 
     def start(self) -> None:
         """Send the log-in."""
@@ -388,7 +391,23 @@ class _Client(Client):
         """
         if bufsize > MAX_BYTES:
             raise BlockingIOError
-        return super()._sock_recv(min(bufsize, _READ_BYTES))
+        with self._explained():
+            return super()._sock_recv(min(bufsize, _READ_BYTES))
+
+    def _sock_send(self, buf: bytes | bytearray) -> int:
+        """Send part of the packets, and keep the reason of a failure."""
+        with self._explained():
+            return super()._sock_send(buf)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except BlockingIOError:
+            raise
+        except OSError as fault:
+            self.fault = broke(fault)
+            raise
 
 
 def _low(code: ReasonCode) -> str:

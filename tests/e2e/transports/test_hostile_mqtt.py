@@ -92,8 +92,11 @@ async def test_half_delivered_messages_end_the_line() -> None:
             assert "does not complete its message deliveries" in await ended_untaken(transport)
 
 
-async def test_acknowledgements_that_nobody_takes_end_the_line() -> None:
-    """They are not heaped up."""
+async def test_acknowledgements_that_nobody_takes_end_the_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They are not heaped up. On a busy machine, the system's own timeout would come first."""
+    monkeypatch.setattr("urc.transports._stream._UNANSWERED_MS", 600_000)
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         turn_deaf(writer)
@@ -102,6 +105,19 @@ async def test_acknowledgements_that_nobody_takes_end_the_line() -> None:
     async with liar(broker(talk), window=4096) as port, line(port) as transport:
         with bounded(30_000_000):
             assert "acknowledgements" in await ended_untaken(transport)
+
+
+async def test_the_system_tells_why_it_ended_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A deaf broker has not closed the connection: the system gave up waiting for it."""
+    monkeypatch.setattr("urc.transports._stream._UNANSWERED_MS", 50)
+    monkeypatch.setattr("urc.transports.mqtt_client.MAX_UNTAKEN", 10**9)
+
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        turn_deaf(writer)
+        await flood(writer, published(b"c", b"", qos=1) * 100)
+
+    async with liar(broker(talk), window=4096) as port, line(port) as transport:
+        assert await ended_untaken(transport) == "the connection broke (connection timed out)"
 
 
 async def test_long_names_of_topics_are_counted() -> None:
