@@ -44,6 +44,9 @@ _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
 """Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the
 loop."""
+HURRY_S = 1.0
+"""Shortest interval of two attempts that operators request, in seconds. A robot that refuses is not
+flooded, however often and on however many pages they press."""
 SETTLE_S = 1.0
 """Age after which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
@@ -99,6 +102,10 @@ class Link:
             self._wanted.set()
         self._retry_s = clock.now()
         """Monotonic time of the next attempt."""
+        self._hurried = asyncio.Event()
+        """Event that ends the backoff early."""
+        self._hurried_s = float("-inf")
+        """Time of the last request to try at once."""
         self._ended: asyncio.Future[str] | None = None
         """Future with the reason for the end of the connection; None without a connection."""
         self._forget_connection()
@@ -136,6 +143,15 @@ class Link:
     def want_open(self) -> None:
         """Connect as soon as the backoff permits."""
         self._wanted.set()
+
+    def reconnect(self) -> None:
+        """Try a lost connection now instead of after the backoff, at most once in `HURRY_S`."""
+        now = self._clock.now()
+        if self.is_connected or now - self._hurried_s < HURRY_S:
+            return
+        self._hurried_s = now
+        self._retry_s = min(self._retry_s, now)
+        self._hurried.set()
 
     def want_close(self, reason: str) -> None:
         """Close the connection after all output; with a `reason`, close immediately."""
@@ -222,7 +238,7 @@ class Link:
         try:
             while True:
                 await self._wanted.wait()
-                await self._clock.sleep(max(0.0, self._retry_s - self._clock.now()))
+                await self._back_off()
                 if self._wanted.is_set():
                     await self._connection()
                 self.publish()
@@ -230,6 +246,17 @@ class Link:
             self._ended = None
             self.tried.set()
             await self._close()
+
+    async def _back_off(self) -> None:
+        """Wait until the time of the next attempt, which `reconnect` brings forward."""
+        await asyncio.sleep(0)
+        while self._retry_s > self._clock.now():
+            self._hurried.clear()
+            alarm = self._clock.call_at(self._retry_s, self._hurried.set)
+            try:
+                await self._hurried.wait()
+            finally:
+                alarm.cancel()
 
     async def _connection(self) -> None:
         """Make one connection attempt; on success, serve the connection until its end."""

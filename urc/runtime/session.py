@@ -295,6 +295,11 @@ class Session:
         found = await asyncio.gather(*(link.settle() for link in self._links.values()))
         return "; ".join(filter(None, found))
 
+    def reconnect(self) -> None:
+        """Try all lost connections now, instead of after their backoff."""
+        for link in self._links.values():
+            link.reconnect()
+
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, continue or end a sequence.
 

@@ -392,3 +392,32 @@ async def test_command_fails_with_a_code(
         with pytest.raises(CommandFailed) as failed:
             await waiting
         assert failed.value.code == code
+
+
+async def test_operator_tries_a_lost_line_at_once_and_cannot_flood_the_robot() -> None:
+    """The backoff is left out once a second at most, and grows on as before."""
+    clock, line = FakeClock(), MemoryTransport(answer=says_42)
+    line.refuse("nothing listens", times=9)
+    async with opened(line, clock) as session:
+        await clock.advance(3.75)
+        assert line.opens == 5  # the next attempt would be after 4 s
+        session.reconnect()
+        await clock.advance(0)
+        assert line.opens == 6
+        session.reconnect()
+        await clock.advance(0.9)
+        assert line.opens == 6
+        session.reconnect()
+        await clock.advance(0.1)
+        session.reconnect()
+        await clock.advance(0)
+        assert line.opens == 7
+        line.refuse(times=0)
+
+
+async def test_a_good_line_is_left_alone_by_a_request_to_try_it() -> None:
+    clock, line = FakeClock(), MemoryTransport(answer=says_42)
+    async with opened(line, clock) as session:
+        session.reconnect()
+        await clock.advance(1)
+        assert (line.opens, state_of(session)) == (1, ("live", ""))

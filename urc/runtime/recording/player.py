@@ -287,6 +287,9 @@ class PlaybackSession:
         """Refuse the command."""
         raise CommandFailed("not-allowed", REFUSAL)
 
+    def reconnect(self) -> None:
+        """Do nothing, because a recording has no connections."""
+
     def pull(self, sequence: str, what: Pull) -> None:
         """Do nothing, because a recording runs no sequence."""
 
