@@ -194,12 +194,12 @@ def test_texts_of_documents_are_text(client: TestClient) -> None:
 
 
 def test_the_menu_names_the_settings_that_are_missing(client: TestClient) -> None:
-    """Connect is disabled and says why; secrets are not shown."""
+    """A robot that cannot be connected is no link, and says why; secrets are not shown."""
     page = client.get("/").text
     card = page[page.index("Needy") :]
     assert "Not set yet: Host." in " ".join(card.split())
     assert "--set host=…" in card
-    assert "disabled" in card
+    assert 'href="/robots/needy/"' not in page
     assert "hush" not in page
     assert 'href="/robots/puppet/"' in page
 

@@ -114,3 +114,16 @@ class PageFaults:
 
     def _page_error(self, error: Error) -> None:
         self.found.append(f"exception: {error.stack or error.message}")
+
+
+async def choose_theme(page: Page, theme: str) -> None:
+    """Choose a theme in the settings of the device; "" is the theme of the system."""
+    await page.locator("[popovertarget='device']").click()
+    await page.locator(f"label:has([data-theme-choice][value='{theme}'])").click()
+    await page.locator("[popovertarget='device']").click()
+
+
+async def choose_language(page: Page, tag: str) -> None:
+    """Choose the language in the settings of the device; the page loads again."""
+    await page.locator("[popovertarget='device']").click()
+    await page.locator("[data-language-choice]").select_option(tag)

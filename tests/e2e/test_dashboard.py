@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 from playwright.async_api import Page, expect
 
-from tests.e2e.browser import Size
+from tests.e2e.browser import SIZES, Size, choose_theme
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.ports import free_port
@@ -226,7 +226,7 @@ async def test_a_robot_is_found_by_a_word_on_a_phone(new_page: PageMaker) -> Non
         await expect(page.locator("[data-robot-card]:visible")).to_have_count(1)
         await page.get_by_role("searchbox", name="Find a robot").fill("xyzzy")
         await expect(page.locator("[data-robot-card]:visible")).to_have_count(0)
-        await expect(page.get_by_text("No robot has these words")).to_be_visible()
+        await expect(page.get_by_text("No robot fits.")).to_be_visible()
 
 
 async def test_from_menu_to_robot_and_back_by_keyboard(new_page: PageMaker) -> None:
@@ -258,17 +258,15 @@ async def test_from_menu_to_robot_and_back_by_keyboard(new_page: PageMaker) -> N
         await until(lambda: not robot.is_open)
 
 
-async def test_connect_is_disabled_until_the_settings_are_complete(new_page: PageMaker) -> None:
+async def test_a_robot_is_no_link_until_its_settings_are_complete(new_page: PageMaker) -> None:
     """The menu says what is missing; the robot's page leads back to it."""
     profile = dashboard_profile(settings={"host": Setting("host", "host")})
     async with running_dashboard(FakeRobot(profile)) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         assert page.url == address
-        button = page.get_by_role("button", name="Connect")
-        assert await button.is_disabled()
-        described = await button.get_attribute("aria-describedby")
-        assert "Not set yet: Host." in await page.inner_text(f"[id='{described}']")
+        assert await page.get_by_role("link", name="Connect").count() == 0
+        assert "Not set yet: Host." in await page.inner_text("[data-robot-card]")
 
 
 @pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
@@ -298,28 +296,28 @@ async def test_the_battery_fits_every_screen(new_page: PageMaker, size: Size) ->
 
 @pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
 async def test_nothing_in_the_bar_is_cut_off(new_page: PageMaker, size: Size) -> None:
-    """The short name on a small screen, the whole one else; the arrow has room at its right."""
+    """The pages are in the bar, or behind a button; the settings of the device fit the screen."""
     robot = FakeRobot(dashboard_profile())
     async with running_dashboard(robot) as address:
         page = await new_page(size=size)
         await page.goto(address)
-        assert await page.locator(".urc-bar-more").is_visible() is (size != "phone")
         cut = "el => el.scrollWidth > el.clientWidth"
         assert not await page.locator(".urc-bar-title").evaluate(cut)
+        pages = page.get_by_role("link", name="Widgets")
+        if size != "desktop":
+            await expect(pages).to_be_hidden()
+            await page.get_by_role("button", name="Pages of URC").click()
+        await expect(pages).to_be_visible()
+        await page.keyboard.press("Escape")
         for theme in ("light", "dark", "sunlight", "night"):
-            await page.get_by_label("Theme").select_option(theme)
-            room = await page.locator(".urc-theme").first.evaluate(
-                """el => {
-                  const arrow = getComputedStyle(el, "::after");
-                  const select = getComputedStyle(el.querySelector("select"));
-                  const left = parseFloat(arrow.right) + parseFloat(arrow.width);
-                  return [select.appearance, parseFloat(arrow.right),
-                          parseFloat(select.paddingRight) - left];
-                }"""
-            )
-            assert room[0] == "none"
-            assert room[1] >= 12
-            assert room[2] >= 4
+            await choose_theme(page, theme)
+        await page.get_by_role("button", name="This device").click()
+        sheet = await page.locator("#device").bounding_box()
+        width, height = SIZES[size]
+        assert sheet is not None
+        assert sheet["x"] >= 0
+        assert sheet["x"] + sheet["width"] <= width
+        assert sheet["y"] + sheet["height"] <= height
 
 
 async def test_the_round_trip_is_not_part_of_what_is_bad(new_page: PageMaker) -> None:
@@ -346,12 +344,12 @@ async def test_a_theme_is_kept_on_the_device(new_page: PageMaker) -> None:
         ground = "getComputedStyle(document.body).backgroundColor"
         colours = {await page.evaluate(ground)}
         for theme in ("light", "sunlight", "night"):
-            await page.get_by_label("Theme").select_option(theme)
+            await choose_theme(page, theme)
             colours.add(await page.evaluate(ground))
         assert len(colours) == 4
         await open_robot(page, address, robot)
         await until_attribute(page, "html", "data-theme", "night")
-        assert await page.get_by_label("Theme").input_value() == "night"
+        assert await page.locator("[data-theme-choice]:checked").input_value() == "night"
 
 
 async def test_lines_of_the_log_are_shown_once_in_order(new_page: PageMaker) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.e2e.browser import choose_theme
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from urc.model.interface import WidgetUse
@@ -248,7 +249,7 @@ async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
     async with running_dashboard(robot) as address:
         page = await new_page()
         await page.goto(address)
-        await page.get_by_label("Theme").select_option(theme)
+        await choose_theme(page, theme)
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         robot.set_reading("battery", level)

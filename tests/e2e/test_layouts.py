@@ -124,7 +124,7 @@ async def test_the_left_hand_is_kept_on_the_device(new_page: PageMaker) -> None:
         await page.goto(f"{address}robots/puppet/")
         assert (await box(page, A))["x"] < (await box(page, C))["x"]
         await page.get_by_role("button", name="This device").click()
-        await page.select_option("[data-hand-choice]", "left")
+        await page.locator("label:has([data-hand-choice][value='left'])").click()
         assert (await box(page, C))["x"] < (await box(page, A))["x"]
         await page.reload()
         assert (await box(page, C))["x"] < (await box(page, A))["x"]

@@ -9,7 +9,7 @@ from anyio import to_thread
 from playwright.async_api import Locator, Page, expect
 
 from tests.e2e.axe import CONTRAST, faults, prepare
-from tests.e2e.browser import PAGE_TIMEOUT_MS
+from tests.e2e.browser import PAGE_TIMEOUT_MS, choose_language
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
 from tests.e2e.gallery import THEMES
@@ -146,7 +146,8 @@ async def test_download_a_driver(
         await expect(page.locator(":focus")).to_have_count(1)
         assert installed(data) == ["drivers/rover 1.0.0"]
         await page.goto(address)
-        await expect(page.get_by_role("button", name="Connect to Rover")).to_be_disabled()
+        await expect(page.get_by_role("link", name="Connect to Rover")).to_have_count(0)
+        await expect(page.get_by_role("link", name="Settings of Rover").first).to_be_visible()
         await expect(page.locator("main")).to_contain_text("Not set yet: Robot address, Key.")
 
 
@@ -358,7 +359,7 @@ async def test_the_pages_are_for_everybody(new_page: PageMaker, shop: Shop, tmp_
                 )
                 assert await faults(page, CONTRAST) == []
             for tag in (*OTHERS, "en"):
-                await page.locator("[data-language-choice]").select_option(tag)
+                await choose_language(page, tag)
                 await expect(page.locator("html")).to_have_attribute("lang", tag)
                 if path in MANAGERS:
                     await expect(page.locator("[data-available] li").first).to_be_visible()

@@ -132,6 +132,8 @@ class FakeRobot:
         """Names of the people who confirmed each command."""
         self.pulls: list[tuple[str, Pull]] = []
         """Requests to sequences."""
+        self.reconnects = 0
+        """Number of requests to try the connections now."""
         self.latched: list[str] = []
         """Reasons of all latched stops, in order."""
         self.frames = FakeFrames(profile.driver)
@@ -172,6 +174,10 @@ class FakeRobot:
         self.commands.append((name, dict(arguments)))
         values = self.on_command(name, arguments) if self.on_command else {}
         return Replied(len(self.commands), name, values)
+
+    def reconnect(self) -> None:
+        """Count a request to try the connections now."""
+        self.reconnects += 1
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Record a request about a sequence."""

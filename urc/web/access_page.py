@@ -97,7 +97,12 @@ class AccessMiddleware:
     def _shown(self, visitor: Visitor) -> ShownVisitor:
         keeps_people = self._access.control.store is not None
         name = t("This computer") if visitor.is_local else visitor.identity.name
-        return ShownVisitor(name, keeps_people and visitor.may(ADMINISTER), keeps_people)
+        return ShownVisitor(
+            name,
+            keeps_people and visitor.may(ADMINISTER),
+            keeps_people,
+            names_screen=visitor.is_local or not visitor.is_known,
+        )
 
     def _warnings(self, scope: Scope) -> Iterator[str]:
         """Yield the warnings of each page: the server's, and those of this connection."""

@@ -13,6 +13,7 @@ from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import quote
 
+import msgspec
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -26,6 +27,8 @@ from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
+from urc.runtime.contact_times import FILE as CONTACT_FILE
+from urc.runtime.contact_times import ContactStore
 from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
@@ -42,6 +45,7 @@ from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
 from urc.web.drive.redundant_socket import RedundantSocket
+from urc.web.fleet.contact_watch import ContactWatch
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import LINGER_S, Playback, Robot, RobotService, missing_settings
@@ -135,6 +139,9 @@ def build_app(
         audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     fleet = _fleet(robots, data, audit, linger_s)
+    contacts = ContactWatch(
+        lambda: fleet.stations, ContactStore(data / CONTACT_FILE if data is not None else None)
+    )
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
@@ -145,7 +152,8 @@ def build_app(
         ),
         access=access,
         recording_calls=RecordingCalls(lambda: fleet.stations, recordings, recorder),
-        robot_calls=RobotCalls(lambda: fleet.stations, access.followed),
+        robot_calls=RobotCalls(lambda: fleet.stations, access.followed, contacts.times),
+        contacts=contacts,
         audit=audit,
         recorder=recorder,
         ways_in=WaysIn(access, recorder, sign_in),
@@ -275,6 +283,7 @@ class _Routes:
     recorder: ServerRecorder
     recording_calls: RecordingCalls
     robot_calls: RobotCalls
+    contacts: ContactWatch
     ways_in: WaysIn
     audit: AuditLog | None = None
     data: Path | None = None
@@ -373,6 +382,7 @@ class _Routes:
                 tasks = [
                     group.create_task(self.access.run()),
                     group.create_task(self._record_late()),
+                    group.create_task(self.contacts.run()),
                 ]
                 if self.dev:
                     tasks.append(group.create_task(self.dev.run()))
@@ -381,6 +391,7 @@ class _Routes:
                 yield
                 self.robot_calls.sessions.close()
                 await self.recording_calls.close()
+                await self.contacts.close()
                 for task in tasks:
                     task.cancel()
                 if self.manager is not None:
@@ -404,9 +415,11 @@ class _Routes:
             await self.manager.refresh()
             drivers = self.manager.drivers()
         visitor = visitor_of(request)
+        states = self.robot_calls.listed(visitor)
         html = menu_page(
             head,
-            {name: one for name, one in self.robots.items() if visitor.may(WATCH, name)},
+            {one.name: self.robots[one.name] for one in states.robots},
+            states=msgspec.to_builtins(states),
             ways=self.ways,
             drivers=drivers,
             broken=self.fleet.broken if visitor.may(MAINTAIN_SERVER) else {},
@@ -441,6 +454,7 @@ class _Routes:
             tab=query.get("tab", ""),
             wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
+            is_emulated=robot.is_emulated,
             trust=self.trust,
         )
         return HTMLResponse(html, headers=_PAGE)

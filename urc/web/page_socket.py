@@ -23,7 +23,7 @@ from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missi
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
 from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
-from urc.wire.client_messages import ImageSelection
+from urc.wire.client_messages import ImageSelection, Reconnect, ScreenName
 
 __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientSocket"]
 
@@ -257,6 +257,11 @@ class BrowserClient:
             self._place.subscription.show(asked.signals)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)
+        elif isinstance(asked, ScreenName):
+            if self._operator is not None:
+                self._service.controls.name_screen(self._operator, asked.name)
+        elif isinstance(asked, Reconnect):
+            live.session.reconnect()
         elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
                 self._pong = wire.encode_pong(asked, now_s, time())

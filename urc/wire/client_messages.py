@@ -27,6 +27,9 @@ __all__ = [
     "Approval",
     "ApprovalRequest",
     "SequenceAction",
+    "SCREEN_NAME_LENGTH",
+    "ScreenName",
+    "Reconnect",
     "Drive",
     "Tick",
     "Release",
@@ -36,6 +39,8 @@ __all__ = [
 
 INBOUND_BYTES = 64 * 1024
 """Maximum length of a message from a client, in bytes."""
+SCREEN_NAME_LENGTH: Final = 40
+"""Maximum length of the name of a screen, in characters."""
 
 _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
@@ -102,6 +107,21 @@ class SequenceAction(
     verb: Pull
 
 
+class ScreenName(
+    msgspec.Struct, tag_field="t", tag="name", forbid_unknown_fields=True, frozen=True
+):
+    """The name of a screen without a sign-in of its own, such as “Tablet in the lab”."""
+
+    name: Annotated[str, msgspec.Meta(max_length=SCREEN_NAME_LENGTH)] = ""
+    """"": back to the number of the screen."""
+
+
+class Reconnect(
+    msgspec.Struct, tag_field="t", tag="reconnect", forbid_unknown_fields=True, frozen=True
+):
+    """A request to try all lost connections of the robot now, instead of after the backoff."""
+
+
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
     """A request about the lease; `for_s` is the time for the holder's answer, in seconds."""
 
@@ -156,6 +176,8 @@ ClientMessage = (
     | Approval
     | ApprovalRequest
     | SequenceAction
+    | ScreenName
+    | Reconnect
     | Drive
     | Tick
     | Release
@@ -170,6 +192,8 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     ApprovalRequest: "drive",
     Approval: "drive",
     SequenceAction: "drive",
+    ScreenName: "watch",
+    Reconnect: "watch",
     Drive: "drive",
     Tick: "drive",
     Release: "drive",

@@ -156,7 +156,7 @@ async def each_interface(page: Page, robot: Overheard) -> None:
             assert await lasting_faults(page, CELLS) == [], f"{name} at {size}"
     await page.get_by_role("button", name="This device").click()
     for hand in ("left", ""):
-        await page.locator("[data-hand-choice]").select_option(hand)
+        await page.locator(f"label:has([data-hand-choice][value='{hand}'])").click()
         await is_whole(page)
     await page.get_by_role("button", name="This device").click()
     await choose(page, "debug")

@@ -1,8 +1,12 @@
 """What a card shows of a robot: a picture, values, or nothing; and nobody is connected for it."""
 
+from collections.abc import Callable
+from time import monotonic, sleep
+
 from starlette.testclient import TestClient
 
 from urc.model.driver import Driver
+from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
@@ -14,10 +18,20 @@ from urc.web.show.card import VALUES, small_values
 JPEG = b"\xff\xd8\xff\xe0 a picture"
 
 
+def until(holds: Callable[[], bool], within_s: float = 10.0) -> None:
+    """Wait until something holds."""
+    end_s = monotonic() + within_s
+    while not holds():
+        assert monotonic() < end_s
+        sleep(0.02)
+
+
 def client_of(robot: FakeRobot, glimpse: Glimpse | str = "real") -> TestClient:
     """Return a client of a dashboard; "real": the robot is not emulated."""
     look = None if isinstance(glimpse, str) else lambda: glimpse
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)}, access=ACCESS, linger_s=0.01
+    )
     client = TestClient(app, base_url="http://localhost:8080", cookies=HERE)
     client.app_state["flow"] = SocketFlow()
     return client
@@ -59,10 +73,26 @@ def test_a_real_robot_is_shown_while_somebody_is_connected() -> None:
         assert client.get("/robots/puppet/card").json() == [["Battery", "77 %"]]
 
 
-def test_the_menu_says_where_the_picture_is_and_a_tap_on_it_drives() -> None:
+def test_the_last_picture_of_a_real_robot_stays_and_is_marked_as_old() -> None:
+    uses = (WidgetUse("view", "image", {"image": "view"}),)
+    profile = dashboard_profile(signals={"view": Signal("view", "image")}, uses=uses)
+    robot = FakeRobot(profile)
+    ours = {"origin": "http://localhost:8080"}
+    with client_of(robot) as client:
+        with client.websocket_connect("ws://localhost:8080/ws?robot=puppet", headers=ours) as line:
+            assert line.receive_json()["t"] == "hello"
+            assert client.portal is not None
+            client.portal.call(robot.set_reading, "view", JPEG)
+            assert "x-urc-old" not in client.get("/robots/puppet/card").headers
+        until(lambda: client.get("/robots/puppet/card").headers.get("x-urc-old") == "1")
+        assert client.get("/robots/puppet/card").content == JPEG
+
+
+def test_the_whole_card_leads_to_the_robot() -> None:
     page = client_of(FakeRobot(dashboard_profile()), JPEG).get("/").text
-    assert 'href="/robots/puppet/" data-look="/robots/puppet/card"' in page
-    assert page.count("/static/manage/card.js") == 1
+    assert 'data-look="/robots/puppet/card"' in page
+    assert '<a class="urc-robot-link" href="/robots/puppet/" aria-label="Connect to Puppet"' in page
+    assert page.count("/static/manage/menu.js") == 1
 
 
 def test_values_are_the_first_few_that_fit_and_are_known() -> None:

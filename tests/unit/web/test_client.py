@@ -379,3 +379,26 @@ async def test_a_tick_that_has_just_come_is_taken_at_once_and_nothing_else() -> 
         it.line.leave()
         await settle()
         assert not it.line.sink(tick)
+
+
+async def test_a_page_asks_to_try_the_robot_now() -> None:
+    """A page that only watches may: it connects the robot by being open."""
+    async with scene(role="watch") as it:
+        it.line.say({"t": "reconnect"})
+        await settle()
+        assert it.robot.reconnects == 1
+
+
+async def test_a_screen_without_a_sign_in_has_the_name_that_it_gives() -> None:
+    async with scene() as it:
+        it.line.say({"t": "name", "name": " Tablet in\tthe  lab\u202e "})
+        await settle()
+        assert [one.client.name for one in it.service.controls.operators] == [
+            "Tablet in the lab\\u202e"
+        ]
+        it.line.say({"t": "name", "name": "x" * 41})
+        await settle()
+        assert it.line.of_type("error")[-1]["code"] == "bad-message"
+        it.line.say({"t": "name", "name": ""})
+        await settle()
+        assert it.service.controls.operators[0].client.name == "screen 1"

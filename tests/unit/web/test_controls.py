@@ -427,3 +427,25 @@ async def test_audit_names_person_right_and_place_of_each_event() -> None:
         ("reset", *named),
         ("STOP", "", "", "", "", ""),
     ]
+
+
+async def test_a_named_screen_drives_under_its_name_and_no_two_have_the_same() -> None:
+    async with scene() as it:
+        ann, bob = it.add_page(), it.add_page("192.168.1.7")
+        it.controls.name_screen(ann, "Tablet in the lab")
+        (lease,) = it.read(ann)
+        assert lease["name"] == "Tablet in the lab"
+        it.say(ann, "take")
+        (lease,) = it.read(bob)
+        assert lease["holder"] == {"id": "s1", "name": "Tablet in the lab"}
+        it.controls.name_screen(bob, "Tablet in the lab")
+        assert bob.client.name == "Tablet in the lab (screen 2 at 192.168.1.7)"
+
+
+async def test_a_person_keeps_the_name_of_the_sign_in() -> None:
+    async with scene() as it:
+        who = Identity("p1", "s", "Ann", "person", "passkey", "p1")
+        peer = SocketPeer("", identity=who, is_known=True, rights=FixedRights("drive"))
+        operator = it.controls.add_page(peer, lambda: None)
+        it.controls.name_screen(operator, "Bob")
+        assert operator.client.name == "Ann"

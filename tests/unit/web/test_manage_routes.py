@@ -260,9 +260,9 @@ def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
         assert client.get("/robots/rover/").status_code == 200
         for page in ("/", "/robots/rover/settings"):
             assert "open sesame" not in client.get(page).text
-            assert "10.0.0.8" in client.get(page).text
+        assert "10.0.0.8" in client.get("/robots/rover/settings").text
     with served(tmp_path) as client:
-        assert "10.0.0.8" in client.get("/").text
+        assert "10.0.0.8" in client.get("/robots/rover/settings").text
 
 
 def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
@@ -271,7 +271,7 @@ def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
         page = client.get("/robots/rover/settings").text
         assert "given when URC was started" in page
         send(client, settings={"host": "10.0.0.7", "key": "x"})
-        assert "10.9.9.9" in client.get("/").text
+        assert "10.9.9.9" in client.get("/robots/rover/settings").text
 
 
 def test_a_damaged_file_of_settings_is_told_and_replaced(tmp_path: Path) -> None:

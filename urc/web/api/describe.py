@@ -10,7 +10,9 @@ from urc.model.driver import Argument, Command
 from urc.model.exchange import Confirm
 from urc.model.role import Role, includes
 from urc.model.values import Signal
+from urc.runtime.contact_times import NO_CONTACT, ContactTimes
 from urc.runtime.hub import LinkState, LinkStatus
+from urc.web.api.overview import active_alarms, battery_of, battery_signal
 from urc.web.api.readings import plain
 from urc.web.api.wire import (
     ArgumentInfo,
@@ -27,29 +29,51 @@ from urc.web.fleet.robots import RobotService, missing_settings
 __all__ = ["may_run", "robot_info", "summary"]
 
 _WORST_FIRST: Final[tuple[LinkState, ...]] = ("lost", "silent", "connecting", "live", "idle")
+_ABNORMAL: Final = ("lost", "silent")
 _LIMITS: Final = ("lolo", "low", "high", "hihi")
 
 
-def summary(name: str, service: RobotService, role: Role) -> RobotSummary:
-    """Return a robot as an entry of a list; `role` is the visitor's role at the robot."""
+def summary(
+    name: str, service: RobotService, role: Role, times: ContactTimes = NO_CONTACT
+) -> RobotSummary:
+    """Return a robot as an entry of a list.
+
+    Args:
+        name: name of the robot in paths.
+        service: the robot.
+        role: role of the visitor at the robot.
+        times: the times of the robot's last use and last data.
+    """
     profile = service.robot.profile
-    states = {one.state for one in _links(service).values()}
+    links = _links(service).values()
+    by_state = {one.state: one for one in links}
+    state: LinkState = next((one for one in _WORST_FIRST if one in by_state), "idle")
     controls = service.who()
     return RobotSummary(
         name=name,
         title=profile.title,
         summary=profile.summary,
         tags=profile.tags,
-        state=next((one for one in _WORST_FIRST if one in states), "idle"),
+        state=state,
         holder=str(controls["holder"]),
         latched=str(controls["latched"]),
         emulated=bool(controls["emulated"]),
         role=role,
+        connected=service.is_used,
+        detail=by_state[state].detail if state in _ABNORMAL else "",
+        battery=battery_of(service, battery_signal(profile)),
+        alarms=active_alarms(service),
+        used_at=times.used_at,
+        seen_at=times.seen_at,
     )
 
 
 def robot_info(
-    name: str, service: RobotService, role: Role, may_give: Callable[[str], bool]
+    name: str,
+    service: RobotService,
+    role: Role,
+    may_give: Callable[[str], bool],
+    times: ContactTimes = NO_CONTACT,
 ) -> RobotInfo:
     """Return a robot with its signals and commands.
 
@@ -58,11 +82,12 @@ def robot_info(
         service: the robot.
         role: role of the visitor at the robot.
         may_give: whether the scope of the visitor's token contains a command.
+        times: the times of the robot's last use and last data.
     """
     profile = service.robot.profile
     controller, links = service.controls.controller, _links(service)
     return RobotInfo(
-        robot=summary(name, service, role),
+        robot=summary(name, service, role, times),
         missing=tuple(one.name for one in missing_settings(service.robot)),
         connections=tuple(
             _connection(transport, links.get(transport)) for transport in profile.driver.transports

@@ -18,11 +18,13 @@ from starlette.types import ASGIApp
 from urc.images import media_type
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
+from urc.runtime.contact_times import ContactTimes
 from urc.runtime.one_shot_commands import HELD, OUT_OF_SCOPE, role_refusal
 from urc.web.api.describe import robot_info, summary
 from urc.web.api.documents import document_of
 from urc.web.api.event_stream import EventStream
 from urc.web.api.limits import RequestLimits
+from urc.web.api.overview import in_order
 from urc.web.api.readings import plain, value_of, values_of
 from urc.web.api.sessions import ProgramSession, ProgramSessions, opened
 from urc.web.api.wire import (
@@ -40,7 +42,7 @@ from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import LiveSession, RobotService
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors, body_of
 from urc.web.serve.rights import WATCH
-from urc.web.serve.visitor import peer_of, visitor_of
+from urc.web.serve.visitor import Visitor, peer_of, visitor_of
 from urc.wire.client_messages import ApprovalRequest, CommandRequest
 
 __all__ = ["RobotCalls"]
@@ -69,6 +71,7 @@ class RobotCalls:
         self,
         stations: Callable[[], Mapping[str, RobotService]],
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
+        times: Callable[[str], ContactTimes],
     ) -> None:
         """Prepare.
 
@@ -76,9 +79,11 @@ class RobotCalls:
             stations: function that returns the robots, by their names in paths.
             followed: function that returns a context; in this context, its callback is called
                 after each change of rights.
+            times: function that returns the times of a robot's last use and last data.
         """
         self._stations = stations
         self._followed = followed
+        self._times = times
         self.sessions = ProgramSessions(followed)
         self._limits = RequestLimits()
 
@@ -101,13 +106,16 @@ class RobotCalls:
     @answers_errors
     async def robots(self, request: Request) -> Response:
         """Return the robots that the visitor may watch."""
-        visitor = visitor_of(request)
+        return answer(self.listed(visitor_of(request)))
+
+    def listed(self, visitor: Visitor) -> RobotList:
+        """Return the robots that a visitor may watch, with their present state."""
         found = []
         for name, service in self._stations().items():
             role = visitor.role(name)
             if role is not None and visitor.may(WATCH, name):
-                found.append(summary(name, service, role))
-        return answer(RobotList(tuple(found)))
+                found.append(summary(name, service, role, self._times(name)))
+        return RobotList(in_order(found), time())
 
     @answers_errors
     async def robot(self, request: Request) -> Response:
@@ -115,7 +123,7 @@ class RobotCalls:
         name, service = self._service(request)
         visitor = visitor_of(request)
         role = visitor.role(name) or "watch"
-        return answer(robot_info(name, service, role, visitor.may_give))
+        return answer(robot_info(name, service, role, visitor.may_give, self._times(name)))
 
     @answers_errors
     async def document(self, request: Request) -> Response:

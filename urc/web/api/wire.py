@@ -12,7 +12,9 @@ from urc.wire.client_messages import Arguments, Verb
 
 __all__ = [
     "LONGEST_TIMEOUT_S",
+    "ActiveAlarms",
     "ArgumentInfo",
+    "BatteryLevel",
     "CommandAnswer",
     "CommandAsked",
     "CommandInfo",
@@ -57,6 +59,23 @@ class ConnectionInfo(ApiMessage, frozen=True):
     """Reason for an abnormal state, in one line."""
 
 
+class BatteryLevel(ApiMessage, frozen=True):
+    """The state of charge of a robot's battery, or its voltage."""
+
+    value: float
+    unit: str
+    alarm: Literal["", "lolo", "low", "high", "hihi"] = ""
+    """Exceeded limit of the signal."""
+
+
+class ActiveAlarms(ApiMessage, frozen=True):
+    """The alarms of a robot at this moment."""
+
+    count: int = 0
+    worst: Literal["", "low", "high"] = ""
+    """Highest priority of all alarms; "" without an alarm."""
+
+
 class RobotSummary(ApiMessage, frozen=True):
     """A robot in a list."""
 
@@ -75,12 +94,25 @@ class RobotSummary(ApiMessage, frozen=True):
     """Whether the robot is emulated, or is the playback of a recording."""
     role: Role
     """Role of the visitor at this robot."""
+    connected: bool = False
+    """Whether a page or program uses the robot, so that URC connects to it."""
+    detail: str = ""
+    """Reason for an abnormal state, in one line."""
+    battery: BatteryLevel | None = None
+    """null: the robot has no signal of this kind, or its value is unknown or stale."""
+    alarms: ActiveAlarms = ActiveAlarms()
+    used_at: float | None = None
+    """Time at which a page or program last used the robot, in seconds since 1970 (UTC)."""
+    seen_at: float | None = None
+    """Time at which a connection to the robot was last live, in seconds since 1970 (UTC)."""
 
 
 class RobotList(ApiMessage, frozen=True):
-    """The robots that the visitor may watch."""
+    """The robots that the visitor may watch, in the order of `urc.web.api.overview.in_order`."""
 
     robots: tuple[RobotSummary, ...]
+    time: float = 0.0
+    """Time of the server, in seconds since 1970 (UTC)."""
 
 
 class ConfirmInfo(ApiMessage, frozen=True):

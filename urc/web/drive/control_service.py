@@ -16,6 +16,7 @@ from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import Reason
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
+from urc.problems import printable
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, Timer
@@ -185,6 +186,24 @@ class ControlService:
         if operator.spare is not None:
             operator.spare.end()
         self.controller.part(operator.client.id)
+
+    def name_screen(self, operator: OperatorSession, name: str) -> None:
+        """Name a screen of this computer, or of a visitor without a sign-in.
+
+        People, devices and programs keep the names of their sign-ins. A name that another page
+        already has gets the number of the screen, so that no page passes as another one.
+        """
+        client = operator.client
+        if client.who and client.way != "key":
+            return
+        wanted = printable(" ".join(name.split()))
+        others = (one.client for one in self._operators.values() if one is not operator)
+        if any(wanted in (one.name, one.who) for one in others):
+            wanted = f"{wanted} ({operator.own_name})"
+        operator.client = client._replace(name=wanted or operator.own_name)
+        self.controller.change(operator.client)
+        operator.seen = -1  # the lease message has the page's own name
+        operator.wake()
 
     def recheck(self, operator: OperatorSession) -> None:
         """Look at an operator's rights again; without the right to drive, its motion stops."""

@@ -41,6 +41,8 @@ class OperatorSession:
         self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES
     ) -> None:
         self.client = client
+        self.own_name = client.name
+        """Name from the sign-in, or number of the screen."""
         self.rights = rights
         """The present rights; `client` has the rights of the last look."""
         self.wake = wake

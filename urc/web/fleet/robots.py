@@ -94,6 +94,8 @@ CLOSE_TIMEOUT_S = 8.0
 STOP_WITHIN_S = 1.0
 """Maximum time for which a STOP over HTTP waits for its delivery, in seconds."""
 _LOOK_S = 0.01
+PICTURE_BYTES = 256 * 1024
+"""Maximum size of the image that stays after the end of a session."""
 
 log = logging.getLogger(__name__)
 
@@ -114,6 +116,9 @@ class SessionLike(MotionSession, Protocol):
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
+
+    def reconnect(self) -> None:
+        """Try all lost connections now, instead of after their backoff."""
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, resume or end a running sequence."""
@@ -227,6 +232,20 @@ class RobotService:
         self._held_off = 0
         """Number of callers that currently require a disconnected robot."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
+        self._last_picture: bytes | None = None
+
+    @property
+    def is_used(self) -> bool:
+        """Whether a page or program uses the robot."""
+        return self._visitors > 0
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether a connection to the robot is live."""
+        live = self.open_session
+        return live is not None and any(
+            link.state == "live" for link in live.session.hub.links.values()
+        )
 
     @property
     def is_full(self) -> bool:
@@ -269,17 +288,20 @@ class RobotService:
         return coming.result()
 
     def glimpse(self) -> Glimpse:
-        """Return a view of the robot, without opening a connection."""
+        """Return a view of the robot, without opening a connection.
+
+        Without a session, the view of a real robot is the last image of its last session.
+        """
         if self.robot.glimpse is not None:
             return self.robot.glimpse()
         live = self.open_session
-        if live is None:
-            return None
-        hub = live.session.hub
-        samples = {name: hub.latest(name) for name in hub.signals}
-        values = {name: one.value for name, one in samples.items() if one is not None}
-        pictures = (value for value in values.values() if isinstance(value, bytes))
-        return next(pictures, None) or values or None
+        return _view(live.session.hub) if live is not None else self._last_picture
+
+    def _keep_picture(self, hub: Hub) -> None:
+        """Keep the last image of a session for the menu."""
+        seen = _view(hub)
+        if isinstance(seen, bytes):
+            self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
 
     async def deliver_stop(self) -> bool:
         """Connect if necessary, and wait briefly; return whether the robot received the stop."""
@@ -340,6 +362,7 @@ class RobotService:
         self._is_open = False
         if self._successor is not None:
             (self.robot, latch), self._successor = self._successor, None
+            self._last_picture = None  # it may be of another robot
             self.controls.renew(self.robot.profile.driver, latch)
 
     async def run(self) -> None:
@@ -387,6 +410,7 @@ class RobotService:
                     task.cancel()
         finally:
             self._next = None
+            self._keep_picture(session.hub)
             self.controls.recorder.attend(None, self.clock.now)
             live.ended.set()
             live.fanout.flush()  # wakes every client, so that each sees the end
@@ -435,3 +459,11 @@ class RobotService:
         if coming is not None and not coming.done():
             coming.set_exception(SessionFailed(reason))
             coming.exception()  # marks the exception as retrieved
+
+
+def _view(hub: Hub) -> Glimpse:
+    """Return the first image of a robot, or else its values; None without any."""
+    samples = {name: hub.latest(name) for name in hub.signals}
+    values = {name: one.value for name, one in samples.items() if one is not None}
+    pictures = (value for value in values.values() if isinstance(value, bytes))
+    return next(pictures, None) or values or None

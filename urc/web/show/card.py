@@ -1,7 +1,7 @@
 """The image on a robot's card on the menu: its camera, its pose in the world, or its main values.
 
-Layer 5. A card never connects a robot. An emulated robot shows its simulated world; a real robot
-shows data only while a page is connected.
+Layer 5. A card never connects a robot. An emulated robot shows its simulated world. A real robot
+shows data only while a page is connected, and afterwards the last image.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,7 +41,10 @@ class Cards:
         return [ProtectedRoute("/robots/{name}/card", self.card, WATCH)]
 
     async def card(self, request: Request) -> Response:
-        """Return an image, or values as JSON ``[[title, text], …]``; status 204 without data."""
+        """Return an image, or values as JSON ``[[title, text], …]``; status 204 without data.
+
+        The header ``x-urc-old`` marks the last image of a session that has ended.
+        """
         service = self._stations().get(request.path_params["name"])
         if service is None:
             raise HTTPException(404, t("No robot of that name is served here."))
@@ -49,7 +52,9 @@ class Cards:
         if seen is None:
             return Response(status_code=204, headers=_FRESH)
         if isinstance(seen, bytes):
-            return Response(seen, media_type=media_type(seen), headers=_FRESH)
+            is_old = service.robot.glimpse is None and service.open_session is None
+            headers = {**_FRESH, "x-urc-old": "1"} if is_old else _FRESH
+            return Response(seen, media_type=media_type(seen), headers=headers)
         shown = small_values(service.robot.profile.driver, seen)
         return JSONResponse(shown, headers=_FRESH)
 

@@ -4,7 +4,7 @@ Layer 5. Pure. The template `menu.html.j2` gets a `MenuPage`; all pages around t
 `Nav`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 from time import gmtime, strftime
@@ -40,6 +40,8 @@ class Nav:
     """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
     ``audit``, ``people``, ``account``, or "" for any other page."""
     ways: NavigationLinks
+    is_sheet: bool = False
+    """Whether a narrow screen shows the links behind a button."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,21 +65,29 @@ class Card:
     title: str
     summary: str
     url: str
+    link: str
+    """URL of the robot's page, or of its settings while a setting is missing; "" without both."""
+    link_label: str
+    """Name of the link for screen readers."""
     driver: str
-    """Name of the driver's package, or path of its file."""
+    """Name and version of the driver's package, or name of its file."""
     interface: str
     """Title of the robot's first interface."""
+    tags: tuple[str, ...]
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
-    """Titles of missing settings; a missing setting disables the button Connect."""
+    """Titles of missing settings, which prevent a connection."""
     missing_names: tuple[str, ...]
     """Names of the missing settings, for use on a command line."""
+    initials: str
+    """One or two letters, shown without an image."""
     settings_url: str = ""
     """URL of the robot's settings; "" if the settings are fixed."""
     dev_url: str = ""
     """URL of the robot's developer page; "" for a robot without a developer page."""
-    is_looked_at: bool = False
-    """Whether a live image is available without a connection."""
+    is_live: bool = False
+    """Whether the card shows the state and an image of the robot."""
+    is_emulated: bool = False
     fault: str = ""
     """Reason why the robot cannot be used; "" if it can."""
     recorded: str = ""
@@ -86,17 +96,22 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class MenuPage:
-    """Context of ``menu.html.j2``: the served robots and their settings."""
+    """Context of ``menu.html.j2``: the served robots."""
 
     head: PageHead
     nav: Nav
     cards: tuple[Card, ...]
+    tags: tuple[str, ...]
+    """All tags of the robots, in alphabetical order."""
+    states: object
+    """State of the robots in the form of the call ``/api/v1/robots``."""
 
 
 def menu_page(
     head: PageHead,
     robots: Mapping[str, Robot],
     *,
+    states: object = None,
     ways: NavigationLinks = NavigationLinks(),
     drivers: Mapping[str, str] | None = None,
     broken: Mapping[str, BrokenRobot] | None = None,
@@ -105,7 +120,8 @@ def menu_page(
 
     Args:
         head: data for the head of the page.
-        robots: the robots, by the name in their URL.
+        robots: the robots, by the name in their URL, in the order of the page.
+        states: state of the robots, in the form of the call ``/api/v1/robots``.
         ways: navigation links of this server.
         drivers: installed package of each robot with its version, by name of the robot.
         broken: robots that cannot be used, by name.
@@ -116,7 +132,9 @@ def menu_page(
     cards += [
         _broken(name, one, ways) for name, one in (broken or {}).items() if name not in robots
     ]
-    return render("menu.html.j2", MenuPage(head, Nav("menu", ways), tuple(cards)))
+    tags = tuple(sorted({tag for card in cards for tag in card.tags}))
+    page = MenuPage(head, Nav("menu", ways, is_sheet=True), tuple(cards), tags, states)
+    return render("menu.html.j2", page)
 
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:
@@ -143,21 +161,39 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
     )
     first = next(iter(profile.interfaces.values()), None)
     url = f"/robots/{quote(name, safe='')}/"
+    settings_url = f"{url}settings" if ways.has_managers else ""
+    title = profile.title or name
+    link, label = url, t("Connect to {title}", title=title)
+    if missing:
+        link, label = settings_url, t("Settings of {title}", title=title)
+    elif robot.playback is not None:
+        label = t("Play {title}", title=title)
     return Card(
         name=name,
-        title=profile.title or name,
+        title=title,
         summary=profile.summary,
         url=url,
+        link=link,
+        link_label=label,
         driver=driver or PurePath(profile.file).name,
         interface=(first.title or first.name) if first is not None else "",
+        tags=profile.tags,
         rows=rows,
         missing=tuple(row.title for row in rows if row.is_missing),
         missing_names=tuple(one.name for one in missing),
-        settings_url=f"{url}settings" if ways.has_managers else "",
+        initials=_initials(title),
+        settings_url=settings_url,
         dev_url=f"{url}dev" if ways.has_dev else "",
-        is_looked_at=robot.glimpse is not None,
+        is_live=not missing and robot.playback is None,
+        is_emulated=robot.is_emulated,
         recorded=_utc(robot.playback.began_s) if robot.playback is not None else "",
     )
+
+
+def _initials(title: str) -> str:
+    """Return the first letters of the first two words."""
+    words = title.replace("-", " ").split()
+    return "".join(word[0] for word in words[:2]).upper()
 
 
 def _utc(time_s: float) -> str:
@@ -165,9 +201,23 @@ def _utc(time_s: float) -> str:
 
 
 def _broken(name: str, one: BrokenRobot, ways: NavigationLinks) -> Card:
-    empty: Sequence[SettingRow] = ()
     url = f"/robots/{quote(name, safe='')}/"
     settings_url = f"{url}settings" if ways.has_managers else ""
+    label = t("Settings of {title}", title=one.title)
     return Card(
-        name, one.title, "", url, name, "", tuple(empty), (), (), settings_url, fault=one.fault
+        name=name,
+        title=one.title,
+        summary="",
+        url=url,
+        link=settings_url,
+        link_label=label,
+        driver=name,
+        interface="",
+        tags=(),
+        rows=(),
+        missing=(),
+        missing_names=(),
+        initials=_initials(one.title or name),
+        settings_url=settings_url,
+        fault=one.fault,
     )

@@ -96,6 +96,8 @@ class RobotPage:
     """Whether the page shows the controls and STOP."""
     playback: str
     """Path of the playback's state; "" without a playback."""
+    is_emulated: bool
+    """Whether the robot is emulated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,7 @@ def robot_page(
     wire: str = "",
     playback: str = "",
     is_part: bool = False,
+    is_emulated: bool = False,
     trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface of a robot.
@@ -134,6 +137,7 @@ def robot_page(
         wire: path of the developer page; "" if the visitor may not use it.
         playback: path of the playback's state; "" without a playback.
         is_part: whether an open page requests this page to replace its interface.
+        is_emulated: whether the robot is emulated, which the page shows next to the title.
         trust: rule that distinguishes third-party widgets from trusted widgets.
     """
     uses = _uses(profile, interface)
@@ -164,6 +168,7 @@ def robot_page(
         lines=json.dumps(motion_lines(profile.driver)),
         can_move=can_move(profile.driver) and not playback,
         playback=playback,
+        is_emulated=is_emulated,
     )
     return render("robot.html.j2", page)
 

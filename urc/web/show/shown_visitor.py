@@ -18,6 +18,8 @@ class ShownVisitor(NamedTuple):
     may_administer: bool = False
     may_sign_in: bool = False
     """Whether the server keeps people, so that an unknown visitor can sign in."""
+    names_screen: bool = False
+    """Whether the visitor names its screen, because its sign-in has no name of its own."""
 
 
 shown_visitor: Final[ContextVar[ShownVisitor]] = ContextVar(

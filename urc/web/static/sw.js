@@ -17,7 +17,7 @@ const worker = self;
 
 const CACHE = "urc-1";
 /** Files that are kept besides opened pages. */
-const FIRST = ["/", "/static/core/tokens.css", "/static/core/app.css", "/static/manage/menu.css", "/static/core/theme.js", "/static/favicon.svg"];
+const FIRST = ["/", "/static/core/tokens.css", "/static/core/app.css", "/static/core/device.css", "/static/manage/menu.css", "/static/manage/card.css", "/static/manage/fleet.css", "/static/core/theme.js", "/static/core/handedness.js", "/static/favicon.svg"];
 const KEPT = /^\/(static|vendor|widgets|words)\/|^\/$|^\/robots\/[^/]+\/$|^\/app\.webmanifest$/;
 /** Polled by the pages of a widget in development; useless without the server. */
 const NEVER = /\/stamp$/;

@@ -21,19 +21,19 @@
 
   show(kept());
   document.addEventListener("DOMContentLoaded", () => {
-    for (const choice of document.querySelectorAll("select[data-hand-choice]")) {
-      if (!(choice instanceof HTMLSelectElement)) continue;
-      choice.value = kept();
-      choice.addEventListener("change", () => {
-        // Held controls are released before they move away under the finger.
-        dispatchEvent(new CustomEvent("urc-let-go", { detail: "the layout was changed" }));
-        show(choice.value);
-        try {
-          localStorage.setItem(KEY, choice.value);
-        } catch {
-          // Private mode: the choice lasts until the page closes.
-        }
-      });
+    for (const choice of document.querySelectorAll("[data-hand-choice]")) {
+      if (choice instanceof HTMLInputElement) choice.checked = choice.value === kept();
+    }
+  });
+  document.addEventListener("change", ({ target }) => {
+    if (!(target instanceof HTMLInputElement) || !target.matches("[data-hand-choice]")) return;
+    // Held controls are released before they move away under the finger.
+    dispatchEvent(new CustomEvent("urc-let-go", { detail: "the layout was changed" }));
+    show(target.value);
+    try {
+      localStorage.setItem(KEY, target.value);
+    } catch {
+      // Private mode: the choice lasts until the page closes.
     }
   });
 }

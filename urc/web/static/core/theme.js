@@ -3,14 +3,25 @@
 // without storage, the preference of the system counts.
 {
   const KEY = "urc-theme";
+  const UNITS_KEY = "urc-units"; // the same as in units.js
+  const NAME_KEY = "urc-screen-name";
   const THEMES = new Set(["dark", "light", "sunlight", "night"]);
 
-  /** @returns {string} */
-  const kept = () => {
+  /** @param {string} key @returns {string} */
+  const kept = (key) => {
     try {
-      return localStorage.getItem(KEY) ?? "";
+      return localStorage.getItem(key) ?? "";
     } catch {
       return "";
+    }
+  };
+
+  /** @param {string} key @param {string} value */
+  const keep = (key, value) => {
+    try {
+      localStorage.setItem(key, value);
+    } catch {
+      // Private mode: the choice lasts until the page closes.
     }
   };
 
@@ -22,24 +33,31 @@
 
   const YEAR_S = 365 * 24 * 3600;
 
-  show(kept());
+  show(kept(KEY));
   document.addEventListener("DOMContentLoaded", () => {
-    for (const choice of document.querySelectorAll("select[data-theme-choice]")) {
+    const theme = THEMES.has(kept(KEY)) ? kept(KEY) : "";
+    for (const choice of document.querySelectorAll("[data-theme-choice]")) {
+      if (choice instanceof HTMLInputElement) choice.checked = choice.value === theme;
+    }
+    for (const choice of document.querySelectorAll("select[data-units-choice]")) {
       if (!(choice instanceof HTMLSelectElement)) continue;
-      choice.value = THEMES.has(kept()) ? kept() : "";
+      choice.value = kept(UNITS_KEY);
+      if (choice.selectedIndex < 0) choice.value = "";
+    }
+    for (const field of document.querySelectorAll("[data-screen-name]")) {
+      if (field instanceof HTMLInputElement) field.value = kept(NAME_KEY);
     }
   });
   // On the document, so that a choice before the modules have loaded counts.
   document.addEventListener("change", ({ target }) => {
-    if (!(target instanceof HTMLSelectElement)) return;
-    if (target.matches("[data-theme-choice]")) {
+    if (target instanceof HTMLInputElement && target.matches("[data-theme-choice]")) {
       show(target.value);
-      try {
-        localStorage.setItem(KEY, target.value);
-      } catch {
-        // Private mode: the choice lasts until the page closes.
-      }
-    } else if (target.matches("[data-language-choice]")) {
+      keep(KEY, target.value);
+    }
+    if (target instanceof HTMLInputElement && target.matches("[data-screen-name]")) keep(NAME_KEY, target.value.trim());
+    if (!(target instanceof HTMLSelectElement)) return;
+    if (target.matches("[data-units-choice]")) keep(UNITS_KEY, target.value);
+    if (target.matches("[data-language-choice]")) {
       // A cookie, since the server renders the texts of the page.
       document.cookie = `urc-language=${target.value};path=/;max-age=${YEAR_S};samesite=strict`;
       location.reload();

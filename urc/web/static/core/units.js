@@ -121,18 +121,8 @@ export function chosenSystem() {
 export function offerSystems(use) {
   use(chosenSystem());
   const choice = document.querySelector("select[data-units-choice]");
-  if (choice instanceof HTMLSelectElement) {
-    choice.value = chosenSystem();
-    if (choice.selectedIndex < 0) choice.value = "";
-    choice.addEventListener("change", () => {
-      use(choice.value);
-      try {
-        localStorage.setItem(KEY, choice.value);
-      } catch {
-        // Private mode: the choice lasts until the page closes.
-      }
-    });
-  }
+  // theme.js shows and keeps the choice on every page.
+  if (choice instanceof HTMLSelectElement) choice.addEventListener("change", () => use(choice.value));
   addEventListener("storage", ({ key, newValue }) => {
     if (key !== KEY) return;
     use(newValue ?? "");

@@ -17,6 +17,7 @@ import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
 import { Panel } from "./panel.js";
 import { FullScreen, WakeLock } from "./screen.js";
+import { ScreenName } from "./screen_name.js";
 import { Socket } from "./socket.js";
 import { ViewSwitch } from "./view_switch.js";
 import { StopButton } from "../control/stop.js";
@@ -130,6 +131,7 @@ function tellOfDoor() {
   else if (note.textContent === AT_THE_DOOR) tell("");
 }
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
+const screenName = new ScreenName((message) => socket.send(message));
 const wakeLock = new WakeLock(tell);
 const stage = new ViewSwitch(root, { store, run, input, asks, host, panel: panel.el, wake });
 /** Images that the server sends, as JSON. */
@@ -194,6 +196,7 @@ function take(message) {
       store.hello(message, nowMs);
       session = message.session;
       sequences = {};
+      screenName.tell();
       shown = "[]"; // a new connection sends no images before a request
       break;
     case "links":

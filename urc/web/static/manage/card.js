@@ -19,27 +19,30 @@ const PACE_MS = 125;
  * @property {string} shown object URL of the image
  */
 
-/** @type {Look[]} */
-const looks = [...document.querySelectorAll("[data-look]")].flatMap((el) =>
-  el instanceof HTMLElement
-    ? [{ el, url: el.dataset["look"] ?? "", isSeen: false, dueMs: 0, shown: "" }]
-    : [],
-);
-const sight = new IntersectionObserver((entries) => {
-  for (const { target, isIntersecting } of entries) {
-    const look = looks.find(({ el }) => el === target);
-    if (look) look.isSeen = isIntersecting;
-  }
-});
-for (const { el } of looks) sight.observe(el);
+/** Watch the images of all cards on the page. */
+export function watchPictures() {
+  /** @type {Look[]} */
+  const looks = [...document.querySelectorAll("[data-look]")].flatMap((el) =>
+    el instanceof HTMLElement
+      ? [{ el, url: el.dataset["look"] ?? "", isSeen: false, dueMs: 0, shown: "" }]
+      : [],
+  );
+  const sight = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      const look = looks.find(({ el }) => el === target);
+      if (look) look.isSeen = isIntersecting;
+    }
+  });
+  for (const { el } of looks) sight.observe(el);
+  void go(looks);
+}
 
-void go();
-
-async function go() {
+/** @param {Look[]} looks */
+async function go(looks) {
   for (;;) {
     const nowMs = performance.now();
     // The card with the oldest due time is next; a hidden page polls none.
-    const due = looks.filter((look) => isWanted(look) && look.dueMs <= nowMs);
+    const due = looks.filter((look) => look.isSeen && look.dueMs <= nowMs);
     const next = due.sort((one, other) => one.dueMs - other.dueMs)[0];
     if (next && !document.hidden) {
       next.dueMs = nowMs + EVERY_MS;
@@ -50,22 +53,15 @@ async function go() {
 }
 
 /** @param {Look} look */
-function isWanted({ el, isSeen }) {
-  return isSeen || el.hidden; // a card without content has no visible area
-}
-
-/** @param {Look} look */
 async function renew(look) {
   try {
     const answer = await fetch(look.url, { signal: AbortSignal.timeout(QUIET_MS) });
-    if (answer.status !== 200) {
-      look.el.hidden = true;
-      look.dueMs += QUIET_MS;
-    } else if (answer.headers.get("content-type")?.startsWith("image/")) {
-      await show(look, await answer.blob());
-    } else {
-      list(look, await answer.json());
-    }
+    const isOld = answer.headers.get("x-urc-old") !== null;
+    look.el.dataset["old"] = String(isOld);
+    if (answer.status !== 200 || isOld) look.dueMs += QUIET_MS;
+    if (answer.status !== 200) look.el.dataset["shows"] = "";
+    else if (answer.headers.get("content-type")?.startsWith("image/")) await show(look, await answer.blob());
+    else list(look, await answer.json());
   } catch {
     look.dueMs += QUIET_MS; // the server is away, or the image is invalid: the last one stays
   }
@@ -83,7 +79,7 @@ async function show(look, picture) {
   image.src = url;
   await image.decode().finally(() => URL.revokeObjectURL(old));
   look.el.dataset["shows"] = "picture";
-  image.hidden = look.el.hidden = false;
+  image.hidden = false;
 }
 
 /**
@@ -101,6 +97,6 @@ function list(look, values) {
       return [term, value];
     }),
   );
-  look.el.dataset["shows"] = "values";
-  el.hidden = look.el.hidden = values.length === 0;
+  look.el.dataset["shows"] = values.length > 0 ? "values" : "";
+  el.hidden = values.length === 0;
 }

@@ -1,23 +1,179 @@
 // @ts-check
-/** Search in the menu: the cards that have each of the typed words stay visible. */
+/**
+ * The menu: the state of each robot on its card, the order of the cards, search and filters.
+ *
+ * @typedef {import("./card_words.js").Summary} Summary
+ * @typedef {import("./card_words.js").Said} Said
+ * @typedef {import("./fleet_poll.js").RobotList} RobotList
+ */
+import { alarmWords, batteryWords, linkWords, whoWords } from "./card_words.js";
+import { watchPictures } from "./card.js";
+import { followRobots } from "./fleet_poll.js";
 import { fits } from "./search.js";
+import { placeSheets } from "./sheets.js";
+import { t } from "../core/words.js";
 
-const field = document.querySelector("[data-find-robot]");
+/** Time without input after which cards may change places, so that none moves away under a finger. */
+const CALM_MS = 3000;
+const KEPT = "urc-menu-filter";
+
+const root = document.querySelector("[data-fleet]");
+const list = document.querySelector("[data-cards]");
 const cards = [...document.querySelectorAll("[data-robot-card]")].filter((el) => el instanceof HTMLElement);
+/** @type {Map<string, HTMLElement>} */
+const byName = new Map(cards.map((card) => [card.dataset["robotCard"] ?? "", card]));
+const field = document.querySelector("[data-find-robot]");
+const filters = [...document.querySelectorAll("[data-filter]")].filter((el) => el instanceof HTMLElement);
+const tags = [...document.querySelectorAll("[data-tag]")].filter((el) => el instanceof HTMLElement);
 const none = document.querySelector("[data-no-match]");
+const title = document.title;
+/** Wanted order of the cards. @type {string[]} */
+let order = [];
+let touchedMs = -CALM_MS;
 
-if (field instanceof HTMLInputElement) {
-  field.addEventListener("input", () => find(field.value));
-  find(field.value); // the browser restores earlier input
+/** @param {RobotList | null} news */
+function take(news) {
+  if (root instanceof HTMLElement) root.dataset["stale"] = String(news === null);
+  if (news === null) return; // the server is away: the last states stay, greyed
+  for (const robot of news.robots) {
+    const card = byName.get(robot.name);
+    if (card && "live" in card.dataset) show(card, robot, news.time);
+  }
+  order = news.robots.map(({ name }) => name);
+  count();
+  find();
+  sort();
 }
 
-/** @param {string} typed */
-function find(typed) {
+/**
+ * @param {HTMLElement} card
+ * @param {Summary} robot
+ * @param {number} nowS
+ */
+function show(card, robot, nowS) {
+  const link = linkWords(robot, nowS);
+  card.dataset["state"] = link.state;
+  card.dataset["alarms"] = String(robot.alarms.count);
+  put(card, "[data-link]", link);
+  put(card, "[data-alarms]", alarmWords(robot));
+  put(card, "[data-battery]", batteryWords(robot));
+  put(card, "[data-who]", whoWords(robot));
+}
+
+/**
+ * @param {HTMLElement} card
+ * @param {string} selector
+ * @param {Said | null} what
+ */
+function put(card, selector, what) {
+  const el = card.querySelector(`.urc-robot-state ${selector}`);
+  if (!(el instanceof HTMLElement)) return;
+  el.hidden = what === null;
+  el.dataset["tone"] = what?.tone ?? "";
+  if (el.textContent !== (what?.words ?? "")) el.textContent = what?.words ?? "";
+}
+
+function count() {
+  const on = cards.filter(isOn).length;
+  const alarms = cards.filter(hasAlarm).length;
+  /** @type {Record<string, number>} */
+  const figures = { "": cards.length, on, alarms };
+  for (const button of filters) {
+    const figure = figures[button.dataset["filter"] ?? ""] ?? 0;
+    const el = button.querySelector("[data-count]");
+    if (el) el.textContent = String(figure);
+  }
+  document.title = alarms > 0 ? `▲ ${alarms} · ${title}` : title;
+}
+
+/** @param {HTMLElement} card */
+function isOn(card) {
+  return "live" in card.dataset && card.dataset["state"] !== "off";
+}
+
+/** @param {HTMLElement} card */
+function hasAlarm(card) {
+  return Number(card.dataset["alarms"] ?? 0) > 0;
+}
+
+/** Show the cards that fit the typed words, the filter and the tag. */
+function find() {
+  const typed = field instanceof HTMLInputElement ? field.value : "";
+  const filter = pressed(filters)?.dataset["filter"] ?? "";
+  const tag = pressed(tags)?.dataset["tag"] ?? "";
   let found = 0;
   for (const card of cards) {
-    const said = [...card.querySelectorAll("h2, .urc-card-summary")].map((el) => el.textContent ?? "");
-    card.hidden = !fits([card.dataset["robotCard"] ?? "", ...said].join(" "), typed);
-    if (!card.hidden) found += 1;
+    const said = [...card.querySelectorAll("h2, .urc-robot-summary")].map((el) => el.textContent ?? "");
+    const own = (card.dataset["cardTags"] ?? "").split(" ");
+    const isShown =
+      fits([card.dataset["robotCard"] ?? "", ...said, ...own.map((one) => `#${one}`)].join(" "), typed) &&
+      (filter !== "on" || isOn(card)) &&
+      (filter !== "alarms" || hasAlarm(card)) &&
+      (tag === "" || own.includes(tag));
+    card.hidden = !isShown;
+    if (isShown) found += 1;
   }
   if (none instanceof HTMLElement) none.hidden = found > 0;
 }
+
+/** Put the cards in their order, unless someone uses the page just now. */
+function sort() {
+  if (!list || performance.now() - touchedMs < CALM_MS) return;
+  if (list.contains(document.activeElement) || document.querySelector("[data-more]:popover-open")) return;
+  const wanted = [...order.flatMap((name) => byName.get(name) ?? []), ...cards.filter((card) => !order.includes(card.dataset["robotCard"] ?? ""))];
+  if (wanted.every((card, place) => list.children[place] === card)) return;
+  list.append(...wanted);
+}
+
+/** @param {HTMLElement[]} buttons */
+function pressed(buttons) {
+  return buttons.find((one) => one.getAttribute("aria-pressed") === "true");
+}
+
+/**
+ * @param {HTMLElement[]} buttons
+ * @param {HTMLElement} chosen
+ * @param {boolean} isOptional whether a second press takes the choice back
+ */
+function choose(buttons, chosen, isOptional) {
+  const isBack = isOptional && chosen === pressed(buttons);
+  for (const one of buttons) one.setAttribute("aria-pressed", String(one === chosen && !isBack));
+  keep();
+  find();
+}
+
+/** Keep the filter for the way back from a robot. */
+function keep() {
+  const kept = { filter: pressed(filters)?.dataset["filter"], tag: pressed(tags)?.dataset["tag"] };
+  try {
+    sessionStorage.setItem(KEPT, JSON.stringify(kept));
+  } catch {
+    // Private mode: the filter lasts until the page closes.
+  }
+}
+
+function restore() {
+  try {
+    const kept = JSON.parse(sessionStorage.getItem(KEPT) ?? "{}");
+    const filter = filters.find((one) => one.dataset["filter"] === kept.filter);
+    const tag = tags.find((one) => one.dataset["tag"] === kept.tag);
+    if (filter) choose(filters, filter, false);
+    if (tag) choose(tags, tag, false);
+  } catch {
+    // Nothing is kept, or it is damaged: all robots are shown.
+  }
+}
+
+for (const button of filters) button.addEventListener("click", () => choose(filters, button, false));
+for (const button of tags) button.addEventListener("click", () => choose(tags, button, true));
+if (field instanceof HTMLInputElement) field.addEventListener("input", find);
+for (const event of ["pointerdown", "pointermove", "keydown", "wheel", "scroll"]) {
+  addEventListener(event, () => { touchedMs = performance.now(); }, { passive: true, capture: true });
+}
+
+restore();
+if (root instanceof HTMLElement) take(JSON.parse(root.dataset["states"] ?? "null"));
+find(); // the browser restores earlier input
+followRobots(take);
+watchPictures();
+placeSheets(t("Close"));

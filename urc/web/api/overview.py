@@ -1,0 +1,103 @@
+"""The state of a robot in a few words, for the menu and for lists: battery, alarms and order.
+
+Layer 5. Pure. Nothing here connects a robot: without a session, battery and alarms are unknown.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from urc.model.driver import Driver
+from urc.model.profile import Profile
+from urc.model.values import Sample, Signal
+from urc.web.api.wire import ActiveAlarms, BatteryLevel, RobotSummary
+from urc.web.fleet.robots import RobotService
+
+__all__ = ["active_alarms", "battery_of", "battery_signal", "in_order"]
+
+_NAMES: Final = ("battery", "battery_level", "battery_percentage", "state_of_charge", "charge")
+"""Names of a battery signal without a battery widget, in order of preference."""
+_UNITS: Final = ("%", "V")
+_NUMBERS: Final = ("integer", "number")
+_HIGH: Final = ("lolo", "hihi")
+
+
+def battery_signal(profile: Profile) -> str:
+    """Return the signal with the robot's state of charge; "" without one.
+
+    The signal is the level of a battery widget. Without such a widget, it is a number in percent or
+    volts with a usual name, such as ``battery``.
+    """
+    uses = [*profile.slots.values()]
+    for interface in profile.interfaces.values():
+        uses += interface.widgets.values()
+    for use in uses:
+        widget = profile.widgets.get(use.widget)
+        if widget is not None and widget.folder.name == "battery" and "level" in use.inputs:
+            return use.inputs["level"]
+    return next((name for name in _NAMES if _is_battery(profile.driver, name)), "")
+
+
+def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
+    """Return the present value of a battery signal; None if the value is unknown or stale.
+
+    Args:
+        service: the robot.
+        name: result of `battery_signal`.
+    """
+    live = service.open_session
+    signal = service.robot.profile.driver.signals.get(name)
+    sample = live.session.hub.latest(name) if live is not None and signal is not None else None
+    if signal is None or sample is None or _is_stale(sample, signal, service.clock.now()):
+        return None
+    value = sample.value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    digits = 0 if signal.unit == "%" else signal.precision
+    shown = round(value, 1 if digits is None else digits)
+    return BatteryLevel(shown, signal.unit, sample.alarm)
+
+
+def active_alarms(service: RobotService) -> ActiveAlarms:
+    """Return the number of signals beyond a limit, and the worst kind of limit.
+
+    Values older than the signal permits don't count.
+    """
+    live = service.open_session
+    if live is None:
+        return ActiveAlarms()
+    hub, now = live.session.hub, service.clock.now()
+    found = [
+        sample.alarm
+        for name, signal in hub.signals.items()
+        if (sample := hub.latest(name)) is not None
+        and sample.alarm
+        and not _is_stale(sample, signal, now)
+    ]
+    if not found:
+        return ActiveAlarms()
+    return ActiveAlarms(len(found), "high" if any(one in _HIGH for one in found) else "low")
+
+
+def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
+    """Return robots in the order of their importance to an operator.
+
+    Robots with an alarm come first, then connected robots, then robots by their last use. Equal
+    robots keep their order.
+    """
+    return tuple(sorted(robots, key=_rank))
+
+
+def _rank(robot: RobotSummary) -> tuple[int, int, float]:
+    """Return the rank of a robot; connected robots keep their places while they are used."""
+    severity = {"": 2, "low": 1, "high": 0}[robot.alarms.worst]
+    is_away = not robot.connected
+    return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0
+
+
+def _is_stale(sample: Sample, signal: Signal, now: float) -> bool:
+    return bool(signal.stale_after_s) and now - sample.time_s > signal.stale_after_s
+
+
+def _is_battery(driver: Driver, name: str) -> bool:
+    signal = driver.signals.get(name)
+    return signal is not None and signal.type in _NUMBERS and signal.unit in _UNITS

@@ -1,0 +1,92 @@
+// @ts-check
+/**
+ * The state of a robot in words, for its card. It knows no DOM.
+ *
+ * @typedef {object} Battery
+ * @property {number} value
+ * @property {string} unit
+ * @property {string} alarm exceeded limit; "" if normal
+ *
+ * @typedef {object} Summary A robot in the answer of `/api/v1/robots`.
+ * @property {string} name
+ * @property {"idle" | "connecting" | "live" | "silent" | "lost"} state
+ * @property {boolean} connected whether a page or program uses the robot
+ * @property {string} holder
+ * @property {string} latched
+ * @property {Battery | null} battery
+ * @property {{count: number, worst: "" | "low" | "high"}} alarms
+ * @property {number | null} seen_at in seconds since 1970
+ *
+ * @typedef {{words: string, tone: "" | "caution" | "bad"}} Said
+ */
+import { ageText } from "../core/formatting.js";
+import { said, t } from "../core/words.js";
+
+const DAY_S = 24 * 3600;
+/** Hours up to this number stay hours. */
+const LONGEST_HOURS_S = 48 * 3600;
+
+/**
+ * Return the state of the connection.
+ *
+ * @param {Summary} robot
+ * @param {number} nowS the server's time, in seconds since 1970
+ * @returns {Said & {state: string}}
+ */
+export function linkWords(robot, nowS) {
+  if (!robot.connected) return { state: "off", words: `○ ${awayWords(robot.seen_at, nowS)}`, tone: "" };
+  switch (robot.state) {
+    case "live":
+      return { state: "live", words: `● ${t("Live")}`, tone: "" };
+    case "silent":
+      return { state: "silent", words: `◆ ${t("Silent")}`, tone: "caution" };
+    case "lost":
+      return { state: "lost", words: `▲ ${t("Not reached")}`, tone: "bad" };
+    default:
+      return { state: "connecting", words: `◌ ${t("Connecting")}`, tone: "" };
+  }
+}
+
+/**
+ * @param {number | null} seenAt
+ * @param {number} nowS
+ */
+function awayWords(seenAt, nowS) {
+  if (seenAt === null) return t("Not connected");
+  const ageS = Math.max(0, nowS - seenAt);
+  if (ageS < 60) return t("Not connected, seen just now");
+  const age = ageS > LONGEST_HOURS_S ? t("{n} days", { n: Math.floor(ageS / DAY_S) }) : ageText(ageS);
+  return t("Not connected, seen {age} ago", { age });
+}
+
+/**
+ * @param {Summary} robot
+ * @returns {Said | null} null without a known battery
+ */
+export function batteryWords({ battery }) {
+  if (!battery) return null;
+  const figure = `${battery.value} ${battery.unit}`;
+  const isBad = battery.alarm === "lolo" || battery.alarm === "hihi";
+  return { words: t("Battery {figure}", { figure }), tone: isBad ? "bad" : battery.alarm ? "caution" : "" };
+}
+
+/**
+ * Return the operator who drives, or who stopped the robot.
+ *
+ * @param {Summary} robot
+ * @returns {Said | null}
+ */
+export function whoWords({ holder, latched }) {
+  if (latched) return { words: t("■ Stopped by {who}", { who: said(latched) }), tone: "bad" };
+  return holder ? { words: t("{who} is driving", { who: said(holder) }), tone: "" } : null;
+}
+
+/**
+ * @param {Summary} robot
+ * @returns {Said | null} null without an alarm
+ */
+export function alarmWords({ alarms: { count, worst } }) {
+  if (count === 0) return null;
+  const words = count === 1 ? t("1 alarm") : t("{n} alarms", { n: count });
+  return worst === "low" ? { words: `◆ ${words}`, tone: "caution" } : { words: `▲ ${words}`, tone: "bad" };
+}
