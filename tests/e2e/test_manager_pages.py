@@ -82,6 +82,12 @@ async def agree(page: Page) -> None:
     await expect(dialog).to_be_hidden()
 
 
+async def unfold(page: Page) -> None:
+    """Open all groups of settings."""
+    for group in await page.locator("[data-group]:not([open]) > summary").all():
+        await group.click()
+
+
 @RUNS
 async def test_connection_to_a_repository(
     new_page: PageMaker, shop: Shop, has: dict[str, Path], is_on: bool
@@ -211,6 +217,7 @@ async def test_add_an_interface(
         await expect(dialog).to_contain_text("▲ /nowhere/wide")
         await dialog.get_by_role("button", name="Close").click()
         await page.goto(f"{address}robots/rover/settings")
+        await unfold(page)
         await page.get_by_label("Interface").select_option("wide")
         await page.get_by_role("button", name="Save without a test").click()
         await expect(page.locator("[data-said]")).to_have_text("✓ saved, and used from now on")
@@ -249,6 +256,8 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await page.get_by_label("Robot address").fill("127.0.0.1")
         await page.get_by_label("Port").fill("1")
         await page.get_by_label("Key").fill("open sesame")
+        await expect(page.get_by_label("Pace")).to_be_hidden()
+        await unfold(page)
         await page.get_by_label("Pace").fill("12")
         await page.get_by_role("button", name="Test & save").click()
         speed = page.locator("[data-field='speed']")
@@ -258,7 +267,9 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await page.get_by_role("button", name="Test & save").click()
         wire = page.locator("[data-line='wire']")
         await expect(wire).to_contain_text("nothing listens on 127.0.0.1:1")
-        await expect(wire).to_contain_text("check the port")
+        blamed = page.locator("[data-field='port'] [data-fault]")
+        await expect(blamed).to_contain_text("127.0.0.1:1 refuses the connection.")
+        await expect(page.get_by_label("Port")).to_be_focused()
         await expect(page.locator("[data-said]")).to_contain_text("not saved")
         assert SettingsStore(data / "robots", "rover").load().settings == {}
         await page.get_by_label("Port").fill(str(port))

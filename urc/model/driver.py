@@ -100,6 +100,8 @@ class TransportSpec(NamedTuple):
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
     """Further error replies to any request; each declares a form for decoding."""
+    hint: str = ""
+    """Next step for the operator while the transport cannot connect; "": the step for the cause."""
 
 
 class Reply(NamedTuple):

@@ -41,6 +41,8 @@ class Setting(NamedTuple):
     description: str = ""
     is_required: bool = True
     """Whether a setting without a default must have a value before connecting."""
+    group: str = ""
+    """Title of the group on the settings page; "": the group follows from the use."""
 
     @property
     def empty(self) -> Value:

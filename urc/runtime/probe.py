@@ -11,6 +11,7 @@ from typing import Final, Literal, NamedTuple
 
 from urc.model.driver import TransportSpec
 from urc.registry import Table
+from urc.runtime.connection_cause import Cause, advice_on, cause_of
 from urc.runtime.hub import LinkStatus
 from urc.runtime.session import Session
 from urc.runtime.transport_chain import make_lines
@@ -44,6 +45,8 @@ class ProbeResult(NamedTuple):
     """Description of the result, in one line."""
     advice: str
     """Advice in one line; "" for a good result."""
+    cause: Cause = ""
+    """Cause of a failure; "" if it is unknown, and for a good result."""
 
 
 async def probe(
@@ -152,52 +155,12 @@ def _told(spec: TransportSpec, status: LinkStatus | None) -> ProbeResult:
             "the replies do not match this driver: check the port and"
             " the robot; many robots serve only one program at a time"
         )
-        return ProbeResult(spec.name, spec.type, status.address, "opens", text, advice)
+        return ProbeResult(
+            spec.name, spec.type, status.address, "opens", text, advice, cause_of(text)
+        )
     return _failed(spec, status.address, status.detail or "not connected before the time limit")
 
 
 def _failed(spec: TransportSpec, address: str, text: str) -> ProbeResult:
-    return ProbeResult(spec.name, spec.type, address, "fails", text, advice(text))
-
-
-_ADVICE: Final = (
-    (
-        ("refused",),
-        "the machine responds, but nothing listens on that port: check the port, and whether"
-        " the robot's program is running",
-    ),
-    (
-        ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
-        "the host name cannot be resolved: check the spelling, or use a numeric address",
-    ),
-    (
-        ("unreachable", "no route"),
-        "the network is unreachable: is this machine on the robot's network?",
-    ),
-    (
-        ("timed out", "within", "time-out", "timeout"),
-        "no reply from that address: check the address, the network, and whether the robot is on",
-    ),
-    (
-        ("host key", "fingerprint"),
-        "compare the robot's host key, then trust the key with 'urc trust'",
-    ),
-    (
-        ("authenticat", "password", "permission denied", "login", "publickey", "401", "403"),
-        "the robot rejects the login: check user, password and key file",
-    ),
-    (
-        ("no such file", "could not open port", "no such device"),
-        "the file or device does not exist: check the path, and whether the device is plugged in",
-    ),
-    (("certificate", "tls", "ssl"), "check the certificate, and whether the port speaks TLS"),
-)
-
-
-def advice(text: str) -> str:
-    """Return advice about a failure, based on the words in the error message."""
-    lower = text.lower()
-    for words, what in _ADVICE:
-        if any(word in lower for word in words):
-            return what
-    return "check the settings of this transport"
+    advice, cause = advice_on(text, address), cause_of(text, address)
+    return ProbeResult(spec.name, spec.type, address, "fails", text, advice, cause)

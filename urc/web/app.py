@@ -455,6 +455,7 @@ class _Routes:
             wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
             is_emulated=robot.is_emulated,
+            has_settings=self.ways.has_managers and robot.playback is None,
             trust=self.trust,
         )
         return HTMLResponse(html, headers=_PAGE)

@@ -122,6 +122,8 @@ class LinkRow(msgspec.Struct, frozen=True):
     detail: str
     attempts: int
     faults: int
+    cause: str = ""
+    """Name of the cause of a lost connection; "" if it is unknown."""
 
 
 class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):

@@ -230,6 +230,30 @@ commands: {{ ask: {{ send: ask, reply: {{ pattern: "V {{volts:number}}"{errors} 
     assert talk.links == ["close wire: no answer to ask within 0.5 s"]
 
 
+@pytest.mark.parametrize("fields", ["", "{volts:number}"], ids=["no reading", "reading"])
+@pytest.mark.parametrize("before", [1, 50], ids=["fresh", "after a while"])
+def test_a_good_answer_begins_the_count_of_missing_ones_again(before: int, fields: str) -> None:
+    """A robot that misses a few answers in an hour is healthy, however its answers are read."""
+    talk = Dialogue(f"""
+signals: {{ volts: {{}} }}
+commands: {{ ask: {{ send: ask, reply: {{ pattern: "V {fields}" }} }} }}
+""").connect()
+    now = 0.0
+    for misses in [*[0] * before, *[1, 2] * 5]:
+        for _ in range(misses):
+            number = talk.run("ask")
+            talk.at(now := now + 2.0)
+            assert talk.outcomes[number] == "timed-out"
+        number = talk.run("ask")
+        talk.says("V 7" if fields else "V ")
+        assert talk.outcomes[number] == "done"
+    assert not talk.links
+    for _ in range(3):
+        talk.run("ask")
+        talk.at(now := now + 2.0)
+    assert talk.links == ["close wire: no answer to ask within 0.5 s"]
+
+
 def test_a_lost_connection_fails_what_was_waiting_and_forgets_half_a_frame() -> None:
     """After a reconnect nothing stale survives."""
     wire = opened()

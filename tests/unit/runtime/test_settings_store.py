@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from urc.problems import UrcError
-from urc.runtime.probe import advice
 from urc.runtime.settings_store import SettingsStore, StoredSettings
 
 KEPT = StoredSettings(
@@ -58,18 +57,3 @@ def test_a_failure_to_write_changes_nothing(
         file.save(StoredSettings())
     assert file.load() == KEPT
     assert list(tmp_path.iterdir()) == [file.file]
-
-
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
-        ("nothing listens on 10.0.0.5:80 (connection refused)", "check the port"),
-        ("10.0.0.5 did not answer within 3 s", "check the address"),
-        ("the network is unreachable", "robot's network"),
-        ("permission denied (publickey)", "check user, password and key file"),
-        ("the host key of 10.0.0.5:22 is unknown: found SHA256:x", "urc trust"),
-        ("something that nobody has seen before", "check the settings of this transport"),
-    ],
-)
-def test_a_failure_comes_with_what_to_do(text: str, what: str) -> None:
-    assert what in advice(text)

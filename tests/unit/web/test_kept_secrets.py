@@ -24,7 +24,7 @@ from urc.web.fleet.robots import Robot
 
 ADDRESS = "http://localhost:8080"
 PASSWORD = "open sesame"  # noqa: S105
-AGAIN = "enter it again: it was entered for another place, or another package"
+AGAIN = "Enter it again: it was entered for another place, or another package."
 
 
 class Wire:
@@ -186,10 +186,10 @@ def test_a_file_of_an_earlier_version_is_asked_for_again(tmp_path: Path) -> None
     file.save(StoredSettings(settings={"host": "10.0.0.5", "key": PASSWORD}))
     wire = Wire()
     with served(tmp_path, wire) as client:
-        page = client.get("/").text
+        assert "Not set yet: Key" in client.get("/").text
+        page = client.get("/robots/rover/settings").text
         assert "10.0.0.5" in page
-        assert "Not set yet: Key" in page
-        assert AGAIN in client.get("/robots/rover/settings").text
+        assert AGAIN in page
         assert file.load().settings["key"] == PASSWORD
         assert fill_in(client, host="10.0.0.5", key=PASSWORD)["isSaved"]
         assert "Not set yet" not in client.get("/").text

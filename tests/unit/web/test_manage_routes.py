@@ -269,7 +269,7 @@ def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
     stock(tmp_path)
     with served(tmp_path, given=lambda _: {"host": "10.9.9.9"}) as client:
         page = client.get("/robots/rover/settings").text
-        assert "given when URC was started" in page
+        assert "Given when URC was started" in page
         send(client, settings={"host": "10.0.0.7", "key": "x"})
         assert "10.9.9.9" in client.get("/robots/rover/settings").text
 
@@ -354,8 +354,8 @@ def test_each_type_of_setting_has_its_field(tmp_path: Path) -> None:
         page = client.get("/robots/puppet/settings").text
     assert "1 to 9" in page
     assert 'inputmode="numeric"' in page
-    assert "as the driver says (near)" in page
-    assert "as the driver says (no)" in page
+    assert "Default: near" in page
+    assert "Default: no" in page
     assert 'type="password"' in page
 
 
@@ -406,4 +406,4 @@ def test_what_may_stay_empty_does_not_keep_anybody_from_connecting(tmp_path: Pat
     with served(tmp_path, dashboard_profile(settings=settings)) as client:
         assert "Not set yet" not in client.get("/").text
         assert client.get("/robots/puppet/").status_code == 200
-        assert "may stay empty" in client.get("/robots/puppet/settings").text
+        assert "May stay empty." in client.get("/robots/puppet/settings").text

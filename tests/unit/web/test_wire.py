@@ -130,12 +130,12 @@ def test_values_of_many_parts() -> None:
 
 def test_links_log_replies_and_pongs() -> None:
     """The other messages, each as the page reads it."""
-    link = LinkStatus("wire", "lost", "tcp x:1", 1.0, "refused", 3, 4)
+    link = LinkStatus("wire", "lost", "tcp x:1", 1.0, "connection refused", 3, 4)
     assert json.loads(wire.encode_links([link], 3.0)) == {
         "t": "links",
         "links": [
             {"transport": "wire", "state": "lost", "address": "tcp x:1", "since": 2000,
-             "detail": "refused", "attempts": 3, "faults": 4}
+             "detail": "connection refused", "attempts": 3, "faults": 4, "cause": "refused"}
         ],
     }  # fmt: skip
     assert json.loads(wire.encode_log([LogEntry(1.0, "error", "wire", "no")], 7, 2.0)) == {

@@ -56,6 +56,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
         is_secret=is_secret,
         is_required=is_required,
         description=part.text("description"),
+        group=part.text("group"),
         default=(
             None if default_part is None else setting_value(default_part, kind, choices, problems)
         ),

@@ -18,7 +18,7 @@ __all__ = ["option_templates", "parse_transport"]
 _COMMON: Final = (
     "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
     "queue", "keepalive", "on_connect", "on_close", "stale_after", "tunnel",
-    "replies", "duplex", "errors",
+    "replies", "duplex", "errors", "hint",
 )  # fmt: skip
 
 
@@ -54,6 +54,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
         tunnel=part.text("tunnel"),
         is_half_duplex=part.text("duplex") == "half",
         never_replies=part.text("replies") == "never",
+        hint=part.text("hint"),
     )
 
 

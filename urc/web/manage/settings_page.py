@@ -11,12 +11,13 @@ from urllib.parse import quote
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
 from urc.runtime.settings_store import StoredSettings
+from urc.web.manage.setting_groups import CONNECTION, FURTHER, groups_of
 from urc.web.show.cells import spoken
 from urc.web.show.menu import Nav, NavigationLinks
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["Field", "Option", "SettingsPage", "settings_page"]
+__all__ = ["Field", "FieldGroup", "Option", "SettingsPage", "settings_page"]
 
 _INPUTS: Final = {
     "string": ("text", ""),
@@ -46,15 +47,17 @@ class Field:
     name: str
     title: str
     about: str
-    """Description of the setting, with its range and default."""
+    """Description of the setting, with its range."""
     kind: str
     """Type of the field: ``text``, ``password``, ``choice`` or ``switch``."""
     keys: str
     """HTML ``inputmode`` of the field; "" for the default keyboard."""
     value: str
     """Entered value; always "" for a secret."""
-    placeholder: str
-    """Value of the setting while the field is empty."""
+    default: str
+    """Value of the setting while the field is empty; "" without a default."""
+    is_optional: bool
+    """Whether the field may stay empty although it has no default."""
     options: tuple[Option, ...]
     is_given: bool
     """Whether the value was given at the start of the server, and therefore cannot be changed."""
@@ -65,8 +68,18 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True)
+class FieldGroup:
+    """Form fields that belong together."""
+
+    title: str
+    fields: tuple[Field, ...]
+    is_folded: bool
+    """Whether the fields are hidden at first; never with an entered value."""
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsPage:
-    """Context of ``settings.html.j2``: the driver, the interface, and the driver's settings."""
+    """Context of ``settings.html.j2``: the driver's settings, the driver, and the interface."""
 
     head: PageHead
     nav: Nav
@@ -79,7 +92,7 @@ class SettingsPage:
     versions: tuple[Option, ...]
     """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
-    fields: tuple[Field, ...]
+    groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
     """Names of the transports in the connection test."""
     may_manage: bool
@@ -130,7 +143,10 @@ def settings_page(
         driver=driver,
         versions=_versions(versions, kept.version),
         interfaces=_interfaces(profile, kept.interface),
-        fields=tuple(_field(one, kept, given, withheld) for one in profile.settings.values()),
+        groups=tuple(
+            _group(title, [_field(one, kept, given, withheld) for one in settings])
+            for title, settings in groups_of(profile).items()
+        ),
         transports=tuple(profile.driver.transports),
         may_manage=may_manage,
         is_simulated=False,
@@ -152,6 +168,12 @@ def _interfaces(profile: Profile, chosen: str) -> tuple[Option, ...]:
     return tuple(
         Option(name, one.title or name, name == shown) for name, one in profile.interfaces.items()
     )
+
+
+def _group(title: str, fields: list[Field]) -> FieldGroup:
+    words = {CONNECTION: t("Connection"), FURTHER: t("Further settings")}
+    is_empty = not any(one.value or one.is_set or one.is_withheld for one in fields)
+    return FieldGroup(words.get(title, title), tuple(fields), title != CONNECTION and is_empty)
 
 
 def _field(
@@ -178,7 +200,8 @@ def _field(
         kind=kind,
         keys=keys,
         value=text,
-        placeholder=default or ("" if setting.is_required else t("may stay empty")),
+        default="" if options else default,
+        is_optional=not setting.is_required and not default,
         options=options,
         is_given=is_given,
         is_set=is_given or (setting.name in kept.settings and setting.name not in withheld),
@@ -190,11 +213,7 @@ def _choices(
     values: Sequence[str], chosen: str, default: str, titles: Mapping[str, str] | None = None
 ) -> tuple[Option, ...]:
     called = titles or {}
-    usual = (
-        t("as the driver says ({value})", value=called.get(default, default))
-        if default
-        else t("not set")
-    )
+    usual = t("Default: {value}", value=called.get(default, default)) if default else t("not set")
     first = Option("", usual, chosen not in values)
     return (first, *(Option(one, called.get(one, one), one == chosen) for one in values))
 

@@ -7,6 +7,7 @@ robot is switched off.
 import asyncio
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
+from pathlib import PurePath
 from typing import Final
 
 import msgspec
@@ -27,6 +28,7 @@ from urc.runtime.settings_store import StoredSettings
 from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
+from urc.web.manage.setting_groups import failed_field
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
 from urc.web.serve.actors import actor_of
@@ -98,7 +100,7 @@ class SettingsRoutes:
             filled.given if filled is not None else {},
             withheld=filled.withheld if filled is not None else (),
             ways=self._ways,
-            driver=str(lock) if lock is not None else profile.file,
+            driver=str(lock) if lock is not None else PurePath(profile.file).name,
             versions=[one.version for one in reversed(locks)],
             may_manage=visitor_of(request).may(MAINTAIN, name),
             fault=fault,
@@ -196,7 +198,9 @@ class SettingsRoutes:
         )
         found = factory.filled(profile, kept)
         for name in untouched.keys() & found.withheld:
-            faults[name] = t("enter it again: it was entered for another place, or another package")
+            faults[name] = t(
+                "Enter it again: it was entered for another place, or another package."
+            )
         return msgspec.structs.replace(kept, destination=found.destination), faults
 
     async def _tried(
@@ -220,7 +224,7 @@ class SettingsRoutes:
             finally:
                 trying.cancel()
                 await asyncio.wait((trying,), timeout=_END_S)
-            return tuple(map(_line, trying.result()))
+            return tuple(_line(one, profile) for one in trying.result())
 
 
 def _changes(
@@ -247,7 +251,7 @@ def _epoch(service: RobotService | None) -> int:
     return service.controls.controller.lease.state.epoch if service is not None else 0
 
 
-def _line(tried: ProbeResult) -> ProbedTransport:
+def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
     return ProbedTransport(
         tried.transport,
         tried.type,
@@ -255,6 +259,8 @@ def _line(tried: ProbeResult) -> ProbedTransport:
         tried.verdict,
         printable(tried.text),
         tried.advice,
+        tried.cause,
+        "" if tried.verdict == "answers" else failed_field(profile, tried.transport, tried.cause),
     )
 
 

@@ -302,6 +302,10 @@ class ProbedTransport(ManageMessage, frozen=True):
     verdict: str
     text: str
     advice: str
+    cause: str = ""
+    """Name of the cause of a failure; "" if it is unknown."""
+    field: str = ""
+    """Name of the setting that most likely caused the failure; "" if unknown."""
 
 
 class SettingsAnswer(ManageMessage, frozen=True):

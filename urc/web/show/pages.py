@@ -98,6 +98,10 @@ class RobotPage:
     """Path of the playback's state; "" without a playback."""
     is_emulated: bool
     """Whether the robot is emulated."""
+    settings_url: str
+    """URL of the robot's settings; "" if the settings are fixed."""
+    hints: str
+    """The driver's next steps for lost connections, by transport, as a JSON object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +126,7 @@ def robot_page(
     playback: str = "",
     is_part: bool = False,
     is_emulated: bool = False,
+    has_settings: bool = False,
     trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface of a robot.
@@ -138,6 +143,7 @@ def robot_page(
         playback: path of the playback's state; "" without a playback.
         is_part: whether an open page requests this page to replace its interface.
         is_emulated: whether the robot is emulated, which the page shows next to the title.
+        has_settings: whether the server has a page for the settings of the robot.
         trust: rule that distinguishes third-party widgets from trusted widgets.
     """
     uses = _uses(profile, interface)
@@ -146,6 +152,7 @@ def robot_page(
     place = quote(name, safe="")
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
     tabs = page_tabs(interface, tab)
+    transports = profile.driver.transports
     page = RobotPage(
         head=PageHead(
             nonce=nonce,
@@ -169,6 +176,8 @@ def robot_page(
         can_move=can_move(profile.driver) and not playback,
         playback=playback,
         is_emulated=is_emulated,
+        settings_url=f"{url}settings" if has_settings else "",
+        hints=json.dumps({name: one.hint for name, one in transports.items() if one.hint}),
     )
     return render("robot.html.j2", page)
 

@@ -40,6 +40,7 @@ import msgspec
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Sample, Signal
+from urc.runtime.connection_cause import cause_of
 from urc.runtime.hub import LinkStatus, LogEntry
 from urc.web.wire.text import cut, encoded, encoded_bytes, milliseconds, repaired
 from urc.wire.client_messages import INBOUND_BYTES, ClientMessage, CommandRequest, Ping
@@ -199,6 +200,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
                     detail=cut(link.detail),
                     attempts=link.attempts,
                     faults=link.faults,
+                    cause=cause_of(link.detail, link.address) if link.state == "lost" else "",
                 )
                 for link in links
             ]

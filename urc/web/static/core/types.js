@@ -100,6 +100,7 @@
  * @property {string} detail
  * @property {number} attempts
  * @property {number} faults
+ * @property {string} cause name of the cause of a lost connection, see connection_causes.js
  *
  * @typedef {object} Line
  * @property {number} age

@@ -15,6 +15,7 @@ import { Alerts, PageTopics, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
 import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
+import { LostCard } from "./lost_card.js";
 import { Panel } from "./panel.js";
 import { FullScreen, WakeLock } from "./screen.js";
 import { ScreenName } from "./screen_name.js";
@@ -131,6 +132,9 @@ function tellOfDoor() {
   else if (note.textContent === AT_THE_DOOR) tell("");
 }
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
+const lost = new LostCard(part(root, "[data-lost]"), root, () => {
+  if (!socket.send({ t: "reconnect" })) socket.hurry();
+});
 const screenName = new ScreenName((message) => socket.send(message));
 const wakeLock = new WakeLock(tell);
 const stage = new ViewSwitch(root, { store, run, input, asks, host, panel: panel.el, wake });
@@ -161,6 +165,7 @@ function draw() {
   askPictures();
   badge.frame(store, socket);
   panel.frame(store, socket.reason);
+  lost.frame(store, socket, nowMs);
   alarms.frame(store, nowMs);
   stop.frame();
   controls?.frame(nowMs);

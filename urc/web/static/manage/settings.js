@@ -10,6 +10,8 @@
  * @property {"answers" | "opens" | "fails"} verdict
  * @property {string} text
  * @property {string} advice
+ * @property {string} cause name of the cause of a failure; "" if unknown
+ * @property {string} field setting that most likely caused the failure; "" if unknown
  *
  * @typedef {object} Answer
  * @property {boolean} isSaved
@@ -20,6 +22,7 @@
  */
 import { ask, reason } from "../core/api_client.js";
 import { part } from "../live/badge.js";
+import { causeWords } from "../core/connection_causes.js";
 import { button, made, ready } from "../core/dom.js";
 import { mark, t } from "../core/words.js";
 
@@ -80,6 +83,7 @@ async function send({ test, anyway = false }) {
     });
     mistakes(answer.faults);
     lines(answer.lines);
+    blame(answer.lines);
     tell(`${answer.isSaved ? "✓" : "▲"} ${answer.text}`, answer.isSaved ? "" : "urc-bad");
     if (answer.isSaved) saved();
     else if (answer.lines.length) offerAnyway();
@@ -127,9 +131,38 @@ function mistakes(faults) {
     told.textContent = text && `▲ ${text}`;
     told.hidden = !text;
     const field = box.querySelector("input, select");
+    told.dataset["tone"] = "";
     if (text) field?.setAttribute("aria-invalid", "true");
     else field?.removeAttribute("aria-invalid");
+    if (text) unfold(box);
   }
+}
+
+/**
+ * Show a failed test at the field that most likely caused it.
+ *
+ * @param {Line[]} some
+ */
+function blame(some) {
+  for (const { field: name, verdict, cause, address, text } of some) {
+    const box = [...form.querySelectorAll("[data-field]")].find(
+      (one) => one instanceof HTMLElement && name !== "" && one.dataset["field"] === name,
+    );
+    const told = box?.querySelector("[data-fault]");
+    if (!box || !(told instanceof HTMLElement) || !told.hidden) continue;
+    const isFailed = verdict === "fails";
+    const words = causeWords(cause, address, text);
+    told.textContent = `${isFailed ? "▲" : "◆"} ${words.cause} ${words.step}`;
+    told.dataset["tone"] = isFailed ? "" : "caution";
+    told.hidden = false;
+    if (isFailed) box.querySelector("input, select")?.setAttribute("aria-invalid", "true");
+    unfold(box);
+  }
+}
+
+/** Open the group of a field. @param {Element} box */
+function unfold(box) {
+  box.closest("[data-group]")?.setAttribute("open", "");
 }
 
 /** @param {Line[]} some */
@@ -146,7 +179,7 @@ function lines(some) {
         made("h3", { class: `urc-row-title ${kind}`.trim() }, `${sign} ${one.transport}: ${t(word)}`),
         made("p", { class: "urc-small" }, one.address),
         one.verdict !== "answers" && made("p", { lang: "en" }, one.text),
-        one.advice && made("p", { lang: "en" }, one.advice),
+        one.verdict !== "answers" && one.cause === "" && one.advice && made("p", { lang: "en" }, one.advice),
       );
     }),
   );
@@ -165,7 +198,7 @@ for (const one of form.querySelectorAll("[data-forget]")) {
     const field = form.elements.namedItem(name);
     if (field instanceof HTMLInputElement) {
       field.value = "";
-      field.placeholder = t("not set");
+      field.placeholder = "";
     }
     tell(t("forgotten once it is saved"));
   });

@@ -49,6 +49,7 @@ const LINE = {
   detail: "",
   attempts: 0,
   faults: 0,
+  cause: "",
 };
 /** @type {Lease} */
 const FREE = {

@@ -1,0 +1,61 @@
+// @ts-check
+/** The card of a lost robot: when it is shown, and its words. */
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
+import { lossOf } from "../../urc/web/static/live/lost_card.js";
+import { Store } from "../../urc/web/static/live/store.js";
+
+/** @returns {any} a socket that is up */
+function socket(more = {}) {
+  return { failures: 0, isShutOut: false, reason: "", ...more };
+}
+
+/** @param {Record<string, string>} states state of each transport */
+function robot(states) {
+  const store = new Store();
+  store.setUp(true, 0);
+  const rows = Object.entries(states).map(([transport, state]) => ({
+    transport, state, address: `ros 127.0.0.1:9 ${transport}`, since: 0, detail: "x", attempts: 1, faults: 0, cause: "refused",
+  }));
+  store.setLinks(/** @type {any} */ (rows), 0);
+  return store;
+}
+
+test("a robot is lost if no connection is good and one is lost", () => {
+  assert.equal(lossOf(robot({}), socket()), null);
+  assert.equal(lossOf(robot({ wire: "connecting" }), socket()), null);
+  assert.equal(lossOf(robot({ wire: "live", eye: "lost" }), socket()), null);
+  assert.equal(lossOf(robot({ wire: "silent", eye: "lost" }), socket()), null);
+  const loss = lossOf(robot({ wire: "idle", eye: "lost" }), socket());
+  assert.equal(loss?.of, "robot");
+  assert.deepEqual(loss, { of: "robot", transport: "eye", cause: "refused", address: "ros 127.0.0.1:9 eye", detail: "x" });
+});
+
+test("without the server the card speaks of the server, after the first failure", () => {
+  const store = new Store();
+  assert.equal(lossOf(store, socket()), null);
+  assert.deepEqual(lossOf(store, socket({ failures: 1, reason: "gone" })), { of: "server", detail: "gone" });
+  assert.equal(lossOf(store, socket({ failures: 1, isShutOut: true })), null);
+});
+
+test("a refusal names the program that the transport needs", () => {
+  assert.deepEqual(causeWords("refused", "ros 127.0.0.1:9", "x"), {
+    cause: "127.0.0.1:9 refuses the connection.", step: "Is rosbridge running?", isForeign: false,
+  });
+  assert.equal(causeWords("refused", "tcp 10.0.0.5:23", "x").step, "Is the robot's program running?");
+  assert.equal(causeWords("timeout", "ros 10.0.0.5:9", "x").cause, "10.0.0.5:9 does not answer.");
+});
+
+test("an unknown cause keeps the transport's own words", () => {
+  const { cause, step, isForeign } = causeWords("", "tcp 10.0.0.5:23", "the moon is in the way");
+  assert.equal(cause, "the moon is in the way");
+  assert.ok(isForeign);
+  assert.equal(step, "Check the settings of the robot.");
+});
+
+test("an address is shown without the type of its transport", () => {
+  assert.equal(placeOf("serial /dev/ttyUSB0"), "/dev/ttyUSB0");
+  assert.equal(placeOf("memory"), "memory");
+});

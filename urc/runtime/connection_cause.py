@@ -1,0 +1,130 @@
+"""The cause of a failed connection, and the next step for the operator: one table for all pages.
+
+Layer 4. Pure. Transports report errors in words of the operating system or of a library; the table
+recognises the usual ones. Pages translate a cause by its name (`core/connection_causes.js`).
+"""
+
+from typing import Final, Literal, NamedTuple
+
+__all__ = ["CAUSES", "Cause", "advice_on", "cause_of"]
+
+Cause = Literal[
+    "",
+    "refused",
+    "unreachable",
+    "timeout",
+    "name",
+    "host-key",
+    "permission",
+    "sign-in",
+    "tls",
+    "device",
+    "closed",
+    "login",
+    "silent",
+]
+"""Name of a cause; "" for an unknown one."""
+
+
+class _Known(NamedTuple):
+    cause: Cause
+    words: tuple[str, ...]
+    """Words in lower case; one of them is in the error message."""
+    advice: str
+    address: str = ""
+    """Start of the addresses to which the row applies; "": all."""
+
+
+CAUSES: Final = (
+    _Known(
+        "refused",
+        ("connection refused",),
+        "the machine responds, but nothing listens on that port: check the port, and whether"
+        " the robot's program is running",
+    ),
+    _Known(
+        "host-key",
+        ("host key", "fingerprint"),
+        "compare the robot's host key, then trust the key with 'urc trust'",
+    ),
+    _Known(
+        "permission",
+        ("permission denied", "access is denied"),
+        "the user of URC may not open the device: add the user to the device's group",
+        "serial",
+    ),
+    _Known(
+        "sign-in",
+        (
+            *("authenticat", "authoriz", "password", "permission denied", "login", "publickey"),
+            *("401", "403"),
+        ),
+        "the robot rejects the login: check user, password and key file",
+    ),
+    _Known(
+        "tls",
+        ("certificate", "no tls", "ssl"),
+        "check the certificate, and whether the port speaks TLS",
+    ),
+    _Known(
+        "name",
+        ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
+        "the host name cannot be resolved: check the spelling, or use a numeric address",
+    ),
+    _Known(
+        "unreachable",
+        ("unreachable", "no route"),
+        "the network is unreachable: is this machine on the robot's network?",
+    ),
+    _Known(
+        "login",
+        ("steps of the connection are not done",),
+        "the robot does not answer the login: check user and password, and the kind of robot",
+    ),
+    _Known(
+        "silent",
+        ("nothing received", "no data", "reply timeout", "no reply"),
+        "connected, but the robot sends nothing: check the port and the kind of robot",
+    ),
+    _Known(
+        "timeout",
+        ("timed out", "no answer", "within", "time-out", "timeout"),
+        "no reply from that address: check the address, the network, and whether the robot is on",
+    ),
+    _Known(
+        "device",
+        ("no such file", "could not open port", "no such device"),
+        "the file or device does not exist: check the path, and whether the device is plugged in",
+    ),
+    _Known(
+        "closed",
+        ("closed", "broke", "reset by peer", "broken pipe", "the connection ("),
+        "the robot ended the connection: many robots serve only one program at a time",
+    ),
+)
+"""All known causes; the first match counts."""
+
+
+def cause_of(text: str, address: str = "") -> Cause:
+    """Return the cause of a failed connection.
+
+    Args:
+        text: error message of the transport.
+        address: target of the connection as text, such as ``tcp 10.0.0.5:6789``.
+    """
+    found = _known(text, address)
+    return found.cause if found is not None else ""
+
+
+def advice_on(text: str, address: str = "") -> str:
+    """Return advice about a failed connection in one line; for the arguments, see `cause_of`."""
+    found = _known(text, address)
+    return found.advice if found is not None else "check the settings of this transport"
+
+
+def _known(text: str, address: str) -> _Known | None:
+    lower = text.lower()
+    for known in CAUSES:
+        if any(word in lower for word in known.words) and address.startswith(known.address):
+            return known
+    return None

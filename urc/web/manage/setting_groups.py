@@ -1,0 +1,97 @@
+"""The groups of a robot's settings, and the setting behind a failed connection.
+
+Layer 5. Pure. Both follow from the use of the settings in the options of the transports.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from urc.expressions import Template
+from urc.model.driver import TransportSpec
+from urc.model.profile import Profile, Setting
+from urc.runtime.connection_cause import Cause
+
+__all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of"]
+
+CONNECTION: Final = ""
+"""Group of the settings that lead to the robot."""
+FURTHER: Final = "*"
+"""Group of the other settings without a declared group."""
+_PLACE: Final = ("host", "url", "address", "path")
+_LOGIN: Final = ("password", "key", "passphrase", "username", "user", "auth", "token", "headers")
+_OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
+    "refused": ("port", "url", "host"),
+    "unreachable": _PLACE,
+    "timeout": _PLACE,
+    "name": _PLACE,
+    "sign-in": _LOGIN,
+    "login": _LOGIN,
+    "permission": ("port", "path"),
+    "device": ("port", "path", "key"),
+    "tls": ("port", "url", "tls", "host"),
+    "closed": ("port", "url", "host"),
+    "silent": ("port", "baud", "url", "host"),
+    "host-key": ("host_key", "host"),
+}
+"""Options that most likely cause a failure, the most likely one first, by cause."""
+
+
+def groups_of(profile: Profile) -> dict[str, list[Setting]]:
+    """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
+
+    A setting without a declared group belongs to the connection if a transport uses it, or if the
+    operator must fill it in.
+    """
+    used = {
+        name for spec in profile.driver.transports.values() for name in _used(dict(spec.options))
+    }
+    groups: dict[str, list[Setting]] = {CONNECTION: []}
+    further: list[Setting] = []
+    for setting in profile.settings.values():
+        if setting.group:
+            groups.setdefault(setting.group, []).append(setting)
+        elif setting.name in used or setting.is_missing(setting.default):
+            groups[CONNECTION].append(setting)
+        else:
+            further.append(setting)
+    if further:
+        groups[FURTHER] = further
+    return {title: settings for title, settings in groups.items() if settings}
+
+
+def failed_field(profile: Profile, transport: str, cause: Cause) -> str:
+    """Return the setting that most likely caused a failure; "" if no setting did.
+
+    Args:
+        profile: profile of the robot.
+        transport: name of the failed transport.
+        cause: cause of the failure.
+    """
+    spec = profile.driver.transports.get(transport)
+    if spec is None:
+        return ""
+    return _first_of(spec, _OPTIONS.get(cause, ())) or _through(profile, spec, cause)
+
+
+def _through(profile: Profile, spec: TransportSpec, cause: Cause) -> str:
+    """Return the setting of the tunnel, if the transport itself uses none."""
+    return failed_field(profile, spec.tunnel, cause) if spec.tunnel else ""
+
+
+def _first_of(spec: TransportSpec, options: Sequence[str]) -> str:
+    for option in options:
+        for name in sorted(_used(spec.options.get(option))):
+            return name
+    return ""
+
+
+def _used(option: object) -> Iterator[str]:
+    """Yield the names of all settings in an option."""
+    if isinstance(option, Template):
+        yield from option.settings
+    elif isinstance(option, Mapping):
+        for one in option.values():
+            yield from _used(one)
+    elif isinstance(option, (list, tuple)):
+        for one in option:
+            yield from _used(one)

@@ -1,0 +1,83 @@
+// @ts-check
+/**
+ * Causes of failed connections in the user's language, each with the next step. The server finds the
+ * cause: see `urc.runtime.connection_cause`.
+ */
+import { mark, t } from "./words.js";
+
+/** Program that a transport needs at the robot, by type of the transport. @type {Record<string, string>} */
+const PROGRAMS = {
+  ros: mark("Is rosbridge running?"),
+  mqtt: mark("Is the MQTT broker running?"),
+  ssh: mark("Is the SSH server running?"),
+  http: mark("Is the robot's web server running?"),
+  websocket: mark("Is the robot's web server running?"),
+  telnet: mark("Is the Telnet server running?"),
+};
+
+/** @type {Record<string, {cause: string, step: string}>} */
+const CAUSES = {
+  refused: { cause: mark("{place} refuses the connection."), step: mark("Is the robot's program running?") },
+  unreachable: {
+    cause: mark("URC's computer has no route to {place}."),
+    step: mark("Is URC's computer on the robot's network?"),
+  },
+  timeout: { cause: mark("{place} does not answer."), step: mark("Is the robot switched on? Is its address right?") },
+  name: { cause: mark("The name in {place} is unknown."), step: mark("Check the spelling, or enter a numeric address.") },
+  "host-key": {
+    cause: mark("URC does not trust the key of {place}."),
+    step: mark("Compare the robot's host key, then run “urc trust”."),
+  },
+  permission: {
+    cause: mark("URC may not open {place}."),
+    step: mark("Add the user of URC to the group of the device."),
+  },
+  "sign-in": { cause: mark("{place} refuses the sign-in."), step: mark("Check user name, password and key.") },
+  tls: {
+    cause: mark("URC cannot verify {place} over TLS."),
+    step: mark("Check the certificate, and whether the port uses TLS."),
+  },
+  device: { cause: mark("{place} does not exist."), step: mark("Is the device plugged in? Check its path.") },
+  closed: {
+    cause: mark("{place} ends the connection."),
+    step: mark("Does another program use the robot? Many robots serve only one."),
+  },
+  login: {
+    cause: mark("{place} does not answer the sign-in."),
+    step: mark("Check user name and password, and the kind of robot."),
+  },
+  silent: {
+    cause: mark("{place} accepts the connection and sends nothing."),
+    step: mark("Check the port and the kind of robot."),
+  },
+};
+
+/**
+ * Return the cause of a failure and the next step.
+ *
+ * @param {string} cause name of the cause; "" if unknown
+ * @param {string} address such as `ros 127.0.0.1:9090`
+ * @param {string} detail message of the transport, for an unknown cause
+ * @returns {{cause: string, step: string, isForeign: boolean}} `isForeign`: the cause is in English
+ */
+export function causeWords(cause, address, detail) {
+  const known = CAUSES[cause];
+  if (!known) return { cause: detail, step: t("Check the settings of the robot."), isForeign: detail !== "" };
+  const program = cause === "refused" ? PROGRAMS[typeOf(address)] : undefined;
+  return { cause: t(known.cause, { place: placeOf(address) }), step: t(program ?? known.step), isForeign: false };
+}
+
+/** @param {string} address */
+function typeOf(address) {
+  return address.split(" ", 1)[0] ?? "";
+}
+
+/**
+ * Return an address without the type of its transport: `ros 127.0.0.1:9090` is `127.0.0.1:9090`.
+ *
+ * @param {string} address
+ */
+export function placeOf(address) {
+  const blank = address.indexOf(" ");
+  return blank > 0 ? address.slice(blank + 1) : address;
+}
