@@ -180,7 +180,5 @@ async def test_without_the_key_it_is_a_stranger(
                 return
             await line.send('{"t":"drive","verb":"force"}')
             async with asyncio.timeout(WAIT_S):
-                while "taking the controls by force needs an engineer" not in str(
-                    said := await line.recv()
-                ):
+                while "Taking over needs the role maintain" not in str(said := await line.recv()):
                     assert '"forces":true' not in str(said)

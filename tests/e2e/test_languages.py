@@ -89,7 +89,9 @@ async def check_sentences(page: Page, tag: str) -> None:
     words = table(tag)
     screen = words["screen {n}"].replace("{n}", "2")
     for sentence, expected in {
-        "stopped by screen 2: reset it first": words["stopped by {name}: reset it first"],
+        "Stopped by screen 2. Reset to drive again.": words[
+            "Stopped by {name}. Reset to drive again."
+        ],
         "Keep has the controls": words["{name} has the controls"].replace("{name}", "Keep"),
         "nothing is stopped": words["nothing is stopped"],
         "the motor is hot": "the motor is hot",
@@ -146,7 +148,9 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
         await expect(page.locator("[data-who]")).to_have_text(words["Nobody drives"])
     await expect(page.locator("[data-who]")).to_have_text(words["Not connected to URC"])
     await page.locator("[data-stop-button]").click()
-    await expect(page.locator("[data-stop-note]")).to_have_text(words["▲ NO LINK: stop it by hand"])
+    await expect(page.locator("[data-stop-note]")).to_have_text(
+        words["▲ NO LINK: use the robot's own stop switch"]
+    )
     await check(page, tag)
     assert await stop_box(page) == before
 
@@ -161,7 +165,7 @@ async def test_the_browsers_wish_is_followed_without_a_choice(browser: Browser) 
             await page.goto(f"{address}nowhere")
             await expect(page.locator("html")).to_have_attribute("lang", "fr")
             await expect(page.locator("main")).to_contain_text(
-                table("fr")["There is no such page."]
+                table("fr")["This page does not exist."]
             )
     finally:
         await context.close()

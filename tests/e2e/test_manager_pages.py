@@ -75,7 +75,7 @@ def row(page: Page, part: str, package: str) -> Locator:
 async def agree(page: Page) -> None:
     """Read what a package may do, say yes, and see it installed."""
     dialog = page.get_by_role("dialog")
-    await expect(dialog).to_contain_text("It may do this")
+    await expect(dialog).to_contain_text("Permissions")
     await dialog.get_by_role("button", name="Install", exact=True).click()
     await expect(dialog).to_contain_text("✓ installed")
     await dialog.get_by_role("button", name="Close").click()
@@ -142,7 +142,7 @@ async def test_download_a_driver(
             return
         await expect(dialog).to_contain_text("connects by tcp (wire): host from the settings")
         await expect(dialog).to_contain_text("widgets/dial 1.0.0")
-        await dialog.get_by_role("button", name="Give up").click()
+        await dialog.get_by_role("button", name="Cancel").click()
         await expect(dialog).to_be_hidden()
         assert installed(data) == []
         await offer.get_by_role("button", name="Install").click()
@@ -220,7 +220,7 @@ async def test_add_an_interface(
         await unfold(page)
         await page.get_by_label("Interface").select_option("wide")
         await page.get_by_role("button", name="Save without a test").click()
-        await expect(page.locator("[data-said]")).to_have_text("✓ saved, and used from now on")
+        await expect(page.locator("[data-said]")).to_have_text("✓ Saved and in use")
         await page.goto(f"{address}robots/rover/")
         await expect(page.locator("[data-interface-choice]")).to_have_value("wide")
 
@@ -275,7 +275,7 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await page.get_by_label("Port").fill(str(port))
         await page.get_by_role("button", name="Test & save").click()
         await expect(wire).to_have_attribute("data-verdict", "answers")
-        await expect(page.locator("[data-said]")).to_have_text("✓ saved, and used from now on")
+        await expect(page.locator("[data-said]")).to_have_text("✓ Saved and in use")
         assert "charge? 7 dawn" in heard
         await page.get_by_role("link", name="Back to the menu").click()
         await expect(page.locator("main")).not_to_contain_text("open sesame")
@@ -338,7 +338,7 @@ async def test_an_update_says_what_it_changes_and_can_be_taken_back(
             dialog = page.get_by_role("dialog")
             await expect(dialog).to_contain_text("drivers/rover 1.0.0 → 1.1.0")
             await expect(dialog).to_contain_text("nothing more")
-            await dialog.get_by_text("What changes on the wire").click()
+            await dialog.get_by_text("Changed connections").click()
             await expect(dialog.locator("pre")).to_contain_text("battery?")
             await dialog.get_by_role("button", name="Update", exact=True).click()
             await expect(dialog).to_contain_text("✓ installed")

@@ -39,7 +39,7 @@ async def test_what_a_package_uses_by_itself_needs_a_tick(
         await expect(risks.nth(0)).to_contain_text("uses a key file of this machine")
         install = dialog.get_by_role("button", name="Install")
         await expect(install).to_be_disabled()
-        await dialog.get_by_label("Let it do that").check()
+        await dialog.get_by_label("Allow it").check()
         await install.click()
         await expect(dialog).to_contain_text("✓ installed")
         (lock,) = Store(tmp_path / "packages").installed()

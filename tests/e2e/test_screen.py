@@ -44,7 +44,7 @@ async def test_the_screen_stays_on_while_this_page_drives(new_page: PageMaker) -
         await fire(page, "document.dispatchEvent(new Event('visibilitychange'))")
         await page.wait_for_function("() => locks.length === 2")
         await page.mouse.up()
-        await page.get_by_role("button", name="Give back").click()
+        await page.get_by_role("button", name="Release").click()
         await page.wait_for_function("() => locks[1].released")
 
 

@@ -177,7 +177,7 @@ class Argument(NamedTuple):
     """Confirmation questions, by argument value as written in the document."""
 
 
-STOPPED: Final = "STOP was pressed meanwhile: give it anew"
+STOPPED: Final = "STOP was pressed meanwhile: send it again"
 """Reason for refusing a motion request that is older than the last STOP."""
 
 

@@ -66,7 +66,7 @@ class Freshness:
             return "the input echoes no beat of this server"
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
-            return f"the input is {(now - issued_at) * 1000:.0f} ms old"
+            return f"Link too slow: your input came {(now - issued_at) * 1000:.0f} ms late"
         self._newest[of] = given.number
         return ""
 

@@ -101,11 +101,11 @@ class Lease:
         if state.latched_by:
             return self.latched
         if state.holder is None:
-            return "nobody has the controls: take them first"
+            return "Take control first"
         if state.holder.id != client:
             return f"{_called(state.holder)} has the controls"
         if epoch != state.epoch:
-            return "the controls were taken anew meanwhile"
+            return "Control changed hands meanwhile"
         return ""
 
     def interlock(self, client: Operator, stops: int | None = None) -> str:
@@ -133,7 +133,7 @@ class Lease:
     def latched(self) -> str:
         """Message about the latched stop, or "" without a latch."""
         by = self.state.latched_by
-        return f"stopped by {by}: reset it first" if by else ""
+        return f"Stopped by {by}. Reset to drive again." if by else ""
 
     def touch(self, now: float) -> None:
         """Record an input of the holder, which renews the lease."""
@@ -169,7 +169,7 @@ class Lease:
         """Hand over the lease or keep the lease, according to the holder's answer."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
-            return LeaseRefused("nobody asks you for the controls")
+            return LeaseRefused("No screen asks you for control")
         if is_granted:
             return self._grant(state.asked_by, now)
         self.state = state._replace(asked_by=None, asked_until=0.0)
@@ -178,7 +178,7 @@ class Lease:
     def force(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
         """Take the lease from its holder. The operator needs the role ``maintain``."""
         if not includes(client.role, "maintain"):
-            return LeaseRefused("taking the controls by force needs an engineer")
+            return LeaseRefused("Taking over needs the role maintain")
         if self.state.latched_by:
             return LeaseRefused(self.latched)
         return self._grant(client, now)

@@ -47,9 +47,9 @@ Moved = Callable[[Operator, int, str, Mapping[str, Reading], Payload, float], No
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
-LET_GO = "it was stopped: let go, then begin anew"
-_CUT = "the line to the robot was cut"
-_TAKE_ANEW = "it was stopped: take the controls anew"
+LET_GO = "Stopped: let go, then start again"
+_CUT = "Lost contact while driving"
+_TAKE_ANEW = "Stopped: take control again"
 
 
 @dataclass(slots=True)

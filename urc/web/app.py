@@ -418,7 +418,7 @@ class _Routes:
         states = self.robot_calls.listed(visitor)
         html = menu_page(
             head,
-            {one.name: self.robots[one.name] for one in states.robots},
+            {one.name: self.robots[one.name] for one in states.robots if one.name in self.robots},
             states=msgspec.to_builtins(states),
             ways=self.ways,
             drivers=drivers,
@@ -430,7 +430,9 @@ class _Routes:
         name = request.path_params["name"]
         robot = self.robots.get(name)
         if robot is None:
-            raise HTTPException(404, words.t("No robot of that name is served here."))
+            raise HTTPException(
+                404, words.t("This server has no robot called “{name}”.", name=name)
+            )
         if missing_settings(robot):
             settings = f"/robots/{quote(name, safe='')}/settings"
             place = settings if self.ways.has_managers else "/"
@@ -541,7 +543,7 @@ async def _told(request: Request, error: Exception) -> Response:
         return told(error.status_code, error.detail)
     standard = HTTPStatus(error.status_code).phrase
     text = (
-        words.t("There is no such page.")
+        words.t("This page does not exist.")
         if error.detail == standard == "Not Found"
         else error.detail
     )

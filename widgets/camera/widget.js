@@ -93,7 +93,7 @@ class Camera {
   }
 
   addSnapshot() {
-    this.shutter = this.addButton("⤓", this.t("Keep this picture"), () => void this.keep());
+    this.shutter = this.addButton("⤓", this.t("Save picture"), () => void this.keep());
     this.shutter.disabled = true;
   }
 
@@ -126,7 +126,7 @@ class Camera {
       show: (/** @type {HoldState} */ { phase, reason }) => {
         attribute(this.root, "data-phase", phase);
         const why = phase !== "idle" && reason ? `◆ ${reason}` : "";
-        this.hand = phase === "asking" ? `… ${t("taking the controls")}` : why;
+        this.hand = phase === "asking" ? `… ${t("taking control")}` : why;
         this.tell();
       },
     });

@@ -100,7 +100,7 @@ class TestView {
   named({ id, map, isStandard }) {
     const name = id || this.t("gamepad");
     const [unknown, stored] = [
-      this.t("nobody knows where its sticks are; say so below"),
+      this.t("Sticks unknown: assign them below"),
       this.t("as stored on this device"),
     ];
     if (!map) return `◆ ${name}: ${unknown}`;

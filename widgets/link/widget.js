@@ -116,8 +116,8 @@ export default {
 
     if (who instanceof HTMLElement && verbs) {
       const words = {
-        take: t("Take the controls"), ask: t("Ask for the controls"), force: t("Take over"),
-        yes: t("Hand over"), no: t("Keep"), leave: t("Give back"), reset: t("Reset"),
+        take: t("Take control"), ask: t("Ask for control"), force: t("Take over"),
+        yes: t("Hand over"), no: t("Keep"), leave: t("Release"), reset: t("Reset"),
       };
       const buttons = Object.entries(words).map(([wish, text]) => {
         const made = document.createElement("button");
@@ -149,7 +149,7 @@ export default {
       if (isMine && asker) return { text: t("◆ {who} asks to drive", { who: asker.name }), wishes: ["yes", "no"] };
       if (isMine) return { text: t("● You drive"), wishes: ["leave"] };
       if (!holder) return { text: t("Nobody drives"), wishes: drives ? ["take"] : [] };
-      const text = asker?.id === you ? t("Asked {who}", { who: holder.name }) : t("{who} drives", { who: holder.name });
+      const text = asker?.id === you ? t("Asked {who}", { who: holder.name }) : t("{who} is driving", { who: holder.name });
       return { text, wishes: drives ? [...(asker ? [] : ["ask"]), ...(forces ? ["force"] : [])] : [] };
     }
 

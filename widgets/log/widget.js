@@ -45,7 +45,7 @@ export default {
       ];
       write(note, words.filter(Boolean).join(" · "));
       attribute(pause, "aria-pressed", String(held !== null));
-      write(pause, held ? t("Go on") : t("Pause"));
+      write(pause, held ? t("Continue") : t("Pause"));
     }
 
     /** @param {LogLine[]} wanted */

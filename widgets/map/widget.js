@@ -135,8 +135,8 @@ class Chart {
       row.append(made);
       return made;
     };
-    add("+", this.t("Closer"), () => this.map.zoomIn());
-    add("−", this.t("Further away"), () => this.map.zoomOut());
+    add("+", this.t("Zoom in"), () => this.map.zoomIn());
+    add("−", this.t("Zoom out"), () => this.map.zoomOut());
     this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a way"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);

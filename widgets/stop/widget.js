@@ -33,7 +33,7 @@ export default {
  * @param {Context["t"]} t
  */
 function words({ phase, isLatched, isConfirmed, fault }, isCut, t) {
-  if (phase === "failed") return t("▲ NO LINK: stop it by hand");
+  if (phase === "failed") return t("▲ NO LINK: use the robot's own stop switch");
   if (isCut) return t("▲ NO LINK: {reason}", { reason: fault });
   if (isConfirmed) return inTurn([t("✓ sent"), t("✓ confirmed"), t("✓ latched")]);
   if (isLatched) return inTurn([t("✓ sent"), t("✓ latched")]);

@@ -36,7 +36,7 @@ async def test_everybody_sees_who_drives_and_a_second_hand_moves_nothing(
         first, second = await opened(new_page, address), await opened(new_page, address)
         await push(first)
         await robot.until_moving()
-        await says(second, "^screen 1 drives$")
+        await says(second, "^screen 1 is driving$")
         await push(second)
         await second.wait_for_function(
             "() => document.querySelector('.joystick-note').textContent"
@@ -85,11 +85,11 @@ async def test_a_request_can_be_turned_down_and_the_controls_taken_over(
         await wish(first, "take")
         await wish(second, "ask")
         await first.click("[data-verb='no']")
-        await says(second, "^screen 1 drives$")
+        await says(second, "^screen 1 is driving$")
         await push(first)
         await robot.until_moving()
         await wish(second, "force")
-        await says(first, "^screen 2 drives$")
+        await says(first, "^screen 2 is driving$")
         await robot.until_stopped()
         await first.mouse.up()
         await wish(second, "leave")

@@ -46,7 +46,7 @@ interfaces:
   default: { grid: fold beep show }
 """
 FOLD, BEEP, SHOW = (f"[data-cell='{place}'] .button-main" for place in range(3))
-LOCKED = "◆ stopped: reset it first"
+LOCKED = "◆ Stopped. Reset to drive again."
 WATCHES = "◆ this page only watches"
 
 
@@ -107,7 +107,7 @@ async def test_stop_holds_back_what_moves_by_itself_and_ends_sequences(
         before = list(heard)  # the next step, B, may have come before the stop
         assert "C" not in before
         await expect(page.locator(note(0))).to_have_text(LOCKED)
-        await expect(page.locator(note(2))).to_contain_text("reset it first")
+        await expect(page.locator(note(2))).to_contain_text("Reset to drive again")
         await page.click(FOLD, force=True)
         await page.click(BEEP)
         await until(lambda: "BEEP" in heard)
@@ -166,7 +166,7 @@ async def test_stop_gives_the_stop_of_the_robot_past_what_waits(
         assert heard in (["ASK", "HALT"], ["ASK", "HALT", "HALT"])
         before = len(heard)
         await page.click(STOP)
-        await expect(page.locator(note(0))).to_contain_text("▲ stopped by screen 1")
+        await expect(page.locator(note(0))).to_contain_text("▲ Stopped by screen 1")
         await until(lambda: len(heard) > before)
         assert set(heard[before:]) == {"HALT"}
 
@@ -195,6 +195,6 @@ async def test_a_choice_that_moves_is_refused_after_stop_and_one_that_ends_motio
         await choice.select_option("hold")
         await until(lambda: heard == ["MODE auto", "MODE hold"])
         await choice.select_option("auto")
-        await expect(page.locator("[data-cell='1']")).to_contain_text("reset it first")
+        await expect(page.locator("[data-cell='1']")).to_contain_text("Reset to drive again")
         await choice.select_option("hold")
         await until(lambda: heard == ["MODE auto", "MODE hold", "MODE hold"])

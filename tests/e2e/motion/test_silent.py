@@ -100,10 +100,10 @@ async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
         await until(robot.is_driven)
         robot.is_mute = True
         await until_text(page, "[data-badge-text]", "Robot silent")
-        await until_text(page, NOTE, "◆ the line to the robot was cut")
+        await until_text(page, NOTE, "◆ Lost contact while driving")
         robot.is_mute = False
         await until_text(page, "[data-badge-text]", "Live")
-        await until_text(page, NOTE, "◆ the line to the robot was cut")
+        await until_text(page, NOTE, "◆ Lost contact while driving")
         await page.mouse.up()
         await push(page, ".joystick-pad")
         await until(robot.is_driven)
@@ -125,7 +125,7 @@ async def test_a_robot_that_is_lost_is_the_reason_that_the_stick_gives(
             line.transport.abort()
         await until_text(page, "[data-badge-text]", "Robot lost")
         await page.wait_for_function(
-            "() => /the line to the robot was cut|the robot is not connected/"
+            "() => /Lost contact while driving|the robot is not connected/"
             f".test(document.querySelector('{NOTE}').textContent)"
         )
         await page.mouse.up()

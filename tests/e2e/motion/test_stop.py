@@ -117,7 +117,7 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
         count = len(robot.line.written)
         await push(driver)
         note = "[data-cell='0'] .joystick-note"
-        await until_text(driver, note, "◆ stopped by screen 2: reset it first")
+        await until_text(driver, note, "◆ Stopped by screen 2. Reset to drive again.")
         await driver.mouse.up()
         assert robot.after(count) == []
 
@@ -159,7 +159,7 @@ async def test_no_link_is_said_when_stop_cannot_be_delivered(new_page: PageMaker
         await page.route("**/api/v1/robots/*/stop", refuse)
         await page.evaluate("WebSocket.prototype.send = () => {}")
         await touch(page)
-        await until_text(page, NOTE, "▲ NO LINK: stop it by hand")
+        await until_text(page, NOTE, "▲ NO LINK: use the robot's own stop switch")
         await until_attribute(page, STOP, "data-phase", "failed")
         assert robot.line.texts == []
 

@@ -261,7 +261,7 @@ async def test_what_the_driver_asks_is_asked_in_the_place_of_the_widget(
         await dock.locator(".button-main").click()
         await dock.get_by_text("Dock now?").wait_for()
         await page.keyboard.press("Escape")
-        await dock.locator(".button-note", has_text="not sent").wait_for()
+        await dock.locator(".button-note", has_text="Cancelled").wait_for()
         await dock.locator(".button-main").click()
         await dock.get_by_role("button", name="Yes").click()
         await robot.until_got("DOCK")

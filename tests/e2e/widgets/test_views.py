@@ -175,7 +175,7 @@ async def test_a_camera_shows_the_newest_picture_and_its_age(new_page: PageMaker
         await until_pixel(page, ".camera-picture", 0.8, 0.5, "r > 150 && b < 50")
         await until_pixel(page, ".camera-picture", 0.2, 0.5, "b > 150 && r < 50")
         async with page.expect_download() as started:
-            await page.get_by_role("button", name="Keep this picture").click()
+            await page.get_by_role("button", name="Save picture").click()
         download = await started.value
         assert download.suggested_filename.endswith(".png")
         assert Path(await download.path()).read_bytes().startswith(b"\x89PNG")

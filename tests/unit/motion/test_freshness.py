@@ -20,7 +20,10 @@ def test_an_input_that_echoes_a_fresh_tick_is_taken_once() -> None:
 def test_an_input_that_lay_in_a_buffer_is_refused() -> None:
     fresh = Freshness()
     echo = fresh.issue(10.0)
-    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.401) == "the input is 401 ms old"
+    assert (
+        fresh.refusal(ControlInput(3, 1, echo), 3, 10.401)
+        == "Link too slow: your input came 401 ms late"
+    )
 
 
 def test_an_input_of_another_lease_is_refused() -> None:
@@ -128,4 +131,7 @@ def test_input_is_taken_up_to_its_greatest_age_and_told_how_old_it_is_beyond() -
     fresh = Freshness()
     echo = fresh.issue(0.0)
     assert fresh.refusal(ControlInput(1, 1, echo), 1, OLDEST_S) == ""
-    assert fresh.refusal(ControlInput(1, 2, echo), 1, 2.0) == "the input is 2000 ms old"
+    assert (
+        fresh.refusal(ControlInput(1, 2, echo), 1, 2.0)
+        == "Link too slow: your input came 2000 ms late"
+    )

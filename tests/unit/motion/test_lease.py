@@ -36,7 +36,7 @@ def test_an_input_of_an_earlier_lease_is_refused() -> None:
     before = lease.state.epoch
     lease.leave("a")
     lease.acquire(ANNA, 1.0)
-    assert lease.refusal("a", before) == "the controls were taken anew meanwhile"
+    assert lease.refusal("a", before) == "Control changed hands meanwhile"
 
 
 def test_a_request_without_an_answer_is_granted_when_its_time_is_over() -> None:
@@ -80,11 +80,11 @@ def test_only_the_holder_answers_a_request() -> None:
     for who in ("b", "c"):
         for is_granted in (True, False):
             answered = lease.answer(who, 2.0, is_granted=is_granted)
-            assert answered == LeaseRefused("nobody asks you for the controls")
+            assert answered == LeaseRefused("No screen asks you for control")
     assert (lease.state.holder, lease.state.asked_by) == (ANNA, BERT)
     lease.answer("a", 2.0, is_granted=False)
     late = lease.answer("a", 3.0, is_granted=True)
-    assert late == LeaseRefused("nobody asks you for the controls")
+    assert late == LeaseRefused("No screen asks you for control")
 
 
 def test_one_asks_at_a_time_and_may_ask_again() -> None:
@@ -127,8 +127,8 @@ def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
     lease = Lease()
     lease.acquire(ANNA, 0.0)
     lease.stop("Eve")
-    assert lease.acquire(ANNA, 1.0) == LeaseRefused("stopped by Eve: reset it first")
-    assert lease.force(CARL, 1.0) == LeaseRefused("stopped by Eve: reset it first")
+    assert lease.acquire(ANNA, 1.0) == LeaseRefused("Stopped by Eve. Reset to drive again.")
+    assert lease.force(CARL, 1.0) == LeaseRefused("Stopped by Eve. Reset to drive again.")
     reset = lease.reset(ANNA)
     assert isinstance(reset, LeaseChanged)
     assert reset.state.holder is None
@@ -155,7 +155,7 @@ def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> No
     lease.stop("ben")
     lease.reset(ANNA)
     lease.acquire(ANNA, 1.0)
-    assert lease.interlock(ANNA, before) == "STOP was pressed meanwhile: give it anew"
+    assert lease.interlock(ANNA, before) == "STOP was pressed meanwhile: send it again"
     assert lease.interlock(ANNA, lease.state.stops) == ""
     assert lease.interlock(ANNA) == ""
 
@@ -167,7 +167,7 @@ def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:
     assert again.state.holder is None
     assert again.state.epoch > lease.state.epoch
     lease.stop("Eve")
-    assert Lease(lease.state).refusal("a", 0) == "stopped by Eve: reset it first"
+    assert Lease(lease.state).refusal("a", 0) == "Stopped by Eve. Reset to drive again."
 
 
 def test_a_holder_who_goes_silent_gives_the_controls_back() -> None:
@@ -211,7 +211,7 @@ def test_only_a_stop_can_be_reset_and_a_reset_stops_nothing() -> None:
     assert lease.latched == ""
     assert lease.reset(ANNA) == LeaseRefused("nothing is stopped")
     lease.stop("Eve")
-    assert lease.latched == "stopped by Eve: reset it first"
+    assert lease.latched == "Stopped by Eve. Reset to drive again."
     assert lease.reset(ANNA) == LeaseChanged(lease.state, must_stop=False)
     assert lease.latched == ""
 

@@ -22,7 +22,7 @@ sequences:
     moves: true
     steps: [{ send: C }, { run: ask }, { send: D }]
 """
-WHY = "stopped by ann: reset it first"
+WHY = "Stopped by ann. Reset to drive again."
 
 
 def latch(talk: Dialogue, reason: str = WHY) -> None:

@@ -1,8 +1,6 @@
 """The times of the last use and the last data of robots: bounded, and kept over a restart."""
 
 import logging
-import os
-import stat
 from pathlib import Path
 
 import pytest
@@ -21,14 +19,6 @@ def test_the_times_survive_a_restart(tmp_path: Path) -> None:
     again = ContactStore(file)
     assert again.of("rover") == ContactTimes(used_at=100.0, seen_at=101.0)
     assert again.of("arm") == ContactTimes()
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no such rights")
-def test_only_the_owner_reads_the_file(tmp_path: Path) -> None:
-    store = ContactStore(tmp_path / "times.json")
-    store.note("rover", 1.0, is_used=True, is_seen=True)
-    store.save()
-    assert stat.S_IMODE((tmp_path / "times.json").stat().st_mode) == 0o600
 
 
 def test_nothing_is_written_without_a_change(tmp_path: Path) -> None:

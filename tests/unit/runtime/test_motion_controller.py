@@ -35,7 +35,7 @@ def test_the_first_tick_arms_with_the_stop_and_each_tick_is_a_frame() -> None:
 def test_who_has_not_the_controls_moves_nothing() -> None:
     """The refusal names the holder, or says what to do."""
     it = Scene()
-    assert it.tick("ann") == "nobody has the controls: take them first"
+    assert it.tick("ann") == "Take control first"
     it.drive("ann", "take")
     assert it.tick("bob", speed=1) == "ann has the controls"
     assert it.drive("bob", "take") == "ann has the controls"
@@ -82,7 +82,7 @@ def test_after_a_stop_that_nobody_made_it_takes_a_release_and_a_new_lease() -> N
     it.heard()
     assert it.tick(speed=0.5) == LET_GO
     it.controller.release("ann", "drive")
-    assert it.tick(speed=0.5) == "it was stopped: take the controls anew"
+    assert it.tick(speed=0.5) == "Stopped: take control again"
     before = it.controller.lease.state.epoch
     assert it.drive("ann", "take") == ""
     assert it.controller.lease.state.epoch == before + 1
@@ -114,9 +114,9 @@ def test_every_change_of_the_holder_goes_through_a_stop() -> None:
     assert it.heard() == ["stop drive"]
     assert it.controller.tick(
         "bob", "drive", {}, ControlInput(old, 99, it.controller.heartbeat("bob", 100)), 100
-    ) == ("the controls were taken anew meanwhile")
+    ) == ("Control changed hands meanwhile")
     it.tick("bob", speed=0.1)
-    assert it.drive("ann", "force") == "taking the controls by force needs an engineer"
+    assert it.drive("ann", "force") == "Taking over needs the role maintain"
     assert it.drive("eve", "force") == ""
     it.tick("eve", speed=0.1)
     it.drive("eve", "leave")
@@ -147,8 +147,8 @@ def test_stop_needs_no_lease_stops_all_and_latches() -> None:
     it.heard()
     it.controller.stop("vic")
     assert it.heard() == ["stop drive lift"]
-    assert it.tick(speed=0.5) == "stopped by vic: reset it first"
-    assert it.drive("ann", "take") == "stopped by vic: reset it first"
+    assert it.tick(speed=0.5) == "Stopped by vic. Reset to drive again."
+    assert it.drive("ann", "take") == "Stopped by vic. Reset to drive again."
     assert it.drive("vic", "reset") == "viewers can stop the robot, and cannot reset it"
     assert it.drive("bob", "reset") == ""
     assert it.controller.lease.state.holder is None
@@ -183,7 +183,7 @@ def test_a_latch_that_was_kept_holds_and_is_no_news_to_the_robot() -> None:
     it = Scene(LeaseState(epoch=41, latched_by="ann"))
     state = it.controller.lease.state
     assert (state.epoch, state.holder, state.latched_by) == (42, None, "ann")
-    assert it.drive("bob", "take") == "stopped by ann: reset it first"
+    assert it.drive("bob", "take") == "Stopped by ann. Reset to drive again."
     assert it.heard() == []
 
 
@@ -208,7 +208,7 @@ def test_a_session_that_ends_leaves_nothing_armed() -> None:
     it.controller.release("ann", "drive")
     it.controller.attach(FakeSession(it.frames, it.backend))
     it.heard()
-    assert it.tick(speed=0.5) == "it was stopped: take the controls anew"
+    assert it.tick(speed=0.5) == "Stopped: take control again"
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
     assert it.heard() == ["arm drive", "drive speed=0.5"]
@@ -408,7 +408,7 @@ def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_
     it.controller.attach(FakeSession(it.frames, None))
     assert it.controller.can_move
     it.controller.stop("ann")
-    assert it.controller.lease.interlock(Operator("bob")) == "stopped by ann: reset it first"
+    assert it.controller.lease.interlock(Operator("bob")) == "Stopped by ann. Reset to drive again."
     assert not it.controller.has_own_stop
     assert it.drive("bob", "reset") == ""
     assert it.controller.lease.interlock(Operator("bob")) == ""
@@ -431,7 +431,7 @@ def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
     assert told == [("drive", "the guard is open")]
     assert it.tick(speed=0.5) == "the guard is open"
     it.controller.release("ann", "drive")
-    assert "take the controls" in it.tick(speed=0.5)
+    assert "take control again" in it.tick(speed=0.5)
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
 

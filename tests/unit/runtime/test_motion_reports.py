@@ -74,7 +74,7 @@ def test_the_report_of_a_stop_that_was_pressed_closes_no_later_gesture() -> None
 
 
 def test_whoever_holds_on_is_told_whether_the_line_or_the_lease_ended() -> None:
-    for reason, why in (("revoked", "the line to the robot was cut"), ("expired", LET_GO)):
+    for reason, why in (("revoked", "Lost contact while driving"), ("expired", LET_GO)):
         it = Scene()
         moving(it)
         it.controller.stopped("drive", reason)  # type: ignore[arg-type]

@@ -137,7 +137,7 @@ def test_an_old_address_says_that_it_is_old() -> None:
     with at(OPEN) as browser:
         page = browser.get("/?key=of-yesterday")
         assert "old or was used" in page.text
-        assert "Go on without a key" in page.text
+        assert "Continue without a key" in page.text
     with at(ACCESS, HERE) as browser:
         page = browser.get("/?key=of-yesterday")
         assert page.status_code == 200

@@ -59,7 +59,7 @@ def test_a_parked_robot_is_stopped_and_disabled_until_the_entry_is_withdrawn(
         know(tmp_path, anna, 1, Block(WHY, "drivers/rover"))
         until(lambda: "rover" not in fleet_of(client).robots)
         assert client.get("/robots/rover/").status_code == 404
-        assert LINE in client.get("/").text
+        assert f"Cannot be used: {LINE}" in client.get("/").text
         kept = json.loads((tmp_path / "latches/rover.latch.json").read_bytes())
         assert kept["latched_by"] == BY
         (said,) = client.get("/api/v1/packages?kinds=driver").json()["installed"]
@@ -69,7 +69,7 @@ def test_a_parked_robot_is_stopped_and_disabled_until_the_entry_is_withdrawn(
         know(tmp_path, anna, 2)
         until(lambda: "rover" in fleet_of(client).robots)
         assert latched(client) == f"{BY}, before a restart"
-        assert LINE not in client.get("/").text
+        assert "Cannot be used" not in client.get("/").text
 
 
 def test_a_robot_given_at_the_start_is_disabled_and_enabled_again(

@@ -137,7 +137,7 @@ async def test_stop_ends_questions_and_takes_back_what_was_agreed_to() -> None:
         await settle()
         assert it.robot.commands == []
         assert [reply["message"] for reply in asker.of_type("reply")] == [
-            "STOP was pressed meanwhile: give it anew",
+            "STOP was pressed meanwhile: send it again",
             "the confirmation is no longer valid: Dock now?",
         ]
 

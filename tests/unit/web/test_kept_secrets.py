@@ -111,7 +111,7 @@ def test_a_secret_given_at_the_start_does_not_follow_a_changed_host(tmp_path: Pa
         stolen = fill_in(client, test=True, host="203.0.113.66", key=None)
         assert stolen["faults"] == {"key": AGAIN}
         part = fill_in(client, test=True, host="203.0.113.66")
-        assert part["text"] == "saved; not set yet: Key"
+        assert part["text"] == "Saved. Not set yet: Key."
         assert AGAIN in client.get("/robots/rover/settings").text
     with served(tmp_path, wire, given={"key": PASSWORD}) as client:  # nor by a restart
         assert "Not set yet: Key" in client.get("/").text

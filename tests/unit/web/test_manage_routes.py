@@ -156,7 +156,7 @@ def test_the_pages_say_who_may(tmp_path: Path) -> None:
     with served(tmp_path, cookies={}) as client:
         for page in ("/drivers", "/interfaces", "/widgets/installed"):
             text = client.get(page).text
-            assert "Only with the key in the address that URC printed" in text
+            assert "You may look at the packages." in text
             assert "<form" not in text
     with served(tmp_path) as client:
         assert "data-connect" in client.get("/drivers").text
@@ -204,7 +204,7 @@ def test_a_damaged_package_costs_its_own_card(tmp_path: Path) -> None:
     store.blob_file(driver.packages["drivers/rover"].sha256).write_bytes(b"rubbish")
     with served(tmp_path, dashboard_profile()) as client:
         page = client.get("/").text
-        assert "It cannot be used" in page
+        assert "Cannot be used" in page
         assert "Connect to Puppet" in page
         cache = client.get("/api/v1/packages?kinds=driver").json()
         assert "damaged" in cache["installed"][0]["fault"]
@@ -252,7 +252,7 @@ def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
         unknown = send(client, settings={"no-such": "1"})
         assert unknown["faults"] == {"no-such": "the driver has no setting with this name"}
         part = send(client, settings={"host": "10.0.0.7", "key": ""})
-        assert part["text"] == "saved; not set yet: Key"
+        assert part["text"] == "Saved. Not set yet: Key."
         assert send(client, settings={"host": "10.0.0.7", "key": "open sesame"})["isSaved"]
         assert send(client, settings={"host": "10.0.0.7", "key": None})["isSaved"]
         assert send(client, settings={"host": "10.0.0.8", "key": "open sesame"})["isSaved"]
@@ -374,7 +374,7 @@ def test_two_robots_may_need_two_versions_of_a_widget(tmp_path: Path) -> None:
         install(store, *with_dial(name, version))
         keep_settings(tmp_path, name, {"key": "x"})
     with served(tmp_path) as client:
-        assert "It cannot be used" not in client.get("/").text
+        assert "Cannot be used" not in client.get("/").text
         dials = {name: dial_of(client.get(f"/robots/{name}/").text) for name in "abc"}
         assert dials["a"] == dials["c"] == "dial"
         assert dials["b"].startswith("dial.")

@@ -58,7 +58,7 @@ async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop()
         it.line.say({"t": "steer", "command": "show", "verb": "resume"})
         it.line.say({"t": "steer", "command": "show", "verb": "abort"})
         await settle()
-        assert refusals(it.line) == ["stopped by screen 1: reset it first"]
+        assert refusals(it.line) == ["Stopped by screen 1. Reset to drive again."]
         assert [name for name, _ in it.robot.commands] == ["fold", "ask"]
         assert it.robot.pulls == [("show", "abort")]
         it.line.say({"t": "drive", "verb": "reset"})
@@ -94,7 +94,7 @@ async def test_what_was_given_before_a_stop_and_came_late_is_refused_after_the_r
             said = {"id": number, "command": name, "stops": lease["stops"]}
             it.line.say({"t": "run", **said})
         await settle()
-        assert refusals(it.line) == ["STOP was pressed meanwhile: give it anew"]
+        assert refusals(it.line) == ["STOP was pressed meanwhile: send it again"]
         now = it.line.of_type("lease")[-1]["stops"]
         it.line.say({"t": "run", "id": 3, "command": "fold", "stops": now})
         await settle()
@@ -125,7 +125,7 @@ async def test_the_session_is_told_of_a_stop_and_of_its_reset() -> None:
         for message in ({"t": "stop"}, {"t": "stop"}, {"t": "drive", "verb": "reset"}):
             it.line.say(message)
         await settle()
-        why = "stopped by screen 1: reset it first"
+        why = "Stopped by screen 1. Reset to drive again."
         assert it.robot.latched == [why, why, ""]
 
 
@@ -141,7 +141,7 @@ async def test_a_stop_that_is_latched_holds_in_the_next_session() -> None:
         line = FakeLine()
         task = asyncio.create_task(BrowserClient(line, it.service, line).serve())
         await settle()
-        assert it.robot.latched == ["stopped by screen 1: reset it first"]
+        assert it.robot.latched == ["Stopped by screen 1. Reset to drive again."]
         line.leave()
         await task
 

@@ -59,7 +59,7 @@ def summary(
         latched=str(controls["latched"]),
         emulated=bool(controls["emulated"]),
         role=role,
-        connected=service.is_used,
+        connected=service.is_open,
         detail=by_state[state].detail if state in _ABNORMAL else "",
         battery=battery_of(service, battery_signal(profile)),
         alarms=active_alarms(service),

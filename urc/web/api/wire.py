@@ -95,7 +95,7 @@ class RobotSummary(ApiMessage, frozen=True):
     role: Role
     """Role of the visitor at this robot."""
     connected: bool = False
-    """Whether a page or program uses the robot, so that URC connects to it."""
+    """Whether URC connects to the robot, because a page or program needs it."""
     detail: str = ""
     """Reason for an abnormal state, in one line."""
     battery: BatteryLevel | None = None

@@ -22,6 +22,7 @@ from urc.web.fleet.robots import Robot, RobotService
 from urc.web.serve.rights import LOCAL, WATCH, ProtectedRoute, ProtectedSocket
 from urc.web.show.pages import PageHead, render
 from urc.web.wire import messages as wire
+from urc.web.words import t
 
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 
@@ -99,7 +100,7 @@ class Dev:
         name = request.path_params["name"]
         watch = self._watches.get(name)
         if watch is None:
-            raise HTTPException(404, "No robot of that name is served here.")
+            raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
         title = watch.service.robot.profile.title or name
         quoted = quote(name, safe="")
         page = DevPage(

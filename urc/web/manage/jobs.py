@@ -235,7 +235,7 @@ class Jobs:
         if job.state in ("working", "asks") and job.line != _INSTALLING:
             job.is_given_up = True
             job.state, job.planned = "cancelled", None
-            job.line = phrase("given up; nothing has changed")
+            job.line = phrase("Cancelled; nothing has changed")
             if self._task is not None:
                 self._task.cancel()
         return job

@@ -82,15 +82,18 @@ def manage_page(
     title, about = {
         "drivers": (
             t("Drivers"),
-            t("How URC talks to a robot. A driver brings its widgets and interfaces along."),
+            t(
+                "A driver connects URC to one kind of robot."
+                " Its widgets and interfaces come with it."
+            ),
         ),
         "interfaces": (
             t("Interfaces"),
-            t("Where the widgets of a robot stand. Every robot that it fits offers it."),
+            t("An interface arranges the widgets of a robot. Each robot that it fits offers it."),
         ),
         "widgets": (
             t("Widgets"),
-            t("What shows a value, or gives a command."),
+            t("A widget shows a value or sends a command."),
         ),
     }[which]
     page = ManagePage(

@@ -89,7 +89,7 @@ class SettingsRoutes:
         if profile is None:
             broken = self._manager.fleet.broken.get(name)
             if broken is None:
-                raise HTTPException(404, t("No robot of that name is served here."))
+                raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
             profile, fault = Profile(name, broken.title, ""), broken.fault
         filled = None if fault else factory.filled(profile, kept)
         return settings_page(
@@ -138,7 +138,7 @@ class SettingsRoutes:
         bare = await asyncio.to_thread(self._document, name, said.version)
         kept, faults = await asyncio.to_thread(self._filled_in, bare, before, said)
         if faults:
-            text = t("not saved: look at what is marked")
+            text = t("Not saved: correct the marked fields")
             return SettingsAnswer(is_saved=False, text=text, faults=faults)
         robot = await asyncio.to_thread(factory.robot, name, bare, kept)
         missing = tuple(one.title or spoken(one.name) for one in missing_settings(robot))
@@ -146,7 +146,7 @@ class SettingsRoutes:
         if said.test and not missing:
             lines = await self._tried(name, bare, robot.settings)
             if any(one.verdict == "fails" for one in lines) and not said.anyway:
-                text = t("not saved: the robot could not be reached")
+                text = t("Not saved: the robot cannot be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
         manager.check_idle(name)  # again: the test takes a while
         await asyncio.to_thread(factory.kept(name).save, kept)
@@ -154,9 +154,9 @@ class SettingsRoutes:
         if changes:
             self._recorder.settings_changed(actor, name, changes)
         await manager.apply_settings(name, robot, said.version)
-        text = t("saved, and used from now on")
+        text = t("Saved and in use")
         if missing:
-            text = t("saved; not set yet: {names}", names=", ".join(missing))
+            text = t("Saved. Not set yet: {names}.", names=", ".join(missing))
         return SettingsAnswer(is_saved=True, text=text, missing=missing, lines=lines)
 
     def _kept(self, name: str) -> StoredSettings:
@@ -219,7 +219,7 @@ class SettingsRoutes:
             try:
                 while not trying.done():
                     if _epoch(service) != epoch:
-                        raise Busy(t("the robot was stopped meanwhile: try again"))
+                        raise Busy(t("STOP was pressed meanwhile: try again"))
                     await asyncio.wait((trying,), timeout=_LOOK_S)
             finally:
                 trying.cancel()

@@ -290,7 +290,7 @@ class _Answer:
             self._has_begun = True
         elif kind == "websocket.close" and not self._has_begun:
             # The server's own refusal of an unknown route would carry no headers.
-            await self.refuse(404, "There is no such page.")
+            await self.refuse(404, "This page does not exist.")
             return
         await self._send(message)
 

@@ -45,9 +45,10 @@ class Cards:
 
         The header ``x-urc-old`` marks the last image of a session that has ended.
         """
-        service = self._stations().get(request.path_params["name"])
+        name = request.path_params["name"]
+        service = self._stations().get(name)
         if service is None:
-            raise HTTPException(404, t("No robot of that name is served here."))
+            raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
         seen = service.glimpse()
         if seen is None:
             return Response(status_code=204, headers=_FRESH)

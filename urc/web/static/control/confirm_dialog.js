@@ -94,7 +94,7 @@ export class ConfirmDialog {
       };
       this.standing.add(refuse);
       end.signal.addEventListener("abort", () => this.standing.delete(refuse));
-      let expiring = window.setTimeout(() => refuse(t("nobody said yes")), isHazard ? HAZARD_MS : ASK_MS);
+      let expiring = window.setTimeout(() => refuse(t("Not confirmed")), isHazard ? HAZARD_MS : ASK_MS);
       const agree = () => {
         clearTimeout(expiring);
         yes.remove();
@@ -102,9 +102,9 @@ export class ConfirmDialog {
         text.textContent = isTwo ? t("Waiting for a second person") : t("… sending");
         resolve(this.ticket(isTwo, text, no, close));
       };
-      signal.addEventListener("abort", () => reject(cancelled(t("not sent"))));
+      signal.addEventListener("abort", () => reject(cancelled(t("Cancelled"))));
       end.signal.addEventListener("abort", () => clearTimeout(expiring));
-      no.addEventListener("click", () => refuse(t("not sent")), { signal: end.signal, once: true });
+      no.addEventListener("click", () => refuse(t("Cancelled")), { signal: end.signal, once: true });
       box.addEventListener("keydown", (event) => {
         if (event.key !== "Escape") return;
         event.preventDefault(); // Escape means no here, and not STOP
@@ -118,7 +118,7 @@ export class ConfirmDialog {
           isReady: isRead,
           touched: () => {
             clearTimeout(expiring);
-            expiring = window.setTimeout(() => refuse(t("nobody said yes")), HAZARD_MS);
+            expiring = window.setTimeout(() => refuse(t("Not confirmed")), HAZARD_MS);
           },
           done: agree,
         });

@@ -86,7 +86,7 @@ export class Controls {
     if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
     if (isMine) return t("● You drive");
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
-    if (lease.holder) return t("{who} drives", { who: holder });
+    if (lease.holder) return t("{who} is driving", { who: holder });
     return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
   }
 
@@ -102,7 +102,7 @@ export class Controls {
     let note = inTurn(steps);
     if (phase === "sending") note = t("… sending");
     if (phase === "failed" || (fault && !isConfirmed)) {
-      if (phase === "failed") note = t("▲ NO LINK: stop it by hand");
+      if (phase === "failed") note = t("▲ NO LINK: use the robot's own stop switch");
       else note = isLatched ? t("▲ NO LINK, latched") : t("▲ NO LINK");
     }
     if (this.stopNote.textContent !== note) this.stopNote.textContent = note;

@@ -154,8 +154,8 @@ export class Input {
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
-    if (lease.latched && lease.latched === lease.name) return t("stopped: reset it first");
-    if (lease.latched) return t("stopped by {name}: reset it first", { name: said(lease.latched) });
+    if (lease.latched && lease.latched === lease.name) return t("Stopped. Reset to drive again.");
+    if (lease.latched) return t("Stopped by {name}. Reset to drive again.", { name: said(lease.latched) });
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return "";
@@ -347,7 +347,7 @@ export class Input {
     }
     if (control.phase !== "held") return;
     if (!lease || !drive.isMine || lease.epoch !== control.epoch) {
-      this.spend(control, this.refusal() || t("the controls were taken anew"));
+      this.spend(control, this.refusal() || t("Control changed hands"));
       return;
     }
     this.tick(control, nowMs);

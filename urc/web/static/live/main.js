@@ -28,8 +28,8 @@ import { said, t } from "../core/words.js";
 
 /** Reasons of stops without an operator. @type {Record<string, string>} */
 const STOPPED = {
-  expired: t("too long without a sign of this page"),
-  revoked: t("the line to the robot was cut"),
+  expired: t("No input from this page for too long"),
+  revoked: t("Lost contact while driving"),
 };
 /** Time for which a confirmation waits for the server. */
 const MEANT_MS = 5000;
@@ -229,7 +229,7 @@ function take(message) {
       break;
     case "lease":
       if (drive.setLease(message, nowMs)) {
-        input.spendAll(input.against() || t("STOP was pressed meanwhile: give it anew"));
+        input.spendAll(input.against() || t("STOP was pressed meanwhile: send it again"));
         stop.heard();
       }
       input.leaseChanged();
@@ -241,7 +241,7 @@ function take(message) {
       input.stopped(
         message.command,
         message.reason === "expired" && drive.isLossy
-          ? t("the link to URC lost or held up too much for the lease of this control")
+          ? t("Link to URC too slow for this control")
           : (STOPPED[message.reason] ?? message.reason),
       );
       break;
@@ -292,13 +292,13 @@ function give({ id, token }) {
   if (!yes) return;
   const isLate = performance.now() - yes.atMs > MEANT_MS;
   if (isLate || !socket.send({ t: "run", ...yes.said, token })) {
-    settle({ id, ok: false, message: t("it took too long: not sent") });
+    settle({ id, ok: false, message: t("Not sent: it took too long") });
   }
 }
 
 /** Withdraw questions and confirmations after STOP. */
 function forgetQuestions() {
-  const why = t("STOP was pressed meanwhile: give it anew");
+  const why = t("STOP was pressed meanwhile: send it again");
   asks.stopped(why);
   for (const id of [...meant.keys()]) settle({ id, ok: false, message: why });
   meant.clear();
@@ -315,7 +315,7 @@ function settle(reply) {
 /** Fail pending commands: after the loss of the socket no reply can come. Nothing is ever repeated. */
 function giveUpCommands() {
   for (const { reject } of waiting.values()) {
-    reject(new Error(t("the connection to URC was lost; whether it was done is not known")));
+    reject(new Error(t("Connection to URC lost: the result is unknown")));
   }
   waiting.clear();
   meant.clear();

@@ -58,7 +58,7 @@ export class Panel {
   frame(store, reason) {
     const links = [...store.links.values()];
     const trying = t("No connection to URC; trying again.");
-    const last = reason ? t("Its last words: {reason}", { reason: said(reason) }) : "";
+    const last = reason ? t("Last message: {reason}", { reason: said(reason) }) : "";
     const lost = `${trying} ${last}`.trim();
     const key = store.isUp ? JSON.stringify(links) : lost;
     if (key === this.shown) return;

@@ -60,7 +60,7 @@ export class JobDialog {
     this.job = null;
     this.open(
       title(t("Remove {name}?", { name: wish })),
-      gone.length ? made("p", {}, t("This goes:")) : made("p", {}, t("Its files stay: another package needs them.")),
+      gone.length ? made("p", {}, t("To be removed:")) : made("p", {}, t("Its files stay: another package needs them.")),
       list(gone),
       hasSettings &&
         made("label", { class: "urc-check" }, forget, ` ${t("Forget what was filled in for it, secrets too")}`),
@@ -121,7 +121,7 @@ export class JobDialog {
       asks: t("Read what it may do, then decide."),
       done: `✓ ${t("installed")}`,
       failed: `▲ ${job.line}`,
-      cancelled: `◆ ${t("given up; nothing has changed")}`,
+      cancelled: `◆ ${t("Cancelled; nothing has changed")}`,
     }[job.state];
     return [
       title(isSwap(job) ? t("Update {name}", { name: job.title }) : t("Install {name}", { name: job.title })),
@@ -139,7 +139,7 @@ export class JobDialog {
           }),
         isOver
           ? button(t("Close"), "close", () => this.close(), { class: "urc-button-main" })
-          : button(t("Give up"), "no", () => this.leave()),
+          : button(t("Cancel"), "no", () => this.leave()),
       ),
     ];
   }
@@ -153,19 +153,19 @@ export class JobDialog {
       ...this.unsigned(job),
       ...this.risks(job),
       job.stays !== "" && made("p", { class: "urc-caution" }, `◆ ${stays}`),
-      isUpdate && heading(t("What changes")),
+      isUpdate && heading(t("Changes")),
       isUpdate && list(job.packages),
-      heading(isUpdate ? t("It may do more than before") : t("It may do this")),
+      heading(isUpdate ? t("New permissions") : t("Permissions")),
       list(isUpdate ? (job.gained.length ? job.gained : [t("nothing more")]) : job.may),
-      isUpdate && job.lost.length > 0 && heading(t("It may no longer do this")),
+      isUpdate && job.lost.length > 0 && heading(t("Removed permissions")),
       isUpdate && list(job.lost),
       isUpdate && job.wire.length > 0 && made(
         "details",
         { class: "urc-more" },
-        made("summary", {}, t("What changes on the wire")),
+        made("summary", {}, t("Changed connections")),
         made("pre", { tabindex: "0", lang: "en" }, job.wire.join("\n")),
       ),
-      !isUpdate && heading(t("Where it comes from")),
+      !isUpdate && heading(t("Source")),
       !isUpdate && list(job.packages),
     ];
   }
@@ -179,9 +179,9 @@ export class JobDialog {
     if (risks.length === 0) return [];
     const yes = this.box("risks");
     return [
-      made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("By itself, without your filling it in")}`),
+      made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("Automatically")}`),
       made("ul", { class: "urc-list urc-bad", "data-risks": true }, ...risks.map((one) => made("li", {}, one))),
-      made("label", { class: "urc-check" }, yes, ` ${t("Let it do that")}`),
+      made("label", { class: "urc-check" }, yes, ` ${t("Allow it")}`),
     ];
   }
 

@@ -85,7 +85,7 @@ function show(shelf) {
   ]);
   put(lists.available, available.map((one) => availableRow(one, doing)));
   put(lists.repositories, repositories.length ? repositories.map((one) => placeRow(one, doing)) : [
-    row(shelf.isAsking ? t("asking …") : t("None is known: connect to one.")),
+    row(shelf.isAsking ? t("asking …") : t("No repositories yet.")),
   ]);
   counted.textContent = countText(shelf);
 }
@@ -93,7 +93,7 @@ function show(shelf) {
 /** @param {Shelf} shelf */
 function countText({ total, available, isAsking, repositories }) {
   if (isAsking) return t("asking the repositories …");
-  if (repositories.length === 0) return t("What repositories have is shown here.");
+  if (repositories.length === 0) return t("Add a repository to see its packages.");
   if (total > available.length) return t("{shown} of {total} are shown: search for more", { shown: available.length, total });
   return t("{total} found", { total });
 }

@@ -69,7 +69,7 @@ function lock(isBusy) {
 /** @param {{test: boolean, anyway?: boolean}} how */
 async function send({ test, anyway = false }) {
   lock(true);
-  tell(test ? t("trying the robot …") : t("saving …"));
+  tell(test ? t("testing the connection …") : t("saving …"));
   mistakes({});
   lines([]);
   try {
@@ -200,7 +200,7 @@ for (const one of form.querySelectorAll("[data-forget]")) {
       field.value = "";
       field.placeholder = "";
     }
-    tell(t("forgotten once it is saved"));
+    tell(t("Deleted when you save"));
   });
 }
 ready(root);

@@ -361,7 +361,7 @@ export class Cell {
     const reason = document.createElement("p");
     reason.textContent = error instanceof Error ? error.message : String(error);
     const hint = document.createElement("p");
-    hint.textContent = t("The others go on. Open the page again to try this one anew.");
+    hint.textContent = t("Other widgets still work. Reload the page to retry this one.");
     card.append(title, reason, hint);
     this.el.replaceChildren(card);
   }

@@ -146,7 +146,7 @@ export class Motion {
     });
     if (this.next) write(this.next, `${Math.round(this.speed * 100)} %`);
     let note = isLocked ? `◆ ${this.reason}` : "";
-    if (phase === "asking") note = t("… taking the controls");
+    if (phase === "asking") note = t("… taking control");
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
