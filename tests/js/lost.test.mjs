@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { lossOf } from "../../urc/web/static/live/lost_card.js";
+import { lossOf, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -36,8 +36,18 @@ test("a robot is lost if no connection is good and one is lost", () => {
 test("without the server the card speaks of the server, after the first failure", () => {
   const store = new Store();
   assert.equal(lossOf(store, socket()), null);
-  assert.deepEqual(lossOf(store, socket({ failures: 1, reason: "gone" })), { of: "server", detail: "gone" });
+  assert.deepEqual(lossOf(store, socket({ failures: 1 })), { of: "server", detail: "" });
+  assert.deepEqual(lossOf(store, socket({ failures: 1, reason: "no answer" })), { of: "server", detail: "" });
   assert.equal(lossOf(store, socket({ failures: 1, isShutOut: true })), null);
+});
+
+test("a reason of the server is no lost connection to it", () => {
+  const reason = "too many clients watch this robot";
+  const loss = lossOf(new Store(), socket({ failures: 1, reason }));
+  assert.deepEqual(loss, { of: "session", detail: reason });
+  assert.ok(loss);
+  assert.equal(wordsOf(loss, "Cart").heading, "Cannot open Cart");
+  assert.equal(wordsOf(loss, "Cart").cause, reason);
 });
 
 test("a refusal names the program that the transport needs", () => {

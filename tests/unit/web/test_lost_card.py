@@ -39,6 +39,11 @@ def test_the_card_is_hidden_at_first() -> None:
     assert re.search(r"<section [^>]* hidden>", card_of(page_of()))
 
 
+def test_another_interface_replaces_the_stage_and_leaves_the_card() -> None:
+    page = page_of()
+    assert page.index("</main>") < page.index('class="urc-lost"')
+
+
 def test_the_settings_are_one_tap_away_where_the_server_has_them(tmp_path: Path) -> None:
     assert 'href="/robots/puppet/settings"' not in card_of(page_of())
     assert 'href="/robots/puppet/settings"' in card_of(page_of(tmp_path))

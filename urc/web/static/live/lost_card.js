@@ -12,6 +12,8 @@ import { said, t } from "../core/words.js";
 
 /** Time after the loss of a good connection until the card covers the page. */
 const GRACE_MS = 3000;
+/** Reason of a socket that closed itself. */
+const SILENT = "no answer";
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
 
@@ -44,9 +46,11 @@ export class LostCard {
    * @param {Store} store
    * @param {import("./socket.js").Socket} socket
    * @param {number} nowMs
+   * @param {boolean} isReplay whether a recording plays, which has no robot to lose
    */
-  frame(store, socket, nowMs) {
-    const loss = lossOf(store, socket);
+  frame(store, socket, nowMs, isReplay) {
+    const found = lossOf(store, socket);
+    const loss = isReplay && found?.of === "robot" ? null : found;
     if (!loss) this.wasGood ||= store.isUp && [...store.links.values()].some(isConnected);
     if (!loss) this.lostMs = 0;
     else if (this.lostMs === 0) this.lostMs = nowMs;
@@ -61,17 +65,13 @@ export class LostCard {
 
   /** @param {Loss} loss */
   say(loss) {
-    const robot = this.el.dataset["robot"] ?? "";
-    const { cause, step, isForeign } =
-      loss.of === "robot"
-        ? causeWords(loss.cause, loss.address, loss.detail)
-        : { cause: said(loss.detail), step: t("Is the server running? Is this device on its network?"), isForeign: false };
-    this.title.textContent =
-      loss.of === "robot" ? t("Cannot reach {title}", { title: robot }) : t("No connection to URC");
+    const title = this.el.dataset["robot"] ?? "";
+    const { heading, cause, step, isForeign } = wordsOf(loss, title);
+    this.title.textContent = heading;
     this.cause.textContent = cause;
-    this.cause.lang = isForeign ? "en" : "";
-    const hint = loss.of === "robot" ? this.hint(loss.transport) : "";
-    this.step.textContent = hint || step;
+    if (isForeign) this.cause.lang = "en";
+    else this.cause.removeAttribute("lang");
+    this.step.textContent = (loss.of === "robot" && this.hint(loss.transport)) || step;
   }
 
   /** Return the driver's own next step for a transport. @param {string} transport */
@@ -83,12 +83,29 @@ export class LostCard {
 
 /**
  * @typedef {{of: "robot", transport: string, cause: string, address: string, detail: string}} RobotLoss
- * @typedef {{of: "server", detail: string}} ServerLoss
- * @typedef {RobotLoss | ServerLoss} Loss
+ * @typedef {{of: "server", detail: ""}} ServerLoss
+ * @typedef {{of: "session", detail: string}} SessionLoss The server closed the connection, with a reason.
+ * @typedef {RobotLoss | ServerLoss | SessionLoss} Loss
  */
 
 /**
- * Return what is lost: the server, or the whole robot. A robot with one good connection is not lost.
+ * @param {Loss} loss
+ * @param {string} title title of the robot
+ * @returns {{heading: string, cause: string, step: string, isForeign: boolean}}
+ */
+export function wordsOf(loss, title) {
+  switch (loss.of) {
+    case "robot":
+      return { heading: t("Cannot reach {title}", { title }), ...causeWords(loss.cause, loss.address, loss.detail) };
+    case "session":
+      return { heading: t("Cannot open {title}", { title }), cause: said(loss.detail), step: t("Check the settings of the robot."), isForeign: false };
+    case "server":
+      return { heading: t("No connection to URC"), cause: "", step: t("Is the server running? Is this device on its network?"), isForeign: false };
+  }
+}
+
+/**
+ * Return what is lost: the server, the robot's session, or the whole robot. A robot with one good connection is not lost.
  *
  * @param {Store} store
  * @param {import("./socket.js").Socket} socket
@@ -97,7 +114,8 @@ export class LostCard {
 export function lossOf(store, socket) {
   if (!store.isUp) {
     if (socket.failures === 0 || socket.isShutOut) return null;
-    return { of: "server", detail: socket.reason };
+    const { reason } = socket;
+    return reason && reason !== SILENT ? { of: "session", detail: reason } : { of: "server", detail: "" };
   }
   const links = [...store.links.values()];
   const lost = links.find(({ state }) => state === "lost");

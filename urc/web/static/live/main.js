@@ -165,7 +165,7 @@ function draw() {
   askPictures();
   badge.frame(store, socket);
   panel.frame(store, socket.reason);
-  lost.frame(store, socket, nowMs);
+  lost.frame(store, socket, nowMs, badge.isReplay);
   alarms.frame(store, nowMs);
   stop.frame();
   controls?.frame(nowMs);
