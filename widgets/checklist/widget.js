@@ -41,7 +41,7 @@ export default {
       attribute(root, "data-phase", giver.phase);
       if (done) attribute(done, "aria-disabled", String(!isAll || !giver.isReady || giver.isPending));
       const figure = t("{count} of {all}", { count, all: boxes.length });
-      const words = isAll ? `✓ ${t("all is ticked")}` : figure;
+      const words = isAll ? `✓ ${t("all done")}` : figure;
       write(note, giver.note(words));
     }
 

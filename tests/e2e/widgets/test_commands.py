@@ -213,7 +213,7 @@ async def test_each_control_gives_exactly_its_command(
         await done.click()
         await robot.until_got("UNLOCK")
         await page.reload()
-        await until_text(page, ".checklist-note", "✓ all is ticked")
+        await until_text(page, ".checklist-note", "✓ all done")
         assert await page.get_by_label("Fuel").is_checked()
         assert robot.lines == []
 

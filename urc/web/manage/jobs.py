@@ -262,7 +262,7 @@ class Jobs:
                 job.state, job.line = "failed", _line(error)
         else:
             if not job.is_given_up:
-                job.state, job.line = "asks", phrase("read what it may do")
+                job.state, job.line = "asks", phrase("permissions read")
 
     def _ended(self, thread: "asyncio.Future[_Planned]") -> None:
         self._left -= 1
@@ -276,7 +276,7 @@ class Jobs:
         if job.is_given_up:
             raise PackageError("given up")
         job.of = job.done
-        job.line = phrase("reading what it may do")
+        job.line = phrase("reading the permissions")
         old = what if isinstance(what, Lock) else None
         with self._store.changing() as change:
             unsigned = tuple(self._store.state().lacking(plan))

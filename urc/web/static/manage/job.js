@@ -63,7 +63,7 @@ export class JobDialog {
       gone.length ? made("p", {}, t("To be removed:")) : made("p", {}, t("Its files stay: another package needs them.")),
       list(gone),
       hasSettings &&
-        made("label", { class: "urc-check" }, forget, ` ${t("Forget what was filled in for it, secrets too")}`),
+        made("label", { class: "urc-check" }, forget, ` ${t("Also delete its settings and secrets")}`),
       made(
         "div",
         { class: "urc-ways" },
@@ -118,7 +118,7 @@ export class JobDialog {
     const isAsking = job.state === "asks";
     const line = {
       working: `… ${job.line}`,
-      asks: t("Read what it may do, then decide."),
+      asks: t("Check the permissions, then decide."),
       done: `✓ ${t("installed")}`,
       failed: `▲ ${job.line}`,
       cancelled: `◆ ${t("Cancelled; nothing has changed")}`,
