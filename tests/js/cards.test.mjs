@@ -55,5 +55,6 @@ test("alarms are counted, and the worst decides about the sign", () => {
   const of = (/** @type {number} */ count, /** @type {any} */ worst) => alarmWords(robot({ alarms: { count, worst } }));
   assert.equal(of(0, ""), null);
   assert.deepEqual(of(1, "low"), { words: "◆ 1 alarm", tone: "caution" });
+  assert.equal(of(2, "medium")?.tone, "caution");
   assert.deepEqual(of(3, "high"), { words: "▲ 3 alarms", tone: "bad" });
 });

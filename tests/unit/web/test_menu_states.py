@@ -182,10 +182,11 @@ def test_alarms_come_first_then_connected_robots_then_the_last_used() -> None:
         summary("on 1", on=True, used=99.0),
         summary("on 2", on=True, used=100.0),
         summary("warning", worst="low", used=5.0),
+        summary("medium", worst="medium"),
         summary("alarm", worst="high"),
     ]
     order = [one.name for one in in_order(robots)]
-    assert order == ["alarm", "warning", "on 1", "on 2", "today", "long ago", "never"]
+    assert order == ["alarm", "medium", "warning", "on 1", "on 2", "today", "long ago", "never"]
 
 
 SIGNALS = {

@@ -89,7 +89,7 @@ def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
 
 def _rank(robot: RobotSummary) -> tuple[int, int, float]:
     """Return the rank of a robot; connected robots keep their places while they are used."""
-    severity = {"": 2, "low": 1, "high": 0}[robot.alarms.worst]
+    severity = {"": 3, "low": 2, "medium": 1, "high": 0}[robot.alarms.worst]
     is_away = not robot.connected
     return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0
 

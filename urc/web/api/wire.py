@@ -72,7 +72,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
     """The alarms of a robot at this moment."""
 
     count: int = 0
-    worst: Literal["", "low", "high"] = ""
+    worst: Literal["", "low", "medium", "high"] = ""
     """Highest priority of all alarms; "" without an alarm."""
 
 

@@ -14,7 +14,7 @@
  * @property {string} holder
  * @property {string} latched
  * @property {Battery | null} battery
- * @property {{count: number, worst: "" | "low" | "high"}} alarms
+ * @property {{count: number, worst: "" | "low" | "medium" | "high"}} alarms
  * @property {number | null} seen_at in seconds since 1970
  *
  * @typedef {{words: string, tone: "" | "caution" | "bad"}} Said
@@ -88,5 +88,5 @@ export function whoWords({ holder, latched }) {
 export function alarmWords({ alarms: { count, worst } }) {
   if (count === 0) return null;
   const words = count === 1 ? t("1 alarm") : t("{n} alarms", { n: count });
-  return worst === "low" ? { words: `◆ ${words}`, tone: "caution" } : { words: `▲ ${words}`, tone: "bad" };
+  return worst === "high" ? { words: `▲ ${words}`, tone: "bad" } : { words: `◆ ${words}`, tone: "caution" };
 }
