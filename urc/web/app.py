@@ -27,8 +27,6 @@ from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
-from urc.runtime.contact_times import FILE as CONTACT_FILE
-from urc.runtime.contact_times import ContactStore
 from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
@@ -139,9 +137,7 @@ def build_app(
         audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     fleet = _fleet(robots, data, audit, linger_s)
-    contacts = ContactWatch(
-        lambda: fleet.stations, ContactStore(data / CONTACT_FILE if data is not None else None)
-    )
+    contacts = ContactWatch(lambda: fleet.stations, data)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),

@@ -115,19 +115,18 @@ def test_only_the_emulated_robot_has_the_mark(client: TestClient) -> None:
     assert ">SIM</abbr>" not in client.get("/robots/puppet/").text
 
 
-def test_last_use_and_last_data_survive_a_restart(
-    client: TestClient, robots: dict[str, FakeRobot], tmp_path: Path
+@pytest.mark.anyio
+async def test_last_use_and_last_data_survive_a_restart(
+    robots: dict[str, FakeRobot], tmp_path: Path
 ) -> None:
-    store = ContactStore(tmp_path / "own.json")
     service = RobotService(Robot(robots["arm"].profile, {}, robots["arm"].open))
-    watch = ContactWatch(lambda: {"arm": service}, store, utc=lambda: 500.0)
+    watch = ContactWatch(lambda: {"arm": service}, tmp_path, utc=lambda: 500.0)
     watch.look()
     assert watch.times("arm") == (None, None)
     with service.visit():
-        watch.look()
+        await watch.close()
     assert watch.times("arm") == (500.0, None)
-    store.save()
-    again = ContactWatch(lambda: {"arm": service}, ContactStore(tmp_path / "own.json"))
+    again = ContactWatch(lambda: {"arm": service}, tmp_path)
     assert again.times("arm").used_at == 500.0
     assert again.times("unknown") == (None, None)
 

@@ -5,10 +5,11 @@ Layer 5. A look takes microseconds for a hundred robots, so no event of a robot 
 
 import asyncio
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from time import time
 from typing import Final
 
-from urc.runtime.contact_times import NO_CONTACT, ContactStore, ContactTimes
+from urc.runtime.contact_times import FILE, NO_CONTACT, ContactStore, ContactTimes
 from urc.web.fleet.robots import RobotService
 
 __all__ = ["ContactWatch"]
@@ -25,18 +26,18 @@ class ContactWatch:
     def __init__(
         self,
         stations: Callable[[], Mapping[str, RobotService]],
-        store: ContactStore,
+        folder: Path | None,
         utc: Callable[[], float] = time,
     ) -> None:
-        """Prepare.
+        """Read the stored times.
 
         Args:
             stations: function that returns the served robots, by the name in their URL.
-            store: the store of the times.
+            folder: the data folder; None stores nothing.
             utc: source of the time, in seconds since 1970.
         """
         self._stations = stations
-        self._store = store
+        self._store = ContactStore(folder / FILE if folder is not None else None)
         self._utc = utc
 
     def times(self, name: str) -> ContactTimes:
