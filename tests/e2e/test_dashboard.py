@@ -265,7 +265,7 @@ async def test_a_robot_is_no_link_until_its_settings_are_complete(new_page: Page
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         assert page.url == address
-        assert await page.get_by_role("link", name="Connect").count() == 0
+        assert await page.get_by_role("link", name="Connect to").count() == 0
         assert "Not set yet: Host." in await page.inner_text("[data-robot-card]")
 
 

@@ -84,8 +84,9 @@ async def agree(page: Page) -> None:
 
 async def unfold(page: Page) -> None:
     """Open all groups of settings."""
-    for group in await page.locator("[data-group]:not([open]) > summary").all():
-        await group.click()
+    folded = page.locator("[data-group]:not([open]) > summary")
+    while await folded.count() > 0:
+        await folded.first.click()
 
 
 @RUNS
@@ -270,7 +271,7 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         blamed = page.locator("[data-field='port'] [data-fault]")
         await expect(blamed).to_contain_text("127.0.0.1:1 refuses the connection.")
         await expect(page.get_by_label("Port")).to_be_focused()
-        await expect(page.locator("[data-said]")).to_contain_text("not saved")
+        await expect(page.locator("[data-said]")).to_contain_text("Not saved")
         assert SettingsStore(data / "robots", "rover").load().settings == {}
         await page.get_by_label("Port").fill(str(port))
         await page.get_by_role("button", name="Test & save").click()

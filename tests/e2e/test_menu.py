@@ -99,6 +99,7 @@ async def test_the_whole_card_is_the_link_and_the_rest_is_behind_a_button(
 ) -> None:
     async with running_dashboard(*fleet(2)) as address:
         page = await new_page(size="phone")
+        await page.emulate_media(reduced_motion="reduce")
         await page.goto(address)
         await page.get_by_role("button", name="More about Salamandra-0").click()
         sheet = page.locator(f"{card(page, 0)} [data-more]")

@@ -101,7 +101,8 @@ class AccessMiddleware:
             name,
             keeps_people and visitor.may(ADMINISTER),
             keeps_people,
-            names_screen=visitor.is_local or not visitor.is_known,
+            names_screen=visitor.is_local
+            or (not visitor.is_known and visitor.best_role() is not None),
         )
 
     def _warnings(self, scope: Scope) -> Iterator[str]:
