@@ -63,6 +63,10 @@ async def whole_browser(anyio_backend: str) -> AsyncIterator[Browser]:
         yield started
 
 
+HINTS_SEEN = "try { localStorage.setItem('urc-hints', 'seen'); } catch {}"
+"""The hints of a first visit lie over a page until they are read."""
+
+
 class PageMaker:
     """Opens pages for one test; call it as ``await new_page(size="phone", theme="dark")``."""
 
@@ -72,11 +76,17 @@ class PageMaker:
         self._faults: dict[Page, PageFaults] = {}
 
     async def __call__(
-        self, size: Size = "desktop", theme: Theme = "light", *, is_kept: bool = False
+        self,
+        size: Size = "desktop",
+        theme: Theme = "light",
+        *,
+        is_kept: bool = False,
+        is_first: bool = False,
     ) -> Page:
         """Return an empty page of its own browser context, so that nothing is shared.
 
         `is_kept`: the pages may install their service worker, as they do for people.
+        `is_first`: the device has not seen the hints of a first visit.
         """
         width, height = SIZES[size]
         context = await self._browser.new_context(
@@ -88,6 +98,8 @@ class PageMaker:
         )
         self._contexts.append(context)
         await context.add_init_script(WATCH_POLICY)
+        if not is_first:
+            await context.add_init_script(HINTS_SEEN)
         await known_here(context)
         page = await context.new_page()
         entering(page)

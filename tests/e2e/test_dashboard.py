@@ -361,6 +361,7 @@ async def test_lines_of_the_log_are_shown_once_in_order(new_page: PageMaker) -> 
         for number in range(3):
             robot.log(f"line {number} <b>not bold</b>")
         lines = page.locator("[data-log] > li")
+        await page.locator("[data-badge-why]").click()
         await lines.nth(2).wait_for()
         await page.evaluate("dispatchEvent(new Event('pagehide'))")
         await page.evaluate("dispatchEvent(new PageTransitionEvent('pageshow', {persisted: true}))")

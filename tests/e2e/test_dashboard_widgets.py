@@ -52,7 +52,7 @@ async def test_hostile_texts_are_shown_as_they_are(new_page: PageMaker) -> None:
             robot.link("lost", text)
             robot.log(text)
             await until_text(page, ".value-text", text.strip())
-            await page.locator("[data-log] > li", has_text=text).first.wait_for()
+            await page.locator("[data-log] > li", has_text=text).first.wait_for(state="attached")
         assert await page.locator("main :is(img, script, svg[onload], h1)").count() == 0
         assert await page.locator("[data-panel] :is(img, script, svg, h1)").count() == 0
         grown = await page.locator("*").count() - elements

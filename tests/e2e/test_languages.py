@@ -143,7 +143,9 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
         await page.goto(address)
         await check(page, tag)
         await page.goto(f"{address}robots/puppet/")
-        await expect(page.locator("[data-who]")).to_contain_text(words["■ Stopped by {who}"][:5])
+        await expect(page.locator("[data-latched-text]")).to_contain_text(
+            words["■ Stopped by {who}"][:5]
+        )
         await page.locator("[data-verb='reset']").click()
         await expect(page.locator("[data-who]")).to_have_text(words["Nobody drives"])
     await expect(page.locator("[data-who]")).to_have_text(words["Not connected to URC"])

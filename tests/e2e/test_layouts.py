@@ -24,6 +24,7 @@ from tests.e2e.motion.driving import (
     USES,
     Wire,
     centre,
+    commands,
     driven,
     held,
     number,
@@ -275,24 +276,79 @@ async def test_an_interface_that_cannot_be_opened_leaves_this_one(new_page: Page
         await until_text(page, f"{A} .value-text", "5")
 
 
-async def test_the_background_fills_the_stage_and_controls_lie_above_it(
+async def test_a_touch_user_sees_hints_once_that_cover_no_control(new_page: PageMaker) -> None:
+    async with driven(robot=Wire(lease_s=CALM_LEASE_S)) as (_, address):
+        page = await new_page(size="phone", is_first=True)
+        await page.goto(address)
+        hints = page.get_by_role("region", name="Hints")
+        await expect(hints).to_contain_text("Let go to stop")
+        assert await is_on_top(page, "[data-stop-button]")
+        assert await is_on_top(page, ".joystick-pad")
+        await page.reload()
+        await page.get_by_role("button", name="Got it").click()
+        await page.reload()
+        await expect(page.locator("[data-who]")).to_contain_text("drives")
+        await expect(hints).to_have_count(0)
+        mouse = await new_page(size="desktop", is_first=True)
+        await mouse.goto(address)
+        await expect(mouse.locator("[data-who]")).to_contain_text("drives")
+        await expect(mouse.get_by_role("region", name="Hints")).to_have_count(0)
+
+
+GROUND = "[data-place='ground']"
+
+
+async def test_the_background_fills_the_stage_with_the_widgets_in_front(
     new_page: PageMaker,
 ) -> None:
-    """On each screen; STOP is never covered."""
+    """On each screen but a phone in portrait: there it is above the widgets."""
     grid = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
     async with running_dashboard(
         gauged(Interface("x", "X", {"landscape": grid}, background="c"))
     ) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
-        for size in (PHONE, PHONE_LYING, TABLET, DESKTOP):
+        for size in (PHONE_LYING, TABLET, DESKTOP):
             await turned(page, size)
-            stage, back = await page.evaluate(
-                "['[data-stage]', '.urc-background'].map((one) =>"
-                " document.querySelector(one).getBoundingClientRect().toJSON())"
-            )
+            stage, back = await box(page, "[data-stage]"), await box(page, GROUND)
             assert back == stage, size
-            assert await is_on_top(page, "[data-cell='1']"), size
+            assert await is_on_top(page, B), size
+            assert await is_on_top(page, C), size
+        await turned(page, PHONE)
+        stage, back = await box(page, "[data-stage]"), await box(page, GROUND)
+        assert (back["y"], back["width"]) == (stage["y"], stage["width"])
+        assert back["y"] + back["height"] <= (await box(page, B))["y"]
+
+
+async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:
+    """What is held stays held; the device keeps the choice for the next visit."""
+    robot = steered()
+    signals = {name: Signal(name, "image", title=name.title()) for name in ("front", "rear")}
+    uses = [USES[0], *(WidgetUse(name, "camera", {"image": name}) for name in signals)]
+    grid = Layout(2, 3, (Slot("rear", 0, 0), Slot(USES[0].slot, 1, 2)))
+    interface = Interface("x", "X", {"landscape": grid}, background="front")
+    profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))
+    robot.profile = profile._replace(interfaces={"x": interface})
+    async with driven(robot=robot) as (_, address):
+        page = await new_page()
+        await page.goto(address)
+        await expect(page.locator(".joystick")).to_have_attribute("data-phase", "idle")
+        front = page.locator("[aria-label='Show Front large']")
+        rear = page.locator("[aria-label='Show Rear large']")
+        await expect(front).to_be_hidden()
+        await push(page, ".joystick-pad")
+        await robot.until_moving()
+        await rear.dispatch_event("click")
+        await expect(rear).to_be_hidden()
+        await expect(front).to_be_visible()
+        assert await box(page, GROUND) == await box(page, "[data-stage]")
+        count = len(robot.line.texts)
+        await until(lambda: len(robot.after(count)) > 3)
+        assert robot.newest("drive") != "drive stop"
+        await page.mouse.up()
+        await robot.until_stopped()
+        await page.reload()
+        await expect(front).to_be_visible()
 
 
 async def test_the_cameras_of_the_background_are_chosen_by_mouse_and_touch(

@@ -86,6 +86,9 @@ async def test_no_log_moves_what_steers(new_page: PageMaker) -> None:
         before = await cell.bounding_box()
         for number in range(60):
             robot.log(f"line {number} of a robot that is silent now and then")
-        await page.locator("[data-log] > li").nth(59).wait_for()
+        await page.locator("[data-log] > li").nth(59).wait_for(state="attached")
+        assert await cell.bounding_box() == before
+        await page.locator("[data-badge-why]").click()
+        await page.locator("[data-log] > li").nth(0).wait_for()
         assert await cell.bounding_box() == before
         assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")

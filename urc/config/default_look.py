@@ -57,6 +57,12 @@ _BIG: Final = frozenset(
     )
 )
 """Widgets that span two rows and two columns."""
+_GROUNDS: Final = ("camera", "pano360", "map")
+"""Widgets that fill the page behind the others, the first one before the others."""
+_ACROSS: Final = (0, 4, 1, 3, 2)
+"""Columns in front of a background, in the order in which displays fill them."""
+_MOST_OVER: Final = 14
+"""Maximum number of widgets in front of a background."""
 _STEERED: Final = 2
 """Position of steering controls in the order of widgets; see `_rank`."""
 
@@ -283,11 +289,47 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     right, near the thumb. Other controls fill the free places. On a phone in landscape, steering
     controls are in the first rows, at the right and left edge, and other widgets follow below.
     """
-    return Interface(
-        name="default",
-        title=title,
-        layouts={screen: _grid(slots, screen) for screen in _COLUMNS},
-    )
+    ground = _ground(slots)
+    if ground:
+        over = {name: use for name, use in slots.items() if name != ground}
+        layouts = {screen: _over_ground(over, screen) for screen in _COLUMNS}
+        return Interface("default", title, layouts, ground)
+    return Interface("default", title, {screen: _grid(slots, screen) for screen in _COLUMNS})
+
+
+def _ground(slots: Mapping[str, WidgetUse]) -> str:
+    """Return the slot of the background; "" if no widget fits, or too many would be in front."""
+    if not 1 < len(slots) <= _MOST_OVER + 1:
+        return ""
+    found = {use.widget: name for name, use in reversed(list(slots.items()))}
+    return next((found[one] for one in _GROUNDS if one in found), "")
+
+
+def _over_ground(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
+    """Return the layout in front of a background: displays at the top, controls at the bottom.
+
+    Sticks are in the lower corners, the first one at the right. A phone in portrait has two
+    columns, with the displays first.
+    """
+    ranks = {name: _rank(use) for name, use in slots.items()}
+    sticks = [name for name, rank in ranks.items() if rank == _STEERED]
+    shown = [name for name, rank in ranks.items() if rank in (0, 1)]
+    controls = [name for name, rank in ranks.items() if rank == 3]
+    if screen == "phone_portrait":
+        names = [*sorted(shown, key=lambda name: -ranks[name]), *controls, *reversed(sticks)]
+        pairs = (Slot(name, place // 2, place % 2) for place, name in enumerate(names))
+        return Layout(math.ceil(len(names) / 2), 2, tuple(pairs))
+    top = math.ceil(len(shown) / len(_ACROSS))
+    corners = {4: sticks[:1] or controls[:1], 0: sticks[1:2] or controls[1:2]}
+    taken = [name for names in corners.values() for name in names]
+    rest = [name for name in (*sticks, *controls) if name not in taken]
+    last = top + 1 + math.ceil(len(rest) / 3)
+    placed = [
+        *(Slot(name, place // 5, _ACROSS[place % 5]) for place, name in enumerate(shown)),
+        *(Slot(name, last - place // 3, 1 + place % 3) for place, name in enumerate(rest)),
+        *(Slot(name, last, column) for column, names in corners.items() for name in names),
+    ]
+    return Layout(last + 1, len(_ACROSS), tuple(placed))
 
 
 def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:

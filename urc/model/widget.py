@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from urc.model.values import NOTHING
 
-__all__ = ["WidgetPort", "Widget"]
+__all__ = ["Footprint", "WidgetPort", "Widget"]
+
+Footprint = Literal["value", "button", "stick", "lever", "instrument", "view", "list"]
+"""Size class of a widget in front of a background. A lever is a slider, an instrument a round
+display, a view a camera or map, and a list has lines."""
 
 
 class WidgetPort(NamedTuple):
@@ -58,6 +62,7 @@ class Widget(NamedTuple):
     """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Minimum number of columns and minimum number of rows of the slot."""
+    footprint: Footprint = "instrument"
     is_dead_man: bool = False
     """Whether the widget is a dead-man control; no motion is sent while a dead-man control is
     released."""

@@ -64,7 +64,8 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
         )
         for each, port in declared.get("outputs", {}).items()
     }
-    return Widget(name, name.title(), place, ports, outputs, options=declared.get("options", {}))
+    made = Widget(name, name.title(), place, ports, outputs, options=declared.get("options", {}))
+    return made._replace(footprint=declared.get("footprint", made.footprint))
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:

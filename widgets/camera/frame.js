@@ -2,7 +2,7 @@
 /**
  * The placement of an image in its box. Pure: no DOM.
  *
- * @typedef {"contain" | "cover" | "fill"} Fit
+ * @typedef {"contain" | "cover" | "fill" | "zoom"} Fit "zoom": as "cover", but at most half larger than whole
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -16,6 +16,9 @@
  * @property {number} flip -1 if it is mirrored
  */
 
+/** Most enlargement of an image that fills the background: two thirds of it stay visible. */
+const MOST_ZOOM = 1.5;
+
 /**
  * @param {Size} picture
  * @param {Size} box
@@ -27,7 +30,9 @@ export function place(picture, box, { fit, rotate, mirror }) {
   const isLying = turns % 2 === 1;
   const [across, down] = isLying ? [picture.height, picture.width] : [picture.width, picture.height];
   const [wide, high] = [box.width / Math.max(1, across), box.height / Math.max(1, down)];
-  const scale = fit === "cover" ? Math.max(wide, high) : Math.min(wide, high);
+  const whole = Math.min(wide, high);
+  const filled = Math.max(wide, high);
+  const scale = fit === "cover" ? filled : fit === "zoom" ? Math.min(filled, whole * MOST_ZOOM) : whole;
   const [scaleX, scaleY] = fit === "fill" ? [wide, high] : [scale, scale];
   const [width, height] = isLying
     ? [picture.width * scaleY, picture.height * scaleX]

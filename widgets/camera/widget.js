@@ -46,7 +46,7 @@ class Camera {
     if (!canvas) throw new Error("the template has no canvas");
     this.canvas = canvas;
     this.look = {
-      fit: /** @type {Fit} */ (options["fit"] ?? "contain"),
+      fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
       rotate: Number(options["rotate"] ?? 0),
       mirror: options["mirror"] === true,
     };
@@ -74,6 +74,11 @@ class Camera {
         this.tell();
       },
     );
+    this.isWhole = false;
+    this.face.addEventListener("dblclick", () => {
+      this.isWhole = !this.isWhole;
+      this.draw();
+    }, { signal: this.signal });
     if (options["snapshot"] !== false) this.addSnapshot();
     this.addFullColour();
     if (this.face.tabIndex === 0) this.addHold(ctx);
@@ -188,6 +193,14 @@ class Camera {
     this.tell();
   }
 
+  /** @returns {Fit} */
+  fit() {
+    const { fit } = this.look;
+    if (fit !== "auto") return fit;
+    const isGround = this.root.closest('[data-place="ground"]') !== null;
+    return isGround && !this.isWhole ? "zoom" : "contain";
+  }
+
   draw() {
     const size = { width: this.face.clientWidth, height: this.face.clientHeight };
     if (size.width === 0 || size.height === 0) return;
@@ -195,7 +208,7 @@ class Camera {
     const bitmap = this.pictures.shown;
     if (!bitmap) return;
     if (this.shutter) this.shutter.disabled = false;
-    const lie = place(bitmap, size, this.look);
+    const lie = place(bitmap, size, { ...this.look, fit: this.fit() });
     pen.translate(lie.x, lie.y);
     pen.scale(lie.flip, 1);
     pen.rotate(lie.angle);

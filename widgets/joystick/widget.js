@@ -6,7 +6,7 @@
 /** @typedef {import("../../urc/web/static/widgets/motion.js").Look} Look */
 import { gate, settingsOf } from "urc/response_curve";
 import { attribute, drawing, part, write } from "urc/kit";
-import { along, DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
+import { along, DIRECTIONS, directed, Motion, pointed, pulled, speak } from "urc/motion";
 
 /** Travel of the knob, and size of the face, in units of the drawing. */
 const TRAVEL = 56;
@@ -37,13 +37,14 @@ export default {
 
 class Stick {
   /** @param {Context} ctx */
-  constructor({ el, options, t }) {
+  constructor({ el, options, t, command }) {
     this.t = t;
+    this.named = command("moved")?.arguments ?? {};
     this.pad = part(el, ".joystick-pad");
     this.face = drawing(el, ".joystick-face");
     this.all = drawing(el, ".joystick-all");
     this.thumb = drawing(el, ".joystick-thumb");
-    this.beside = drawing(el, ".joystick-beside");
+    this.way = drawing(el, ".joystick-way");
     this.x = el.querySelector(".joystick-x");
     this.y = el.querySelector(".joystick-y");
     this.axes = String(options["axes"] ?? "both");
@@ -110,18 +111,17 @@ class Stick {
   }
 
   /** @param {Look} look */
-  draw({ phase, push, values }) {
+  draw({ push, values }) {
     const { x = 0, y = 0 } = push ?? {};
     attribute(this.thumb, "transform", move(-y * TRAVEL, -x * TRAVEL));
     const isAway = this.isFloating && push !== null && this.kind === "pointer";
     attribute(this.all, "transform", isAway ? move(this.shift.x, this.shift.y) : move(0, 0));
-    const shown = [this.x ? signed(values["x"]) : "", this.y ? signed(values["y"]) : ""];
-    if (this.x) write(this.x, shown[0] ?? "");
-    if (this.y) write(this.y, shown[1] ?? "");
-    write(this.beside, phase === "held" ? shown.filter(Boolean).join("  ") : "");
+    attribute(this.way, "d", push ? wedge(x, y) : "");
     const { t } = this;
-    speak(this.x?.parentElement ?? null, values["x"], t("forward"), t("backward"));
-    speak(this.y?.parentElement ?? null, values["y"], t("to the left"), t("to the right"));
+    if (this.x) write(this.x, directed("x", values["x"], this.named["x"], t));
+    if (this.y) write(this.y, directed("y", values["y"], this.named["y"], t));
+    speak(this.x, values["x"], t("forward"), t("backward"));
+    speak(this.y, values["y"], t("to the left"), t("to the right"));
   }
 }
 
@@ -131,4 +131,23 @@ class Stick {
  */
 function move(right, down) {
   return `translate(${right.toFixed(1)} ${down.toFixed(1)})`;
+}
+
+/** Half of the angle of the wedge, in radians. */
+const WEDGE = 0.35;
+
+/**
+ * Return the path of the wedge that points in the direction of the push, as long as its strength.
+ *
+ * @param {number} x away from the operator, -1 to 1
+ * @param {number} y to the left
+ */
+function wedge(x, y) {
+  const size = Math.min(1, Math.hypot(x, y));
+  if (size < 0.02) return "";
+  const [angle, reach] = [Math.atan2(-y, x), 40 + size * 54];
+  const [from, to] = [angle - WEDGE, angle + WEDGE].map((one) => {
+    return `${(Math.sin(one) * reach).toFixed(1)} ${(-Math.cos(one) * reach).toFixed(1)}`;
+  });
+  return `M0 0L${from}A${reach.toFixed(1)} ${reach.toFixed(1)} 0 0 1 ${to}Z`;
 }

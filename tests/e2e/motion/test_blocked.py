@@ -105,6 +105,6 @@ async def test_a_block_list_from_a_file_stops_the_robot_and_disables_its_package
         answer = await page.goto(f"{address}robots/cart/")
         assert answer is not None
         assert answer.status == 200, await page.inner_text("body")
-        who = page.locator("[data-who]")
+        who = page.locator("[data-latched-text]")
         await expect(who).to_contain_text("Stopped by URC: robots/cart 1.0.0 is blocked by Keeper")
         assert [one for one in cart.heard[count:] if one not in STOPPED] == []

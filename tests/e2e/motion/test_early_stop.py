@@ -56,7 +56,7 @@ async def test_stop_acts_before_the_modules_have_loaded(new_page: PageMaker) -> 
         await expect(page.locator(NOTE)).to_have_text(re.compile("^Stop"))
         await until_attribute(page, STOP, "data-phase", "confirmed")
         released.set()
-        await expect(page.locator("[data-who]")).to_have_text(re.compile("^■ Stopped by "))
+        await expect(page.locator("[data-latched-text]")).to_have_text(re.compile("^■ Stopped by "))
         assert sorted(robot.line.texts) == BOTH_STOPPED
         await page.click("[data-verb='reset']")
         await until_text(page, "[data-who]", "Nobody drives")

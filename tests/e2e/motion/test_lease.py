@@ -111,7 +111,7 @@ async def test_a_page_that_only_watches_sees_all_and_drives_nothing(new_page: Pa
         assert robot.line.texts == []
         await page.click("[data-stop-button]")
         await robot.until_stopped()
-        await says(page, "^■ Stopped by you$")
+        await until_text(page, "[data-latched-text]", "■ Stopped by you")
         assert await page.locator("[data-verb]:visible").count() == 0, "reset is for drivers"
 
 

@@ -32,7 +32,7 @@ async def test_stop_acts_when_it_is_touched_and_latches(new_page: PageMaker) -> 
         await robot.until_stopped()
         assert set(robot.line.reasons) == {"stopped"}, "not when the lease runs out"
         await until_text(page, NOTE, DONE)
-        await until_text(page, "[data-who]", "■ Stopped by you")
+        await until_text(page, "[data-latched-text]", "■ Stopped by you")
         count = len(robot.line.written)
         await asyncio.sleep(0.4)
         assert moved(robot.after(count)) == {}
@@ -112,7 +112,7 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
         await robot.until_moving()
         await other.click(STOP)
         await robot.until_stopped()
-        await until_text(driver, "[data-who]", "■ Stopped by screen 2")
+        await until_text(driver, "[data-latched-text]", "■ Stopped by screen 2")
         await driver.mouse.up()
         count = len(robot.line.written)
         await push(driver)
@@ -208,7 +208,7 @@ async def opened_latched(new_page: PageMaker, address: str) -> Page:
     """Open the page of a robot that was stopped before; it is screen 1, too, and was not it."""
     page = await fresh(new_page)
     await page.goto(address)
-    await until_text(page, "[data-who]", "■ Stopped by screen 1, before a restart")
+    await until_text(page, "[data-latched-text]", "■ Stopped by screen 1, before a restart")
     return page
 
 

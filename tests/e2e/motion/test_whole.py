@@ -183,7 +183,7 @@ async def test_a_server_that_is_killed_stops_the_robot_and_keeps_the_latch(
         process, address = await serve(urc_process, file, tmp_path)
         await page.goto(address)
         await page.wait_for_function(
-            "() => document.querySelector('[data-who]').textContent.startsWith('■ Stopped')"
+            "() => document.querySelector('[data-latched-text]').textContent.includes('Stopped by')"
         )
         count = len(robot.lines)
         await push(page, ".joystick-pad")

@@ -88,7 +88,7 @@ STICKS = {
     "ardupilot-rover": Stick("Drive", ".joystick-pad", "sticks", "longitude", least=1e-5),
     "create-2": Stick("Drive", ".joystick-pad", "wheels", "left_ticks"),
     "roveo-mini": Stick("Drive", ".joystick-pad", "drive", "speed"),
-    "tello": Stick("Height and turn", ".joystick-pad", "fly", "height"),
+    "tello": Stick("Height, turn", ".joystick-pad", "fly", "height"),
 }
 READY: dict[str, dict[str, Mapping[str, Reading]]] = {
     "absolem": {"enable": {"motors": True}, "set_brake": {"brake": False}},

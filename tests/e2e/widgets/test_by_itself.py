@@ -50,7 +50,7 @@ async def test_stop_ends_a_list_of_steps(new_page: PageMaker) -> None:
         await page.locator(".sequence-start:not([aria-disabled='true'], :disabled)").click()
         await until(lambda: slow.commands == [("unlock", {})])
         await page.click(STOP)
-        await until_text(page, "[data-who]", "■ Stopped by you")
+        await until_text(page, "[data-latched-text]", "■ Stopped by you")
         slow.done.set()
         await until_text(page, ".sequence-note", "▲ STOP was pressed")
         assert slow.commands == [("unlock", {})]
@@ -82,7 +82,7 @@ async def test_stop_ends_what_waits_for_the_robot(
         await page.keyboard.press(key)
         await asyncio.sleep(0.3)
         await page.keyboard.press("Escape")
-        await until_text(page, "[data-who]", "■ Stopped by you")
+        await until_text(page, "[data-latched-text]", "■ Stopped by you")
         slow.done.set()
         await page.wait_for_selector(f".{widget}[data-phase='done']")
         await asyncio.sleep(0.3)
@@ -111,7 +111,7 @@ async def test_stop_ends_a_button_that_repeats(new_page: PageMaker) -> None:
     async with driven(robot=robot) as (_, address):
         page = await repeating(new_page, robot, address)
         await page.dispatch_event(STOP, "pointerdown", {"button": 0, "pointerId": 7})
-        await until_text(page, "[data-who]", "■ Stopped by you")
+        await until_text(page, "[data-latched-text]", "■ Stopped by you")
         count = len(robot.commands)
         await asyncio.sleep(0.5)
         assert len(robot.commands) == count

@@ -20,6 +20,8 @@ pytestmark = pytest.mark.anyio
 TO_10 = Argument("value", min=0.0, max=10.0)
 PUT = Command("put", "wire", SEND, {"value": TO_10})
 RING = Command("ring", "wire", SEND)
+STAGE = "document.querySelector('[data-stage]')"
+"""The part of the page that scrolls."""
 HIGH = """
 const sheet = new CSSStyleSheet();
 sheet.replaceSync(".urc-cell { min-height: 20rem !important }");
@@ -60,7 +62,7 @@ async def ready(page: Page) -> None:
     """Wait until the page can be scrolled, and its control can be used."""
     await fire(page, HIGH)
     await page.wait_for_function(
-        "() => document.documentElement.scrollHeight > innerHeight"
+        f"() => {STAGE}.scrollHeight > {STAGE}.clientHeight"
         " && document.querySelector('[data-cell=\"0\"] [aria-disabled=false]')"
     )
 
@@ -125,7 +127,7 @@ async def test_a_swipe_scrolls_the_page_and_sets_nothing(
                 robot.commands.clear()
             rested_ms = await swipe(page, hands, selector, 5, 150)
             if rested_ms < QUICK_MS:
-                await page.wait_for_function("() => scrollY > 50")
+                await page.wait_for_function(f"() => {STAGE}.scrollTop > 50")
             is_same = await page.inner_text(f".{widget}") == before
             swipes.append(Swipe(rested_ms, is_same, list(robot.commands)))
         await hands.put(0, *await centre(page, selector))
@@ -153,7 +155,7 @@ async def test_a_finger_sets_a_slider_by_a_tap_and_along_its_axis(new_page: Page
         await until_text(page, ".slider-text", "8")
         await hands.lift(0)
         await until(lambda: robot.commands[-1] == ("put", {"value": 8}))
-        assert await page.evaluate("scrollY") == 0
+        assert await page.evaluate(f"{STAGE}.scrollTop") == 0
 
 
 async def test_a_finger_turns_a_knob_that_it_began_sideways_or_had_rested_on(
@@ -174,4 +176,4 @@ async def test_a_finger_turns_a_knob_that_it_began_sideways_or_had_rested_on(
         await hands.put(0, x + 60, y - 60)
         await hands.lift(0)
         await until(lambda: len(robot.commands) > count)
-        assert await page.evaluate("scrollY") == 0
+        assert await page.evaluate(f"{STAGE}.scrollTop") == 0

@@ -212,36 +212,64 @@ def use(slot: str, widget: str, output: str = "") -> WidgetUse:
 
 def test_the_grid_has_the_stick_at_the_bottom_right() -> None:
     """Large views first, and other controls where there is room."""
-    uses = (use("a", "value"), use("stick", "joystick", "m"), use("cam", "camera"))
+    uses = (use("a", "value"), use("stick", "joystick", "m"), use("laser", "scan"))
     slots = {one.slot: one for one in (*uses, use("ring", "button", "p"))}
     grids = default_interface(slots, "T").layouts
     assert grids["landscape"] == Layout(
         4,
         4,
         (
-            Slot("cam", 0, 0, 2, 2),
+            Slot("laser", 0, 0, 2, 2),
             Slot("a", 0, 2),
             Slot("stick", 2, 2, 2, 2),
             Slot("ring", 0, 3),
         ),
     )
-    assert [slot.name for slot in grids["phone_portrait"].slots] == ["cam", "a", "ring", "stick"]
+    assert [slot.name for slot in grids["phone_portrait"].slots] == ["laser", "a", "ring", "stick"]
     assert grids["phone_portrait"].columns == 2
 
 
 def test_a_phone_that_lies_has_the_sticks_under_both_thumbs() -> None:
     """In the two rows that are seen, whatever else there is."""
     sticks = (use("drive", "joystick", "m"), use("look", "joystick", "m"))
-    shown = (use("cam", "camera"), *(use(f"v{place}", "value") for place in range(8)))
+    shown = (use("laser", "scan"), *(use(f"v{place}", "value") for place in range(8)))
     slots = {one.slot: one for one in (*shown, *sticks)}
     low = default_interface(slots, "T").layouts["phone_landscape"]
     places = {slot.name: slot for slot in low.slots}
     assert places["drive"] == Slot("drive", 0, 5, 2, 2)
     assert places["look"] == Slot("look", 0, 0, 2, 2)
-    assert places["cam"] == Slot("cam", 0, 2, 2, 2)
+    assert places["laser"] == Slot("laser", 0, 2, 2, 2)
     assert (low.rows, low.columns) == (3, 7)
     few = default_interface({"a": shown[1], "drive": sticks[0]}, "T").layouts["phone_landscape"]
     assert (few.rows, few.columns) == (2, 3)
+
+
+def test_a_camera_is_the_background_and_sticks_are_in_the_lower_corners() -> None:
+    uses = (use("a", "value"), use("map", "map"), use("cam", "camera"), use("ring", "button", "p"))
+    sticks = (use("drive", "joystick", "m"), use("look", "joystick", "m"))
+    made = default_interface({one.slot: one for one in (*uses, *sticks)}, "T")
+    assert made.background == "cam"
+    for screen in ("landscape", "phone_landscape"):
+        layout = made.layouts[screen]
+        places = {slot.name: (slot.row, slot.column) for slot in layout.slots}
+        last = layout.rows - 1
+        assert (places["drive"], places["look"]) == ((last, 4), (last, 0))
+        assert places["a"] == (0, 0)
+        assert places["map"] == (0, 4)
+        assert 0 < places["ring"][1] < 4
+        assert "cam" not in places
+        assert {row for row, _ in places.values()} < {*range(layout.rows)}, "no row is empty"
+    upright = made.layouts["phone_portrait"]
+    assert [slot.name for slot in upright.slots] == ["a", "map", "ring", "look", "drive"]
+
+
+def test_too_many_widgets_leave_no_background() -> None:
+    """They would cover it."""
+    many = {f"v{place}": use(f"v{place}", "value") for place in range(15)}
+    assert default_interface({"cam": use("cam", "camera"), **many}, "T").background == ""
+    assert default_interface({"cam": use("cam", "camera")}, "T").background == ""
+    del many["v0"]
+    assert default_interface({"cam": use("cam", "camera"), **many}, "T").background == "cam"
 
 
 DOCUMENT = (

@@ -3,6 +3,7 @@
 import pytest
 
 from urc.model.interface import Interface, Layout, Slot, Tab
+from urc.model.widget import Footprint
 from urc.web.show.layout import LEFT_HAND, grid_css, needs_turning
 
 MARGIN = "minmax(0,.12fr)"
@@ -21,7 +22,7 @@ def test_the_picture_keeps_its_margins_on_a_wide_screen() -> None:
     wide = text.split("@media")[0]
     assert f"grid-template-rows:{MARGIN} {ROW};" in wide
     assert f"grid-template-columns:{MARGIN} {MARGIN} {COLUMN}}}" in wide
-    assert '[data-cell="0"]{display:grid;grid-area:2/3/3/4}' in wide
+    assert '[data-place="0"]{display:grid;grid-area:2/3/3/4;' in wide
 
 
 def test_a_phone_gets_no_margins() -> None:
@@ -38,7 +39,7 @@ def test_more_than_two_columns_are_stacked_on_a_phone_in_reading_order() -> None
     text = css(("landscape", Layout(2, 3, slots)), slots=("a", "m", "b", "c"))
     phone = text.split("@media (max-width: 599.98px)")[1]
     for index, row in enumerate((1, 2, 3, 4)):
-        assert f'[data-cell="{index}"]{{display:grid;grid-area:{row}/1/{row + 1}/2}}' in phone
+        assert f'[data-place="{index}"]{{display:grid;grid-area:{row}/1/{row + 1}/2;' in phone
 
 
 def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
@@ -47,8 +48,8 @@ def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
     phone = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 1, 1, 2)))
     text = css(("landscape", wide), ("phone_portrait", phone), slots=("a", "b", "c"))
     rules = text.split("@media (max-width: 599.98px)")[1]
-    assert '[data-cell="0"]{display:grid;grid-area:1/2/2/4}' in rules
-    assert '[data-cell="1"]{display:none}' in rules
+    assert '[data-place="0"]{display:grid;grid-area:1/2/2/4;' in rules
+    assert '[data-place="1"]{display:none}' in rules
 
 
 def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
@@ -57,9 +58,9 @@ def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
     low = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 2)))
     rule = "@media (max-height: 479.98px)"
     drawn = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b", "c")).split(rule)[1]
-    assert '[data-cell="0"]{display:grid;grid-area:1/2/2/3}' in drawn
-    assert '[data-cell="1"]{display:none}' in drawn.split("@media")[0]
-    assert '[data-cell="2"]{display:grid;grid-area:1/1/2/2}' in drawn
+    assert '[data-place="0"]{display:grid;grid-area:1/2/2/3;' in drawn
+    assert '[data-place="1"]{display:none}' in drawn.split("@media")[0]
+    assert '[data-place="2"]{display:grid;grid-area:1/1/2/2;' in drawn
     other = css(("landscape", wide), slots=("a", "b", "c")).split(rule)[1]
     assert f"grid-template-rows:{' '.join(['minmax(6.5rem,1fr)'] * 3)};" in other
 
@@ -82,11 +83,11 @@ def test_the_left_hand_gets_the_columns_the_other_way_round() -> None:
     wide = Layout(1, 3, (Slot("a", 0, 0, 1, 2), Slot("b", 0, 2)))
     text = css(("landscape", wide), slots=("a", "b"))
     right, left = text.split(LEFT_HAND, 1)
-    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/3}' in right
-    assert '[data-cell="0"]{display:grid;grid-area:1/2/2/4}' in left
-    assert '[data-cell="1"]{display:grid;grid-area:1/1/2/2}' in left
+    assert '[data-place="0"]{display:grid;grid-area:1/1/2/3;' in right
+    assert '[data-place="0"]{display:grid;grid-area:1/2/2/4;' in left
+    assert '[data-place="1"]{display:grid;grid-area:1/1/2/2;' in left
     stacked = text.split("@media (max-width: 599.98px)")[2]
-    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/2}' in stacked
+    assert '[data-place="0"]{display:grid;grid-area:1/1/2/2;' in stacked
 
 
 def test_an_author_may_forbid_it_or_draw_it() -> None:
@@ -100,8 +101,8 @@ def test_an_author_may_forbid_it_or_draw_it() -> None:
         "i", layouts={"landscape": wide, "portrait": tall}, left_handed={"landscape": own}
     )
     left = grid_css(drawn, ("a", "b")).split(LEFT_HAND, 1)[1]
-    assert '[data-cell="0"]{display:none}' in left.split("@media")[0]
-    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/2}' in left.split("portrait")[1]
+    assert '[data-place="0"]{display:none}' in left.split("@media")[0]
+    assert '[data-place="0"]{display:grid;grid-area:1/1/2/2;' in left.split("portrait")[1]
 
 
 def test_each_page_places_the_cells_that_all_pages_share() -> None:
@@ -110,29 +111,63 @@ def test_each_page_places_the_cells_that_all_pages_share() -> None:
     second = Tab("two", "Two", {"landscape": Layout(1, 1, (Slot("b", 0, 0),))})
     both = Interface("i", tabs={"one": first, "two": second})
     text = grid_css(both, both.shown)
-    assert '.urc-grid[data-page="0"] [data-cell="1"]{display:grid;grid-area:1/2/2/3}' in text
-    assert '.urc-grid[data-page="1"] [data-cell="1"]{display:grid;grid-area:1/1/2/2}' in text
-    assert '.urc-grid[data-page="1"] [data-cell="0"]{display:none}' in text
+    assert '.urc-grid[data-page="0"] [data-place="1"]{display:grid;grid-area:1/2/2/3;' in text
+    assert '.urc-grid[data-page="1"] [data-place="1"]{display:grid;grid-area:1/1/2/2;' in text
+    assert '.urc-grid[data-page="1"] [data-place="0"]{display:none}' in text
 
 
-def test_over_a_background_what_is_empty_keeps_its_size() -> None:
-    """Through it the background is seen, on a phone above what is stacked."""
+def over(wide: Layout, *names: str, **footprints: Footprint) -> str:
+    """Return the rules for an interface with the background ``v``."""
+    interface = Interface("i", layouts={"landscape": wide}, background="v")
+    return grid_css(interface, ("v", *names), footprints)
+
+
+def test_over_a_background_widgets_keep_their_size_and_the_rest_is_free() -> None:
+    wide = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
+    base = over(wide, "a", "b").split("@media")[0]
+    assert "grid-template-rows:auto minmax(0,1fr);" in base
+    assert "grid-template-columns:auto minmax(0,1fr) auto}" in base
+    assert '[data-place="0"]' not in base
+
+
+def test_over_a_background_an_empty_row_grows() -> None:
+    wide = Layout(3, 1, (Slot("a", 0, 0), Slot("b", 2, 0)))
+    assert "grid-template-rows:auto minmax(0,1fr) auto;" in over(wide, "a", "b")
+
+
+def test_over_a_background_a_widget_is_at_the_side_of_its_slot() -> None:
+    slots = (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 1, 2))
+    base = over(Layout(2, 3, slots), "a", "b", "c").split("@media")[0]
+    assert "grid-area:1/1/2/2;--urc-across:start;--urc-down:start" in base
+    assert "grid-area:1/2/2/3;--urc-across:center;--urc-down:start" in base
+    assert "grid-area:2/3/3/4;--urc-across:end;--urc-down:end" in base
+
+
+def test_a_phone_in_portrait_has_the_background_above_the_widgets() -> None:
     wide = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
-    text = grid_css(Interface("i", layouts={"landscape": wide}, background="v"), ("v", "a", "b"))
-    assert MARGIN not in text.split("@media (max-height: 479.98px)")[0]
-    phone = text.split("@media (max-width: 599.98px)")[1]
-    assert '[data-cell="1"]{display:grid;grid-area:2/1/3/2}' in phone
-    assert '[data-cell="0"]' not in text
+    phone = over(wide, "a", "b").split("@media (max-width: 599.98px)")[1]
+    assert "grid-template-rows:minmax(var(--urc-ground-height),1fr) " in phone
+    assert '[data-place="1"]{display:grid;grid-area:2/1/3/2;' in phone
 
 
-def test_on_a_low_screen_an_empty_row_gives_way_to_those_with_controls() -> None:
-    """Else what steers lies below the edge; the columns between them show the background."""
-    wide = Layout(3, 3, (Slot("a", 0, 0), Slot("b", 2, 2)))
-    text = grid_css(Interface("i", layouts={"landscape": wide}, background="v"), ("v", "a", "b"))
-    low = text.split("@media (max-height: 479.98px)")[1]
-    rows = "grid-template-rows:minmax(6.5rem,1fr) minmax(0,.12fr) minmax(6.5rem,1fr)"
-    assert rows in low.split(";")[0]
-    assert "minmax(5rem,1fr)" in text.split("@media")[0]
+def test_a_stick_in_a_lower_corner_reaches_down_next_to_stop() -> None:
+    """STOP is between the sticks."""
+    slots = (Slot("lift", 1, 0), Slot("move", 1, 2), Slot("a", 0, 1))
+    interface = Interface("i", layouts={"landscape": Layout(2, 3, slots)})
+    sticks: dict[str, Footprint] = {"lift": "stick", "move": "stick", "a": "button"}
+    base = grid_css(interface, ("lift", "move", "a"), sticks).split("@media")[0]
+    corner = "calc(var(--urc-edge) + var(--urc-width-stick))"
+    assert f"--urc-left:{corner};--urc-right:{corner}" in base
+    assert base.count("--urc-corner:1") == 2
+
+
+def test_only_a_background_lets_a_button_reach_down_next_to_stop() -> None:
+    """A button of a plain grid is as wide as its column, which may be under STOP."""
+    wide = Layout(2, 3, (Slot("a", 1, 0),))
+    corner = "--urc-left:calc(var(--urc-edge) + var(--urc-width-button));--urc-right:0px"
+    assert corner in over(wide, "a", a="button")
+    plain = Interface("i", layouts={"landscape": wide})
+    assert "--urc-left:0px;--urc-right:0px" in grid_css(plain, ("a",), {"a": "button"})
 
 
 def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:
@@ -141,7 +176,7 @@ def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:
     tall = Layout(2, 1, (Slot("b", 0, 0), Slot("a", 1, 0)))
     phone = css(("landscape", wide), ("portrait", tall), slots=("a", "b"))
     rules = phone.split("@media (max-width: 599.98px)")[1]
-    assert '[data-cell="0"]{display:grid;grid-area:2/1/3/2}' in rules
+    assert '[data-place="0"]{display:grid;grid-area:2/1/3/2;' in rules
 
 
 @pytest.mark.parametrize(

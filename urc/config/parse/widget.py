@@ -3,12 +3,13 @@
 import re
 from collections.abc import Iterable
 from pathlib import Path as FilePath
+from typing import cast
 
 from urc.config.node import Node, Problems
 from urc.config.schemas import kind_of
 from urc.config.shape.check import check_options, check_shape
 from urc.config.spelling_suggestions import did_you_mean
-from urc.model.widget import Widget, WidgetPort
+from urc.model.widget import Footprint, Widget, WidgetPort
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.source import Document, read_document
 
@@ -44,6 +45,7 @@ def parse_widget(document: Document, problems: Problems) -> Widget:
         outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
         options={key: inner.data for key, inner in part.named("options").items()},
         min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
+        footprint=cast("Footprint", part.text("footprint", "instrument")),  # the schema's enum
         is_dead_man=part.flag("dead_man", default=False),
         summary=part.text("summary"),
         licence=part.text("licence"),

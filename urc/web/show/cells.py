@@ -15,7 +15,7 @@ from urc.model.driver import Driver
 from urc.model.interface import WidgetUse
 from urc.model.profile import Profile
 from urc.model.values import Signal
-from urc.model.widget import Widget
+from urc.model.widget import Footprint, Widget
 from urc.web.load.files import linked_options
 from urc.web.load.widget_trust import WidgetTrust, frame_url
 from urc.web.show.isolated_markup import markup_of
@@ -51,6 +51,9 @@ class Cell:
     is_background: bool
     frame: str = ""
     """URL of the widget's frame; "" for a widget that runs in the page."""
+    footprint: Footprint = "instrument"
+    is_picture: bool = False
+    """Whether the widget shows an image of a camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +186,10 @@ def widget_cell(
         "deadMan": widget.is_dead_man,
     }
     frame = frame_url(widget) if is_foreign else ""
-    return Cell(index, json.dumps(config), html, error, is_background, frame)
+    is_picture = any("image" in port.types for port in widget.inputs.values())
+    return Cell(
+        index, json.dumps(config), html, error, is_background, frame, widget.footprint, is_picture
+    )
 
 
 def spoken(name: str) -> str:

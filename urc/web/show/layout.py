@@ -9,18 +9,23 @@ normal size. Phones show no margins. A phone in portrait shows the grid ``phone_
 order on such a phone if they have more than two columns. A phone in landscape shows the grid
 ``phone_landscape``, else ``landscape``.
 
-Over a background, an empty cell keeps its full size on every screen, so that the background is
-visible. On screens of low height, empty rows become smaller, to leave more space for rows with
-widgets.
+Over a background, each widget has the size of its footprint, at the side of the screen where its
+slot is. Empty rows and columns take the remaining space: there the background is visible. On a
+phone in portrait, the background takes the height that the widgets below leave.
+
+STOP is at the bottom of the screen, in the middle. Widgets end above it, except sticks in the lower
+corners: they reach down next to it.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from urc.model.interface import Interface, Layout, Slot, Tab
+from urc.model.values import NOTHING
+from urc.model.widget import Footprint
 
 __all__ = ["grid_css", "mirrored", "needs_turning"]
 
@@ -33,14 +38,29 @@ LEFT_HAND = ':root[data-hand="left"]'
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
 """Height of a row on a phone in landscape; two rows of this height fit on the screen."""
-_WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
-"""Sizes of rows and columns through which the background is visible."""
+_OVER, _WINDOW = "auto", "minmax(0,1fr)"
+"""Sizes of rows and columns over a background: with a widget, and empty."""
+_PHONE_WINDOW = "minmax(min-content,.01fr)"
+_GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
+"""Height of the background on a phone in portrait: as much as the widgets below leave."""
+_LOW_OVER = ("stick", "button", "value")
+"""Footprints that reach down next to STOP over a background; without one, only sticks do."""
+_SIDES = ("start", "center", "end")
 
 
-def grid_css(interface: Interface, slots: Sequence[str]) -> str:
-    """Return the CSS rules for the cells, which are numbered in the order of `slots`."""
+def grid_css(
+    interface: Interface, slots: Sequence[str], footprints: Mapping[str, Footprint] = NOTHING
+) -> str:
+    """Return the CSS rules for the cells, which are numbered in the order of `slots`.
+
+    Args:
+        interface: the interface.
+        slots: names of the slots that have widgets.
+        footprints: footprint of the widget in each slot.
+    """
     css = ""
-    canvas = _Canvas(slots, interface.background if interface.background in slots else "")
+    background = interface.background if interface.background in slots else ""
+    canvas = _Canvas(slots, background, footprints)
     turned = [needs_turning(page, slots) for page in interface.pages]
     for number, page in enumerate(interface.pages):
         place = f'.urc-grid[data-page="{number}"]'
@@ -50,7 +70,7 @@ def grid_css(interface: Interface, slots: Sequence[str]) -> str:
         css += _screens(place, right, canvas)
         left = _left_hand(page, right, canvas)
         if left != right:
-            css += _screens(f"{LEFT_HAND} {place}", left, canvas)
+            css += _screens(place, left, canvas, f"{LEFT_HAND} ")
     return css
 
 
@@ -58,9 +78,9 @@ class _Canvas(NamedTuple):
     """The slots of a page, and its background slot."""
 
     slots: Sequence[str]
-    background: str
-    """Slot behind all other slots, such as a camera. Empty cells keep their full size, so that this
-    slot is visible."""
+    background: str = ""
+    """Slot behind all other slots, such as a camera; "": none."""
+    footprints: Mapping[str, Footprint] = NOTHING
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
@@ -85,7 +105,7 @@ def mirrored(grid: Layout) -> Layout:
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
     """Return whether a phone in portrait shows a layout that differs from the designed layout."""
-    base = _placed(page.layouts, _Canvas(slots, "")).get("base")
+    base = _placed(page.layouts, _Canvas(slots)).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
 
@@ -94,28 +114,27 @@ def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
     """Return the grid for each kind of screen, without unfilled slots."""
     if not grids:
         return {}
-    crop = Layout._replace if canvas.background else _cropped
+    over = bool(canvas.background)
     wide = grids.get("landscape") or next(iter(grids.values()))
     base = _filled(wide, canvas.slots)
     placed = {"base": base}
     if "portrait" in grids:
         placed[TALL] = _filled(grids["portrait"], canvas.slots)
-    placed[SHORT] = crop(
-        _filled(grids["phone_landscape"], canvas.slots) if "phone_landscape" in grids else base
-    )
+    low = _filled(grids["phone_landscape"], canvas.slots) if "phone_landscape" in grids else base
+    placed[SHORT] = low if over else _cropped(low)
     upright = grids.get("phone_portrait") or grids.get("portrait") or wide
-    phone = crop(_filled(upright, canvas.slots))
+    phone = _cropped(_filled(upright, canvas.slots))
     if "phone_portrait" not in grids and phone.columns > PHONE_COLUMNS:
-        # The first row stays empty over a background, which shows through it.
-        phone = _stacked(phone, first=1 if canvas.background else 0)
+        phone = _stacked(phone)
     placed[PHONE] = phone
     return placed
 
 
-def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas) -> str:
+def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas, hand: str = "") -> str:
+    """Return the rules for each screen; `hand` restricts them to left-handed operators."""
     css = ""
     for screen, grid in grids.items():
-        rules = _rules(place, grid, canvas, _LOW_ROW if screen == SHORT else _USED_ROW)
+        rules = hand.join(("", *_rules(place, grid, canvas, screen)))
         css += rules if screen == "base" else f"@media {screen}{{{rules}}}"
     return css
 
@@ -125,28 +144,81 @@ def _filled(grid: Layout, names: Sequence[str]) -> Layout:
     return Layout(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
-def _rules(place: str, grid: Layout, canvas: _Canvas, row: str) -> str:
-    empty_row, empty_column = _WINDOW if canvas.background else (_MARGIN, _MARGIN)
-    if canvas.background and row == _LOW_ROW:
-        empty_row = _MARGIN  # shrinks, so that no control lies below the edge
-    used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
-    used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
-    rows = _tracks(grid.rows, used_rows, row, empty_row)
-    columns = _tracks(grid.columns, used_columns, _USED_COLUMN, empty_column)
-    css = f"{place}{{grid-template-rows:{rows};grid-template-columns:{columns}}}"
+def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[str]:
+    yield f"{place}{{{_template(grid, canvas, screen)}}}"
     places = {slot.name: slot for slot in grid.slots}
+    is_below = screen == PHONE and bool(canvas.background)
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
-            css += f'{place} [data-cell="{index}"]{{{_place(places.get(name))}}}'
-    return css
+            rules = _place(places.get(name), grid, canvas, is_below)
+            yield f'{place} [data-place="{index}"]{{{rules}}}'
+    corners = _corners(grid, canvas)
+    sides = f"--urc-left:{corners['start']};--urc-right:{corners['end']}"
+    yield f".urc-robot:has(> .urc-stage > {place}){{{sides}}}"
 
 
-def _place(slot: Slot | None) -> str:
+def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
+    """Return the sizes of rows and columns."""
+    row = _LOW_ROW if screen == SHORT else _USED_ROW
+    column, empty_row, empty_column = _USED_COLUMN, _MARGIN, _MARGIN
+    if canvas.background:
+        row, empty_row, empty_column = _OVER, _WINDOW, _WINDOW
+        column = _USED_COLUMN if screen == PHONE else _OVER
+    used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
+    used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
+    if canvas.background and len(used_rows) == grid.rows:
+        used_rows = used_rows - {grid.rows // 2}  # no row is empty: the middle one grows
+    if canvas.background and screen == PHONE:
+        rows = f"{_GROUND_ROW} {_tracks(grid.rows, used_rows, row, _PHONE_WINDOW)}"
+    else:
+        rows = _tracks(grid.rows, used_rows, row, empty_row)
+    columns = _tracks(grid.columns, used_columns, column, empty_column)
+    return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+
+
+def _corners(grid: Layout, canvas: _Canvas) -> dict[str, str]:
+    """Return the width of the widget in the lower left and in the lower right corner, as CSS."""
+    found = {"start": "0px", "end": "0px"}
+    for slot in grid.slots:
+        if _is_corner(slot, grid, canvas):
+            width = f"var(--urc-width-{canvas.footprints[slot.name]})"
+            found[_across(slot, grid)] = f"calc(var(--urc-edge) + {width})"
+    return found
+
+
+def _is_corner(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
+    """Return whether a slot reaches down next to STOP."""
+    is_last = slot.row + slot.row_span == grid.rows
+    is_edge = slot.column == 0 or slot.column + slot.column_span == grid.columns
+    reaching = _LOW_OVER if canvas.background else ("stick",)
+    reaches = canvas.footprints.get(slot.name) in reaching
+    return is_last and is_edge and reaches and slot.column_span < grid.columns
+
+
+def _across(slot: Slot, grid: Layout) -> str:
+    """Return the side of the screen at which a slot is: its left, middle or right third."""
+    return _SIDES[_third(slot.column, slot.column_span, grid.columns)]
+
+
+def _down(slot: Slot, grid: Layout) -> str:
+    """Return the end of the screen at which a slot is: its upper half, else its lower half."""
+    return "start" if 2 * slot.row + slot.row_span < grid.rows else "end"
+
+
+def _third(first: int, span: int, count: int) -> int:
+    return min(2, int(3 * (first + span / 2) / count)) if span < count else 1
+
+
+def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> str:
+    """Return the rules of one cell; `is_below` if the background has the first row."""
     if slot is None:
         return "display:none"
-    row, column = slot.row + 1, slot.column + 1
+    row, column = slot.row + 1 + is_below, slot.column + 1
     area = f"{row}/{column}/{row + slot.row_span}/{column + slot.column_span}"
-    return f"display:grid;grid-area:{area}"
+    across, down = _across(slot, grid), _down(slot, grid)
+    corner = int(_is_corner(slot, grid, canvas))
+    sides = f"--urc-across:{across};--urc-down:{down};--urc-corner:{corner}"
+    return f"display:grid;grid-area:{area};{sides}"
 
 
 def _tracks(count: int, used: set[int], size: str, empty: str) -> str:
@@ -170,8 +242,8 @@ def _cropped(grid: Layout) -> Layout:
     return Layout(len(rows), len(columns), slots)
 
 
-def _stacked(grid: Layout, first: int) -> Layout:
-    """Return the slots in one column in reading order, starting at row `first`."""
+def _stacked(grid: Layout) -> Layout:
+    """Return the slots in one column in reading order."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
-    slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered, first))
-    return Layout(len(slots) + first, 1, slots)
+    slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered))
+    return Layout(len(slots), 1, slots)

@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from urc import __version__
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile
+from urc.model.widget import Footprint
 from urc.runtime.one_shot_commands import can_move
 from urc.shipped import shipped
 from urc.web import words
@@ -159,7 +160,7 @@ def robot_page(
             title=profile.title,
             import_map=with_words(modules),
             widget_styles=styles,
-            grid_css=grid_css(interface, slots),
+            grid_css=grid_css(interface, slots, _footprints(profile, uses)),
         ),
         title=profile.title,
         url=url,
@@ -204,6 +205,10 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }
     return {name: use for name, use in found.items() if use is not None}
+
+
+def _footprints(profile: Profile, uses: Mapping[str, WidgetUse]) -> dict[str, Footprint]:
+    return {slot: profile.widgets[use.widget].footprint for slot, use in uses.items()}
 
 
 def _cells(

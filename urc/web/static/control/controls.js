@@ -17,18 +17,22 @@ const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
 
 export class Controls {
   /**
+   * @param {ParentNode} root the page
    * @param {HTMLElement} el
    * @param {Drive} drive
    * @param {StopButton} stop
    */
-  constructor(el, drive, stop) {
+  constructor(root, el, drive, stop) {
     this.el = el;
     this.drive = drive;
     this.who = part(el, "[data-who]");
+    this.latched = part(root, "[data-latched]");
+    this.latchedText = part(root, "[data-latched-text]");
+    this.latchedNext = part(root, "[data-latched-next]");
     this.stop = part(el, "[data-stop-button]");
     this.stopNote = part(el, "[data-stop-note]");
     /** @type {[Verb, HTMLElement][]} */
-    this.buttons = VERBS.map((verb) => [verb, part(el, `[data-verb="${verb}"]`)]);
+    this.buttons = VERBS.map((verb) => [verb, part(root, `[data-verb="${verb}"]`)]);
     for (const [verb, button] of this.buttons) {
       button.addEventListener("click", () => {
         drive.say(verb);
@@ -67,6 +71,10 @@ export class Controls {
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
     const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS);
     if (this.who.textContent !== text) this.who.textContent = text;
+    const stopped = isLatched ? this.stoppedWords() : "";
+    if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
+    if (this.latchedText.textContent !== stopped) this.latchedText.textContent = stopped;
+    if (this.latched.hidden === isLatched) this.latched.hidden = !isLatched;
     const state = isLatched ? "latched" : isMine ? "mine" : isOthers ? "others" : "free";
     if (this.el.dataset["state"] !== state) this.el.dataset["state"] = state;
   }
@@ -80,14 +88,19 @@ export class Controls {
   words(isMine, isAsked, iAsk, leftS) {
     const lease = this.drive.lease;
     if (!lease) return t("Not connected to URC");
-    if (lease.latched === lease.name && lease.latched) return t("■ Stopped by you");
-    if (lease.latched) return t("■ Stopped by {who}", { who: said(lease.latched) });
     const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
     if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
     if (isMine) return t("● You drive");
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });
     return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
+  }
+
+  /** Return the text of the band of a latched STOP. */
+  stoppedWords() {
+    const { lease, posted } = this.drive;
+    const by = lease?.latched || posted?.latched || "";
+    return by && by === lease?.name ? t("■ Stopped by you") : t("■ Stopped by {who}", { who: said(by) });
   }
 
   /** @param {StopState} state */

@@ -57,6 +57,7 @@
  *   sending.
  *
  * @typedef {object} Argument One argument of a command, as the driver declares it.
+ * @property {string} [name]
  * @property {"integer" | "number" | "boolean" | "string" | "array"} type
  * @property {string} title
  * @property {string} unit

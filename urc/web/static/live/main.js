@@ -13,6 +13,7 @@ import { Controls } from "../control/controls.js";
 import { Drive } from "../control/drive.js";
 import { Alerts, PageTopics, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
+import { offerHints } from "./hints.js";
 import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
 import { LostCard } from "./lost_card.js";
@@ -76,11 +77,11 @@ const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
 const input = new Input(drive);
 const bar = root.querySelector("[data-controls]");
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
-const asks = new ConfirmDialog(part(root, ".urc-bar"), (message) => socket.send(message));
+const asks = new ConfirmDialog(part(root, "[data-bands]"), (message) => socket.send(message));
 stop.onPressed = forgetQuestions;
 /** States of the sequences. @type {Record<string, import("../core/types.js").Progress>} */
 let sequences = {};
-const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
+const controls = bar instanceof HTMLElement ? new Controls(root, bar, drive, stop) : null;
 const log = new Log();
 const alerts = new Alerts();
 const themes = new Themes(wake);
@@ -137,7 +138,7 @@ const lost = new LostCard(part(root, "[data-lost]"), root, () => {
 });
 const screenName = new ScreenName((message) => socket.send(message));
 const wakeLock = new WakeLock(tell);
-const stage = new ViewSwitch(root, { store, run, input, asks, host, panel: panel.el, wake });
+const stage = new ViewSwitch(root, { store, run, input, asks, host, wake });
 /** Images that the server sends, as JSON. */
 let shown = "";
 
@@ -329,6 +330,7 @@ backSafely(part(root, "[data-back]"), {
 });
 offerSystems((system) => store.setUnits(system));
 stop.takeOver(root);
+offerHints(root);
 socket.open();
 setInterval(wake, AGE_EVERY_MS);
 

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The panel at the side of the grid: every link with its state, and the log.
+ * The sheet over the grid: every link with its state, and the log.
  *
  * All content is written as text, because it comes from robots.
  *
@@ -14,7 +14,6 @@ import { ageText } from "./store.js";
 import { said, t } from "../core/words.js";
 
 const LINES_KEPT = 200;
-const WIDE = "(width >= 68.75rem)"; // the same as in steer.css
 
 /** @type {Record<Link["state"], string>} */
 const STATES = {
@@ -37,16 +36,8 @@ export class Panel {
     this.session = "";
     /** Expected number of the next log line. */
     this.next = 0;
-    const wide = matchMedia(WIDE);
-    const follow = () => el.toggleAttribute("open", wide.matches);
-    wide.addEventListener("change", follow);
-    follow();
-    // Below the widgets it may open outside of the view: scroll to it.
-    const show = () => !wide.matches && el.hasAttribute("open") && el.scrollIntoView({ block: "start" });
-    part(el, "summary").addEventListener("click", () => requestAnimationFrame(show));
     document.querySelector("[data-badge-why]")?.addEventListener("click", () => {
-      el.toggleAttribute("open", !wide.matches || !el.hasAttribute("open"));
-      show();
+      el.toggleAttribute("open");
       if (el.hasAttribute("open")) part(el, "summary").focus({ preventScroll: true });
     });
   }

@@ -8,10 +8,10 @@
  *
  * @typedef {object} More
  * @property {import("../widgets/host.js").Host} host
- * @property {HTMLElement} panel a details element; open next to the debug interface
  * @property {() => void} wake
  */
 import { part } from "./badge.js";
+import { swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
 import { tabsOf } from "./tabs.js";
 import { said, t } from "../core/words.js";
@@ -26,7 +26,6 @@ export class ViewSwitch {
     this.el = part(root, "[data-stage]");
     /** @type {Debug | null} */
     this.debug = null;
-    this.wasOpen = false;
     this.enter();
     new Interfaces(root, {
       letGo: (reason) => doors.input.letGo(reason),
@@ -51,6 +50,7 @@ export class ViewSwitch {
   /** Start the present interface. */
   enter() {
     const { host, input, wake } = this.doors;
+    swapViews(this.el);
     host.mountAll(this.el);
     tabsOf(this.el, () => input.letGo(t("another page was opened")));
     const el = this.el.querySelector("[data-debug]");
@@ -62,17 +62,13 @@ export class ViewSwitch {
   async search(el) {
     const { Debug } = await import("../dev/debug.js");
     if (!el.isConnected) return; // another interface was opened meanwhile
-    const { panel, wake } = this.doors;
-    this.wasOpen = panel.hasAttribute("open");
-    panel.toggleAttribute("open", true);
     this.debug = new Debug(el, this.doors);
-    wake();
+    this.doors.wake();
   }
 
   /** End the present interface. */
   leave() {
-    const { host, panel } = this.doors;
-    if (this.debug) panel.toggleAttribute("open", this.wasOpen);
+    const { host } = this.doors;
     this.debug?.end();
     this.debug = null;
     host.unmountAll(this.el);

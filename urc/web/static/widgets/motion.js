@@ -172,6 +172,42 @@ export function signed(value) {
   return Number(text) === 0 ? text : `${share < 0 ? "−" : "+"}${text}`;
 }
 
+/** Directions of a positive and a negative value, by argument or else by axis. @type {Record<string, [string, string]>} */
+const WAYS = {
+  x: [mark("forward"), mark("backward")],
+  y: [mark("left"), mark("right")],
+  forward: [mark("forward"), mark("backward")],
+  left: [mark("left"), mark("right")],
+  right: [mark("right"), mark("left")],
+  up: [mark("up"), mark("down")],
+  clockwise: [mark("clockwise"), mark("counterclockwise")],
+};
+
+/** Mark a text for the catalogues; it is translated when it is shown. @param {string} text */
+function mark(text) {
+  return text;
+}
+
+/**
+ * Return a value of an axis in words, with the declared unit, such as "forward 0.18 m/s"; "" at rest.
+ *
+ * @param {"x" | "y"} axis
+ * @param {unknown} value from -1 to 1
+ * @param {import("../core/types.js").Argument | undefined} argument argument that the axis sets
+ * @param {Context["t"]} t
+ */
+export function directed(axis, value, argument, t) {
+  const share = typeof value === "number" ? value : 0;
+  const reach = share < 0 ? -(argument?.min ?? -1) : (argument?.max ?? 1);
+  const size = Math.abs(share) * Math.abs(reach);
+  const digits = Math.abs(reach) < 20 ? 2 : 0;
+  const figure = argument?.unit ? size.toFixed(digits) : Math.round(Math.abs(share) * 100).toFixed(0);
+  if (Number(figure) === 0) return "";
+  const [ahead, back] = WAYS[argument?.name ?? ""] ?? WAYS[axis] ?? ["", ""];
+  const way = argument?.title ? `${argument.title} ${share < 0 ? "−" : "+"}` : `${t(share < 0 ? back : ahead)} `;
+  return `${way}${figure} ${argument?.unit || "%"}`;
+}
+
 /**
  * Keep one axis of a control readable as a slider for screen readers. Its text changes by tenths only,
  * so that a moving hand does not cause constant speech.

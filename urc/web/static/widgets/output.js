@@ -43,7 +43,10 @@ export function describe(output) {
   if (output === undefined) return null;
   const { command, title = "", asks = [], steps = [], names } = output;
   const known = Object.entries(output.arguments ?? {});
-  const called = known.map(([name, one]) => [Object.hasOwn(names, name) ? names[name] : name, one]);
+  const called = known.map(([name, one]) => [
+    Object.hasOwn(names, name) ? names[name] : name,
+    { ...one, name },
+  ]);
   return { command, title, asks, steps, arguments: Object.fromEntries(called) };
 }
 

@@ -1,0 +1,119 @@
+"""The generator of pictures for work on the design: `python -m scripts.page_pictures FOLDER`.
+
+It pictures the menu and every robot of the demo on each kind of screen, in each theme. The robots
+are emulated, with a data folder of their own. ``shares.md`` in the folder has the measures of each
+page in the theme light: the shares of the background and the bars, and the faults of the layout.
+``--robots``, ``--screens`` and ``--themes`` select some of them.
+"""
+
+import argparse
+import asyncio
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from playwright.async_api import Browser, Error
+
+from tests.e2e.browser import LOCALE, running_browser
+from tests.e2e.keys import enter
+from tests.e2e.processes import UrcProcess
+
+ROOT = Path(__file__).resolve().parents[1]
+MENU = "menu"
+ROBOTS = (MENU, *sorted(path.stem for path in (ROOT / "robots").glob("*.yaml")))
+SCREENS = {
+    "desktop": (1440, 900),
+    "tablet-landscape": (1180, 820),
+    "tablet": (820, 1180),
+    "phone": (390, 844),
+    "phone-landscape": (844, 390),
+    "small-phone": (360, 640),
+}
+THEMES = ("light", "dark", "sunlight", "night")
+LAYOUT = (ROOT / "tests/e2e/robots/page_layout.js").read_text("utf-8")
+LIVE = "() => document.querySelector('[data-badge]')?.dataset.state === 'good'"
+WAIT_MS = 30_000
+SETTLE_MS = 1500
+"""Time for pictures of cameras and the first values, in milliseconds."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Take the pictures; return the exit code."""
+    parser = argparse.ArgumentParser(prog="page_pictures", description="Picture all pages.")
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=ROBOTS)
+    parser.add_argument("--screens", nargs="+", choices=tuple(SCREENS), default=tuple(SCREENS))
+    parser.add_argument("--themes", nargs="+", choices=THEMES, default=THEMES)
+    given = parser.parse_args(arguments)
+    given.folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as data:
+        demo = UrcProcess(("demo", "--no-browser", "--port", "0"), {"XDG_DATA_HOME": data})
+        try:
+            address = demo.wait_for(r"dashboard (http://\S+)")[1]
+            asyncio.run(take(address, given))
+        finally:
+            demo.kill()
+    return 0
+
+
+async def take(address: str, given: argparse.Namespace) -> None:
+    """Take the pictures, and write the measures."""
+    lines = ["| robot | screen | background | bars | faults |", "|---|---|---|---|---|"]
+    async with running_browser() as browser:
+        for theme in given.themes:
+            for screen in given.screens:
+                for name, seen in (await pictures(browser, address, given, screen, theme)).items():
+                    if theme == "light":
+                        share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
+                        faults = "; ".join(seen["faults"]) or "none"
+                        lines.append(
+                            f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
+                        )
+                print(theme, screen, flush=True)
+    (given.folder / "shares.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def row(name: str, screen: str, seen: dict[str, Any]) -> str:
+    """Return the measures of a page as a row of the table."""
+    share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
+    faults = "; ".join(seen["faults"]) or "none"
+    return f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
+
+
+async def pictures(
+    browser: Browser, address: str, given: argparse.Namespace, screen: str, theme: str
+) -> dict[str, dict[str, Any]]:
+    """Picture the pages on one screen in one theme; return the measures by robot."""
+    width, height = SCREENS[screen]
+    context = await browser.new_context(
+        viewport={"width": width, "height": height},
+        has_touch="desktop" not in screen,
+        locale=LOCALE,
+        reduced_motion="reduce",
+    )
+    await enter(context, address)
+    await context.add_init_script(
+        f"localStorage.setItem('urc-theme', '{theme}'); localStorage.setItem('urc-hints', 'seen')"
+    )
+    page = await context.new_page()
+    start = address.split("?")[0].split("#")[0].rstrip("/")
+    found = {}
+    for name in given.robots:
+        await page.goto(f"{start}/" if name == MENU else f"{start}/robots/{name}/")
+        if name != MENU:
+            try:
+                await page.wait_for_function(LIVE, timeout=WAIT_MS)
+            except Error:
+                print(f"{name} was not live in time", file=sys.stderr)
+        await page.wait_for_timeout(SETTLE_MS)
+        await page.screenshot(path=given.folder / f"{name}-{screen}-{theme}.png")
+        if name != MENU:
+            found[name] = await page.evaluate(LAYOUT)
+    await context.close()
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,52 @@
+// Run in a robot's page. Returns the shares of the screen in percent, and the faults of the layout: cells
+// or buttons on top of each other, cells out of the stage, and sticks of different sizes or places.
+() => {
+  const STEP = Math.sqrt((innerWidth * innerHeight) / 12_000); // pixels between two samples
+  const SLACK = 1.5;
+  const boxOf = (el) => el.getBoundingClientRect();
+  const isShown = (el) => el.checkVisibility() && boxOf(el).width > 0;
+  const stage = document.querySelector("[data-stage]");
+  const room = boxOf(stage);
+  let [ground, inside, bars] = [0, 0, 0];
+  for (let y = STEP / 2; y < innerHeight; y += STEP) {
+    for (let x = STEP / 2; x < innerWidth; x += STEP) {
+      if (y < room.top || y >= room.bottom) {
+        bars += 1;
+        continue;
+      }
+      inside += 1;
+      ground += Number(Boolean(document.elementFromPoint(x, y)?.closest('[data-place="ground"]')));
+    }
+  }
+  const faults = [];
+  const cells = [...document.querySelectorAll('.urc-cell:not([data-place="ground"])')].filter(isShown);
+  const dock = [...document.querySelectorAll(".urc-stop-button, .urc-who, .urc-verbs > *")].filter(isShown);
+  const name = (el) => (el.dataset.config ? JSON.parse(el.dataset.config).slot : el.className);
+  const scrolls = stage.scrollHeight > stage.clientHeight + SLACK;
+  const pairs = [...cells, ...dock].flatMap((one, index, all) => all.slice(index + 1).map((other) => [one, other]));
+  for (const [one, other] of pairs) {
+    // A cell may scroll below STOP.
+    if (scrolls && dock.includes(other) && !dock.includes(one)) continue;
+    const [a, b] = [boxOf(one), boxOf(other)];
+    const [wide, high] = [Math.min(a.right, b.right) - Math.max(a.left, b.left), Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top)];
+    if (wide > SLACK && high > SLACK) faults.push(`${name(one)} lies on ${name(other)}: ${Math.round(wide)} × ${Math.round(high)} px`);
+  }
+  for (const cell of cells) {
+    const { left, right, top, bottom } = boxOf(cell);
+    const over = Math.max(room.left - left, right - room.right, scrolls ? 0 : bottom - room.bottom, scrolls ? 0 : room.top - top);
+    if (over > SLACK) faults.push(`${name(cell)} is ${Math.round(over)} px out of the stage`);
+  }
+  if (stage.scrollWidth > stage.clientWidth + SLACK) faults.push("the stage scrolls sideways");
+  const sticks = [...document.querySelectorAll(".joystick-face")].filter(isShown).map(boxOf);
+  const sizes = sticks.map(({ width, height }) => Math.min(width, height));
+  if (Math.max(0, ...sizes) - Math.min(...sizes) > SLACK) faults.push(`sticks of different sizes: ${sizes.join(", ")}`);
+  const edges = sticks.map(({ left, right }) => Math.min(left, innerWidth - right));
+  const gap = sticks.length > 1 ? Math.max(...sticks.map(({ left }) => left)) - Math.min(...sticks.map(({ right }) => right)) : null;
+  const isOverGround = document.querySelector('[data-place="ground"]') !== null;
+  return {
+    ground: Math.round((100 * ground) / inside),
+    bars: Math.round((1000 * bars) / (bars + inside)) / 10,
+    isPicture: document.querySelector('[data-place="ground"][data-picture]') !== null,
+    isOverGround, scrolls, faults, edges, sizes, gap,
+  };
+}

@@ -1,0 +1,93 @@
+// @ts-check
+/**
+ * The background of a page, and the views over it: a tap on a view swaps it with the background. Held
+ * controls stay held; the choice is stored on the device.
+ */
+import { t } from "../core/words.js";
+
+const KEY = "urc-ground:";
+
+/**
+ * Add the buttons of an interface's views, and restore the stored choice.
+ *
+ * @param {HTMLElement} stage
+ */
+export function swapViews(stage) {
+  const ground = stage.querySelector('[data-place="ground"]');
+  if (!(ground instanceof HTMLElement)) return;
+  const views = [...stage.querySelectorAll('.urc-cell[data-footprint="view"]')].filter((one) => one instanceof HTMLElement);
+  for (const view of views) addButton(view, views);
+  const kept = stored();
+  const chosen = views.find((one) => one.dataset["cell"] === kept);
+  if (chosen) swap(chosen, ground);
+  mark(views);
+}
+
+/**
+ * @param {HTMLElement} view
+ * @param {HTMLElement[]} views
+ */
+function addButton(view, views) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "urc-swap";
+  button.textContent = "⤢";
+  button.setAttribute("aria-label", t("Show {title} large", { title: titleOf(view) }));
+  button.addEventListener("click", () => {
+    const ground = views.find((one) => one.dataset["place"] === "ground");
+    if (!ground || ground === view) return;
+    swap(view, ground);
+    mark(views);
+    store(view.dataset["cell"] ?? "");
+  });
+  view.append(button);
+}
+
+/** @param {HTMLElement} view */
+function titleOf(view) {
+  try {
+    return String(JSON.parse(view.dataset["config"] ?? "{}").title ?? "");
+  } catch {
+    return "";
+  }
+}
+
+/**
+ * Exchange the places of two cells.
+ *
+ * @param {HTMLElement} one
+ * @param {HTMLElement} other
+ */
+function swap(one, other) {
+  const { place } = one.dataset;
+  one.dataset["place"] = other.dataset["place"] ?? "";
+  other.dataset["place"] = place ?? "";
+}
+
+/** Mark the views over the background. @param {HTMLElement[]} views */
+function mark(views) {
+  for (const view of views) view.classList.toggle("urc-pip", view.dataset["place"] !== "ground");
+}
+
+/** The key of the page and its interface. */
+function key() {
+  const choice = document.querySelector("[data-interface-choice]");
+  return `${KEY}${location.pathname}${choice instanceof HTMLSelectElement ? choice.value : ""}`;
+}
+
+function stored() {
+  try {
+    return localStorage.getItem(key()) ?? "";
+  } catch {
+    return ""; // the browser forbids storage
+  }
+}
+
+/** @param {string} cell */
+function store(cell) {
+  try {
+    localStorage.setItem(key(), cell);
+  } catch {
+    // The browser forbids storage: the choice lasts until the page closes.
+  }
+}

@@ -1,0 +1,55 @@
+// @ts-check
+/**
+ * Hints for the first visit with a touch screen: how to drive, stop, and swap views. They are shown once
+ * per device, below the bar, cover nothing, and end with the first tap on their button.
+ */
+import { t } from "../core/words.js";
+
+const KEY = "urc-hints";
+
+/**
+ * Show the hints if this device has a touch screen and has not seen them.
+ *
+ * @param {HTMLElement} root the page
+ */
+export function offerHints(root) {
+  const bands = root.querySelector("[data-bands]");
+  if (!bands || !matchMedia("(pointer: coarse)").matches || wasSeen()) return;
+  const lines = [
+    root.querySelector('[data-footprint="stick"]') ? t("Hold a stick to drive. Let go to stop.") : "",
+    root.querySelector("[data-stop-button]") ? t("STOP works at any time, without the controls.") : "",
+    root.querySelector(".urc-pip") ? t("Tap a small view to swap it with the large one.") : "",
+    t("Tap the sign of the connection to see its state and the log."),
+  ].filter(Boolean);
+  const card = document.createElement("section");
+  card.className = "urc-hints";
+  card.setAttribute("aria-label", t("Hints"));
+  const list = document.createElement("ul");
+  list.append(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "urc-button urc-button-main";
+  button.textContent = t("Got it");
+  button.addEventListener("click", () => {
+    remember();
+    card.remove();
+  });
+  card.append(list, button);
+  bands.append(card);
+}
+
+function wasSeen() {
+  try {
+    return localStorage.getItem(KEY) !== null;
+  } catch {
+    return true; // the browser forbids storage: better no hint than one at each visit
+  }
+}
+
+function remember() {
+  try {
+    localStorage.setItem(KEY, "seen");
+  } catch {
+    // The browser forbids storage.
+  }
+}
