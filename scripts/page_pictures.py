@@ -2,7 +2,7 @@
 
 It pictures the menu and every robot of the demo on each kind of screen, in each theme. The robots
 are emulated, with a data folder of their own. ``shares.md`` in the folder has the measures of each
-page in the theme light: the shares of the background and the bars, and the faults of the layout.
+page: the shares of the background and the bars, and the faults of the layout.
 ``--robots``, ``--screens`` and ``--themes`` select some of them.
 """
 
