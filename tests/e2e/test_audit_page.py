@@ -47,6 +47,9 @@ async def opened(page: Page, urc_process: Start, data: Path, query: str = "") ->
     process = urc_process(*words)
     address = str((await process.wait_for_async(r"(http://\S+)"))[1])
     await page.goto(address)
+    pages = page.get_by_role("button", name="Pages of URC")
+    if await pages.is_visible():
+        await pages.click()
     await page.get_by_role("link", name="Audit log").click()
     if query:
         await page.goto(page.url + query)
