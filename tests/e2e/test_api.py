@@ -246,7 +246,7 @@ async def test_stop_blocks_moving_commands_until_the_reset(api: httpx2.AsyncClie
     assert stopped.json()["confirmed"]
     refused = await api.post("robots/cart/commands/launch")
     assert (refused.status_code, refused.json()["code"]) == (409, "refused")
-    assert "stopped by" in refused.json()["message"]
+    assert "Stopped by" in refused.json()["message"]
     reset = await api.post("robots/cart/lease", json={"verb": "reset"})
     assert (reset.status_code, reset.json()["latched"]) == (200, "")
     left = await api.post(

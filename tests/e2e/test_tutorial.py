@@ -150,7 +150,7 @@ async def test_the_tutorial_does_what_it_says(reader: Reader, new_page: PageMake
     assert size is not None
     assert box["x"] + box["width"] > size["width"] * 0.9
     assert box["y"] + box["height"] > size["height"] * 0.9
-    assert box["x"] > size["width"] / 4
+    assert box["x"] > size["width"] / 5
 
 
 async def _level(page: Page, before: str) -> str:

@@ -288,7 +288,7 @@ async def test_a_strange_gamepad_is_learnt_kept_and_driven(new_page: PageMaker) 
     """Its axes and buttons are shown; what was learnt is kept on the device; frozen, it lets go."""
     async with shown(new_page, use("gamepad", **PLAIN)) as (robot, page):
         await fire(page, STRANGE_PAD)
-        await page.wait_for_selector(".gamepad-device:has-text('nobody knows')")
+        await page.wait_for_selector(".gamepad-device:has-text('Sticks unknown')")
         await fire(page, "pad.axes[3] = -1; pad.buttons[2].pressed = true")
         await until_text(page, ".gamepad-axis:nth-child(4)", "3: −1.00")
         await until_text(page, ".gamepad-button:nth-child(3)", "● 2")

@@ -14,7 +14,7 @@ from urc.model.values import Reading
 from urc.model.widget import Widget, WidgetPort
 from urc.runtime.one_shot_commands import HELD, needs_holding
 
-__all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
+__all__ = ["asked_before", "inputs_config", "motion_lines", "output_config", "opens_on_demand"]
 
 _NO_PORT = WidgetPort("")
 _NOTHING_GIVEN = OutputBinding()
@@ -127,15 +127,17 @@ def motion_lines(driver: Driver) -> list[str]:
 def _line(command: Command | None, driver: Driver) -> str:
     """Return the transport whose loss disables the command; "" for no such transport."""
     line = command.transport if command else ""
-    spec = driver.transports.get(line)
-    # A transport that opens on demand is only opened again by the next command. A lost one must
-    # therefore not disable the control.
-    is_made_for_it = (
-        spec is not None
-        and spec.connection == "per_request"
-        and not any(poll.transport == line for poll in driver.polls)
-    )
-    return "" if is_made_for_it else line
+    return "" if opens_on_demand(line, driver) else line
+
+
+def opens_on_demand(transport: str, driver: Driver) -> bool:
+    """Return whether only a command opens the transport.
+
+    A lost one disables no control, because the next command opens it again.
+    """
+    spec = driver.transports.get(transport)
+    is_polled = any(poll.transport == transport for poll in driver.polls)
+    return spec is not None and spec.connection == "per_request" and not is_polled
 
 
 def _ranges(

@@ -35,7 +35,7 @@ from urc.web.show.interfaces import (
     page_tabs,
 )
 from urc.web.show.layout import grid_css
-from urc.web.show.outputs import motion_lines
+from urc.web.show.outputs import motion_lines, opens_on_demand
 from urc.web.show.shown_visitor import shown_visitor
 from urc.web.show.visitor_links import sees_audit
 from urc.web.show.warnings import current_warnings
@@ -103,6 +103,8 @@ class RobotPage:
     """URL of the robot's settings; "" if the settings are fixed."""
     hints: str
     """The driver's next steps for lost connections, by transport, as a JSON object."""
+    on_demand: str
+    """Transports that only commands open, as a JSON list; the robot is not lost without them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +181,7 @@ def robot_page(
         is_emulated=is_emulated,
         settings_url=f"{url}settings" if has_settings else "",
         hints=json.dumps({name: one.hint for name, one in transports.items() if one.hint}),
+        on_demand=json.dumps([one for one in transports if opens_on_demand(one, profile.driver)]),
     )
     return render("robot.html.j2", page)
 

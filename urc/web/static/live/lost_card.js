@@ -31,6 +31,8 @@ export class LostCard {
     this.step = part(el, "[data-lost-step]");
     this.again = part(el, "[data-lost-again]");
     this.shown = "";
+    /** Transports that only commands open. @type {string[]} */
+    this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
     /** Whether a connection was good since the page was opened. */
     this.wasGood = false;
     /** Time of the present loss; 0 without one. */
@@ -49,7 +51,7 @@ export class LostCard {
    * @param {boolean} isReplay whether a recording plays, which has no robot to lose
    */
   frame(store, socket, nowMs, isReplay) {
-    const found = lossOf(store, socket);
+    const found = lossOf(store, socket, this.onDemand);
     const loss = isReplay && found?.of === "robot" ? null : found;
     if (!loss) this.wasGood ||= store.isUp && [...store.links.values()].some(isConnected);
     if (!loss) this.lostMs = 0;
@@ -109,15 +111,16 @@ export function wordsOf(loss, title) {
  *
  * @param {Store} store
  * @param {import("./socket.js").Socket} socket
+ * @param {readonly string[]} onDemand transports that only commands open: a lost one is no loss
  * @returns {Loss | null}
  */
-export function lossOf(store, socket) {
+export function lossOf(store, socket, onDemand = []) {
   if (!store.isUp) {
     if (socket.failures === 0 || socket.isShutOut) return null;
     const { reason } = socket;
     return reason && reason !== SILENT ? { of: "session", detail: reason } : { of: "server", detail: "" };
   }
-  const links = [...store.links.values()];
+  const links = [...store.links.values()].filter(({ transport }) => !onDemand.includes(transport));
   const lost = links.find(({ state }) => state === "lost");
   if (!lost || links.some(isConnected)) return null;
   const { transport, cause, address, detail } = lost;
