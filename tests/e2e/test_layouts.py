@@ -295,6 +295,20 @@ async def test_a_touch_user_sees_hints_once_that_cover_no_control(new_page: Page
         await expect(mouse.get_by_role("region", name="Hints")).to_have_count(0)
 
 
+async def test_widgets_below_the_dock_of_a_phone_take_no_taps(new_page: PageMaker) -> None:
+    """A tap that just misses STOP must not press a widget that is scrolled below the dock."""
+    names = [use.slot for use in USES]
+    robot = steered(Interface("x", "X", {"phone_portrait": column(*names)}))
+    async with driven(robot=robot) as (_, address):
+        page = await opened(new_page, address, "phone")
+        dock = await box(page, "[data-controls]")
+        x, y = dock["x"] + 3, dock["y"] + dock["height"] - 3
+        met = await page.evaluate(
+            "([x, y]) => document.elementFromPoint(x, y).closest('[data-stage]') === null", [x, y]
+        )
+        assert met
+
+
 GROUND = "[data-place='ground']"
 
 
@@ -321,7 +335,7 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
 
 
 async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:
-    """What is held stays held; the device keeps the choice for the next visit."""
+    """A held stick stays held; the device keeps the choice for the next visit."""
     robot = steered()
     signals = {name: Signal(name, "image", title=name.title()) for name in ("front", "rear")}
     uses = [USES[0], *(WidgetUse(name, "camera", {"image": name}) for name in signals)]

@@ -16,7 +16,7 @@ PATIENCE_MS = 15_000
 WIDE = {"width": 1180, "height": 820}
 LYING = {"width": 844, "height": 390}
 
-# Cards of which nothing is below the lower edge of the screen.
+# Cards that are completely on the screen.
 WHOLE_ROWS = """() => [...document.querySelectorAll("[data-robot-card]")]
   .filter((card) => card.getBoundingClientRect().bottom <= innerHeight).length"""
 

@@ -4,6 +4,7 @@ Layer 4. Pure. Transports report errors in words of the operating system or of a
 recognises the usual ones. Pages translate a cause by its name (`core/connection_causes.js`).
 """
 
+import re
 from typing import Final, Literal, NamedTuple
 
 __all__ = ["CAUSES", "Cause", "advice_on", "cause_of"]
@@ -105,6 +106,10 @@ CAUSES: Final = (
 """All known causes; the first match counts."""
 
 
+_NAMES: Final = re.compile(r"'[^']*'|[^\s:]+:\d+")
+"""Quoted names and addresses with a port: ``login.local`` and port 4030 tell no cause."""
+
+
 def cause_of(text: str, address: str = "") -> Cause:
     """Return the cause of a failed connection.
 
@@ -123,7 +128,7 @@ def advice_on(text: str, address: str = "") -> str:
 
 
 def _known(text: str, address: str) -> _Known | None:
-    lower = text.lower()
+    lower = _NAMES.sub(" ", text.lower())
     for known in CAUSES:
         if any(word in lower for word in known.words) and address.startswith(known.address):
             return known

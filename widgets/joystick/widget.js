@@ -6,7 +6,7 @@
 /** @typedef {import("../../urc/web/static/widgets/motion.js").Look} Look */
 import { gate, settingsOf } from "urc/response_curve";
 import { attribute, drawing, part, write } from "urc/kit";
-import { along, DIRECTIONS, directed, Motion, pointed, pulled, speak } from "urc/motion";
+import { along, DIRECTIONS, directed, Motion, pointed, pulled, speak, waysOf } from "urc/motion";
 
 /** Travel of the knob, and size of the face, in units of the drawing. */
 const TRAVEL = 56;
@@ -110,6 +110,20 @@ class Stick {
     this.shift = { x: (startX - left - width / 2) / scale, y: (startY - top - height / 2) / scale };
   }
 
+  /**
+   * Show the value of an axis, and tell it to screen readers in the same words.
+   *
+   * @param {Element | null} el
+   * @param {"x" | "y"} axis
+   * @param {import("../../urc/web/static/widgets/response_curve.js").Push} values
+   */
+  tell(el, axis, values) {
+    if (!el) return;
+    const [ahead, back] = waysOf(axis, this.named[axis]);
+    write(el, directed(axis, values[axis], this.named[axis], this.t));
+    speak(el, values[axis], this.t(ahead), this.t(back));
+  }
+
   /** @param {Look} look */
   draw({ push, values }) {
     const { x = 0, y = 0 } = push ?? {};
@@ -117,11 +131,8 @@ class Stick {
     const isAway = this.isFloating && push !== null && this.kind === "pointer";
     attribute(this.all, "transform", isAway ? move(this.shift.x, this.shift.y) : move(0, 0));
     attribute(this.way, "d", push ? wedge(x, y) : "");
-    const { t } = this;
-    if (this.x) write(this.x, directed("x", values["x"], this.named["x"], t));
-    if (this.y) write(this.y, directed("y", values["y"], this.named["y"], t));
-    speak(this.x, values["x"], t("forward"), t("backward"));
-    speak(this.y, values["y"], t("to the left"), t("to the right"));
+    this.tell(this.x, "x", values);
+    this.tell(this.y, "y", values);
   }
 }
 

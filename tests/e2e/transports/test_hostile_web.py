@@ -268,7 +268,7 @@ async def test_message_of_endless_nothing_ends_the_line() -> None:
 
 
 async def test_pings_without_end_and_no_ear_end_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Answers that nobody takes are not heaped up, even before the system gives up."""
+    """Unread replies are bounded, whatever the time-out of the system."""
     monkeypatch.setattr("urc.transports._stream._UNANSWERED_MS", 600_000)
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -9,12 +9,9 @@ from playwright.async_api import expect
 from tests.e2e.browser import PLAIN_HOST
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
-from tests.e2e.motion.driving import (
-    centre,
-    fingers_on,
-    fire,
-)
+from tests.e2e.motion.driving import CALM_LEASE_S, centre, fingers_on, fire, held, number
 from tests.e2e.widgets.inputs import PLAIN, drag, shown, until_values, use
+from urc.model.interface import OutputBinding
 
 pytestmark = pytest.mark.anyio
 
@@ -45,6 +42,23 @@ async def test_a_stick_goes_where_its_options_say(new_page: PageMaker) -> None:
         await page.keyboard.press("Digit2")
         await until_values(robot, x=0.3)
         await page.keyboard.up("KeyW")
+        await robot.until_stopped("go")
+
+
+async def test_a_stick_tells_the_direction_of_its_arguments(new_page: PageMaker) -> None:
+    """In the same words to eyes and ears, for inverted axes and for any name."""
+    given = {"moved": OutputBinding({"constructor": "x", "right": "y"})}
+    stick = use("joystick", invert_y=True, **PLAIN)._replace(given=given)
+    go = held("go", number("constructor"), number("right"), lease_s=CALM_LEASE_S)
+    async with shown(new_page, stick, go=go) as (robot, page):
+        await drag(page, ".joystick-pad", 0, 300)
+        await until_text(page, ".joystick-x", "forward 100 %")
+        await page.mouse.up()
+        await robot.until_stopped("go")
+        await drag(page, ".joystick-pad", 300, 0)
+        await until_text(page, ".joystick-y", "right 100 %")
+        await until_attribute(page, ".joystick-y", "aria-valuetext", "right 100 %")
+        await page.mouse.up()
         await robot.until_stopped("go")
 
 

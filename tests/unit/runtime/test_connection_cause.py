@@ -45,7 +45,9 @@ def test_errors_of_sockets(fault: OSError, cause: str) -> None:
         ("no such file or directory", "device"),
         ("nothing received for 5 s; reconnecting", "silent"),
         ("connected; the steps of the connection are not done yet", "login"),
-        ("something that nobody has seen before", ""),
+        ("no answer from 10.0.0.5:4030", "timeout"),
+        ("no such host 'login.local'", "name"),
+        ("an unusual failure", ""),
     ],
 )
 def test_messages_of_transports(text: str, cause: str) -> None:

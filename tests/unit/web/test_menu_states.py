@@ -4,6 +4,7 @@ import html
 import json
 import re
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -69,8 +70,7 @@ def test_a_connected_robot_shows_battery_and_alarms_and_comes_first(
         assert found["puppet"]["connected"] is True
         assert found["puppet"]["state"] == "live"
         assert found["puppet"]["battery"] == {"value": 77.0, "unit": "%", "alarm": ""}
-        low = lambda: robots["puppet"].set_reading("battery", 7, alarm="lolo")  # noqa: E731
-        client.portal.call(low)
+        client.portal.call(partial(robots["puppet"].set_reading, "battery", 7, alarm="lolo"))
         found = states(client)
         assert found["puppet"]["alarms"] == {"count": 1, "worst": "high"}
         assert found["puppet"]["battery"] == {"value": 7.0, "unit": "%", "alarm": "lolo"}
@@ -82,7 +82,7 @@ def test_a_stale_value_is_neither_a_battery_nor_an_alarm(
     with client.websocket_connect("ws://localhost:8080/ws?robot=puppet", headers=OURS) as line:
         assert line.receive_json()["t"] == "hello"
         assert client.portal is not None
-        old = lambda: robots["puppet"].set_reading("battery", 7, alarm="lolo", age_s=4.0)  # noqa: E731
+        old = partial(robots["puppet"].set_reading, "battery", 7, alarm="lolo", age_s=4.0)
         client.portal.call(old)
         found = states(client)["puppet"]
         assert found["battery"] is None

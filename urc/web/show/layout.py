@@ -13,8 +13,8 @@ Over a background, each widget has the size of its footprint, at the side of the
 slot is. Empty rows and columns take the remaining space: there the background is visible. On a
 phone in portrait, the background takes the height that the widgets below leave.
 
-STOP is at the bottom of the screen, in the middle. Widgets end above it, except sticks in the lower
-corners: they reach down next to it.
+STOP is at the bottom of the screen, in the middle. Widgets end above STOP. In the lower corners,
+sticks reach down next to it, and over a background buttons and values do, too.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -41,6 +41,7 @@ _LOW_ROW = "minmax(6.5rem,1fr)"
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
 """Sizes of rows and columns over a background: with a widget, and empty."""
 _PHONE_WINDOW = "minmax(min-content,.01fr)"
+"""Size of an empty or growing row on a phone in portrait: the background takes nearly all space."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: as much as the widgets below leave."""
 _LOW_OVER = ("stick", "button", "value")

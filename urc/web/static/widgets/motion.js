@@ -172,10 +172,15 @@ export function signed(value) {
   return Number(text) === 0 ? text : `${share < 0 ? "−" : "+"}${text}`;
 }
 
-/** Directions of a positive and a negative value, by argument or else by axis. @type {Record<string, [string, string]>} */
-const WAYS = {
+/** @typedef {readonly [string, string]} Ways Words for a positive and a negative value. */
+
+/** @type {Record<"x" | "y", Ways>} */
+const AXIS_WAYS = {
   x: [mark("forward"), mark("backward")],
   y: [mark("left"), mark("right")],
+};
+/** Words of arguments that name their direction. @type {Record<string, Ways>} */
+const ARGUMENT_WAYS = {
   forward: [mark("forward"), mark("backward")],
   left: [mark("left"), mark("right")],
   right: [mark("right"), mark("left")],
@@ -186,6 +191,19 @@ const WAYS = {
 /** Mark a text for the catalogues; it is translated when it is shown. @param {string} text */
 function mark(text) {
   return text;
+}
+
+/**
+ * Return the words for both directions of an axis, untranslated.
+ *
+ * @param {"x" | "y"} axis
+ * @param {import("../core/types.js").Argument | undefined} argument argument that the axis sets
+ * @returns {Ways}
+ */
+export function waysOf(axis, argument) {
+  const name = argument?.name ?? "";
+  const named = Object.hasOwn(ARGUMENT_WAYS, name) ? ARGUMENT_WAYS[name] : undefined;
+  return named ?? AXIS_WAYS[axis];
 }
 
 /**
@@ -203,7 +221,7 @@ export function directed(axis, value, argument, t) {
   const digits = Math.abs(reach) < 20 ? 2 : 0;
   const figure = argument?.unit ? size.toFixed(digits) : Math.round(Math.abs(share) * 100).toFixed(0);
   if (Number(figure) === 0) return "";
-  const [ahead, back] = WAYS[argument?.name ?? ""] ?? WAYS[axis] ?? ["", ""];
+  const [ahead, back] = waysOf(axis, argument);
   const way = argument?.title ? `${argument.title} ${share < 0 ? "−" : "+"}` : `${t(share < 0 ? back : ahead)} `;
   return `${way}${figure} ${argument?.unit || "%"}`;
 }
