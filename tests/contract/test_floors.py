@@ -21,6 +21,7 @@ FLOORS = {
     "wire": 3.5,  # what the server and its clients say to each other: they share nothing else
     "guard": 3.5,  # a landing: it stands on transports and motion, and sessions stand on it
     "config": 3, "protocol": 3, "transports": 3, "packages": 3, "motion": 3,
+    "alarms": 3,
     "model": 2,
     "source": 1, "registry": 1, "shipped": 1, "private_files": 1, "expressions": 1, "patterns": 1,
     "images": 1,
@@ -29,7 +30,7 @@ FLOORS = {
 }  # fmt: skip
 
 # Pure floors do no I/O and have no clock: that is why they can be tested to the last byte.
-PURE = {"model", "protocol", "motion", "wire"}
+PURE = {"model", "protocol", "motion", "alarms", "wire"}
 IMPURE = {"asyncio", "socket", "ssl", "threading", "starlette", "uvicorn", "websockets"}
 
 

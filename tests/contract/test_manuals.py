@@ -149,3 +149,19 @@ def test_page_says_what_happens_when_control_is_lost(tmp_path: Path) -> None:
     assert "## When control is lost\n\n" in page
     assert "- `set`: `level 0, side a`\n" in page
     assert "  - The document does not say whether the robot stops by itself.\n" in page
+
+
+def test_page_has_the_alarm_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Operators look up cause and action of an alarm, and when it is suppressed."""
+    head, tail = LAMP.split("    limits: { high: 9, hysteresis: 1 }\n")
+    limits = (
+        "    limits: { high: { at: 9, cause: Dirt, action: Clean it. }, suppressed_when: level > 20"
+        ", states: { off|dark: { priority: high } } }\n"
+    )
+    file = tmp_path / "lamp.yaml"
+    file.write_text(head + limits + tail, "utf-8")
+    assert main(["docs", str(file)]) == 0
+    page = capsys.readouterr().out
+    assert "### Alarms\n\n| signal | alarm | priority | cause | action | suppressed when |" in page
+    assert "| `level` | warning at or above 9 | medium | Dirt | Clean it. | `level > 20` |" in page
+    assert "| `level` | off\\|dark | high |  |  | `level > 20` |" in page

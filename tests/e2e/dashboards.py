@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 from playwright.async_api import Page
 from websockets.asyncio.client import ClientConnection
@@ -30,9 +31,11 @@ async def running_dashboard(
     access: Access = ACCESS,
     certificates: Certificates | None = None,
     handshakes: Handshakes | None = None,
+    data: Path | None = None,
 ) -> AsyncIterator[str]:
     """Serve the robots on this machine; give the address, and end cleanly.
 
+    With `data`, alarms, latches and the audit log are kept in this folder.
     Foreign widgets live in frames, but for those whose names are `trusted`. With `certificates`,
     the address is one of HTTPS.
     """
@@ -44,6 +47,7 @@ async def running_dashboard(
         linger_s=0.2,
         trusted=trusted,
         certificates=certificates,
+        data=data,
     )
     task = asyncio.create_task(
         serve(

@@ -1,9 +1,8 @@
-// What the command widgets reckon: steps, dials, typed numbers and bytes, lines, alerts, round trips.
+// What the command widgets reckon: steps, dials, typed numbers and bytes, lines, round trips.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { boundsOf, keyed, snapped } from "../../urc/web/static/widgets/command_kit.js";
-import { Book } from "../../widgets/alerts/book.js";
 import { Pull, angleOf, arc, ray, shareAt } from "../../widgets/knob/dial.js";
 import { quality, Trips } from "../../widgets/link/trips.js";
 import { chosen, fileOf } from "../../widgets/log/lines.js";
@@ -141,23 +140,6 @@ test("lines are chosen by level and by all words, the newest of them", () => {
   assert.deepEqual(numbers({ words: "ANSWER wire" }), [1]);
   assert.deepEqual(numbers({ most: 1 }), [2]);
   assert.equal(fileOf(LINES.slice(1, 2)), "1970-01-01T00:00:01.000Z\twarning\twire\tlate answer\n");
-});
-
-test("an alert is new once, again when it is worse, and again when its rest is over", () => {
-  const book = new Book(null);
-  const alert = (alarm) => [{ signal: "v", title: "V", alarm, text: "1", unit: "", since: 0 }];
-  assert.equal(book.take(alert("low"), 0).length, 1);
-  assert.equal(book.take(alert("low"), 1).length, 0);
-  book.acknowledge("v");
-  assert.equal(book.state("v", 1), "seen");
-  assert.equal(book.take(alert("lolo"), 2).length, 1);
-  assert.equal(book.state("v", 2), "new");
-  book.shelve("v", 100);
-  assert.equal(book.state("v", 50), "shelved");
-  assert.equal(new Book(book.kept()).take(alert("lolo"), 60).length, 0);
-  assert.equal(book.take(alert("lolo"), 101).length, 1);
-  book.take([], 102);
-  assert.equal(book.take(alert("lolo"), 103).length, 1);
 });
 
 test("round trips have a middle, a tail and a grade", () => {

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { RenderBudget } from "../../urc/web/static/widgets/render_budget.js";
-import { Alerts, PageTopics, Log } from "../../urc/web/static/live/page_topics.js";
+import { PageTopics, Log } from "../../urc/web/static/live/page_topics.js";
 import { frameOf } from "../../urc/web/static/live/frames.js";
 import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/widgets/kit.js";
 import { Decoder } from "../../urc/web/static/widgets/image_decoder.js";
@@ -167,18 +167,6 @@ function storeOf(...signals) {
   store.setUp(true, 0);
   return store;
 }
-
-test("alarms are told the worst first, each since it began", () => {
-  const store = storeOf({ title: "A" }, { title: "B" });
-  const alerts = new Alerts();
-  store.values({ n: 0, i: [0, 1], v: [1, 2], a: [0, 0], s: ["high", "lolo"] }, 0);
-  const first = alerts.news(store, 1000).value;
-  assert.deepEqual(first.map(({ title, alarm, since }) => [title, alarm, since]), [
-    ["B", "lolo", 1], ["A", "high", 1],
-  ]);
-  store.values({ n: 1, i: [1], v: [2], a: [0] }, 1);
-  assert.deepEqual(alerts.news(store, 2000).value.map(({ title, since }) => [title, since]), [["A", 1]]);
-});
 
 test("elements of an array are converted like a number, and its limits too", () => {
   const store = storeOf({ type: "array", unit: "rad", max: 2, limits: { high: 1 } });

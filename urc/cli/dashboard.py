@@ -28,6 +28,8 @@ from urc.runtime.session import Motion, Session
 from urc.runtime.settings_store import StoredSettings
 from urc.simulator.emulated_profile import stand_in
 from urc.simulator.emulated_robot import EmulatedRobot
+from urc.web.alarms.notifier import AlarmNotifier
+from urc.web.alarms.notify_options import NotifyOptions
 from urc.web.app import Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
@@ -74,6 +76,10 @@ class DashboardAddress:
     """Certificate of HTTPS, and public names of a web server in front of this one."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
     """Options of the ways to sign in."""
+    monitors: bool = False
+    """Whether robots stay connected for their alarms, unless their settings say otherwise."""
+    notify: NotifyOptions | None = None
+    """Hook for notifications of alarms; None sends no notification."""
 
 
 def run_dashboard(
@@ -161,6 +167,7 @@ async def _serve(
             recordings=place.recordings,
             certificates=certificates,
             sign_in=place.sign_in,
+            notifier=AlarmNotifier(place.notify) if place.notify is not None else None,
         )
         gc.collect()
         gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us
@@ -191,8 +198,13 @@ async def _robot_at_start(
     redirected = await stack.enter_async_context(
         stand_in(robot.profile, robot.settings, emulated_robot)
     )
-    robot = _robot(place, None, redirected, robot.settings)
-    return replace(robot, glimpse=partial(_seen, emulated_robot), is_emulated=True)
+    made = _robot(place, None, redirected, robot.settings)
+    return replace(
+        made,
+        glimpse=partial(_seen, emulated_robot),
+        is_emulated=True,
+        is_monitored=robot.is_monitored,
+    )
 
 
 @asynccontextmanager
@@ -216,6 +228,7 @@ def workshop_of(
         tried=partial(_session, "none", None, faulty),
         given=given,
         shows_installed=place.shows_installed,
+        monitors=place.monitors,
     )
 
 

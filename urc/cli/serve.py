@@ -15,6 +15,7 @@ from urc.cli.tls_options import add_tls, tls_of
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
+    from urc.web.alarms.notify_options import NotifyOptions
     from urc.web.people.ways_in import SignInOptions
 
 EXAMPLE = "urc serve puppet --set host=192.168.1.20"
@@ -68,6 +69,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="for debugging: send motion commands without a guard process;"
         " if this process hangs, robots are not stopped",
+    )
+    parser.add_argument(
+        "--monitor-alarms",
+        dest="monitors",
+        action="store_true",
+        help="keep all robots with alarms connected, so that alarms are judged with no page open",
+    )
+    parser.add_argument(
+        "--notify-alarms",
+        dest="notify",
+        metavar="FILE",
+        help="file with a command or URL that gets new alarms: see docs/alarms.md",
     )
     for flag, text in (
         ("--data-dir", "data folder for latched stops, audit log and settings"),
@@ -141,6 +154,8 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.record,
             tls=tls_of(arguments),
             sign_in=_sign_in(arguments),
+            monitors=arguments.monitors,
+            notify=_notify(arguments),
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,
@@ -162,6 +177,19 @@ def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
 
     oidc = read_oidc_options(arguments.oidc) if arguments.oidc else None
     return SignInOptions(oidc, tuple(read_proxy_options(file) for file in arguments.proxies))
+
+
+def _notify(arguments: argparse.Namespace) -> "NotifyOptions | None":
+    """Return the hook for notifications of alarms.
+
+    Raises:
+        ProblemsError: the file has mistakes.
+    """
+    if not arguments.notify:
+        return None
+    from urc.web.alarms.notify_options import read_notify_options
+
+    return read_notify_options(arguments.notify)
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -47,6 +47,10 @@ class ServerAddress(NamedTuple):
         """Return the address of a robot's STOP."""
         return f"{self.url}/api/v1/robots/{quote(robot, safe='')}/stop"
 
+    def alarms(self, robot: str, verb: str) -> str:
+        """Return the address of an action on a robot's alarms, such as ``acknowledge``."""
+        return f"{self.url}/api/v1/robots/{quote(robot, safe='')}/alarms/{verb}"
+
 
 def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAddress:
     """Return the address of a server.

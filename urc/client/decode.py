@@ -105,7 +105,7 @@ def progress_of(message: ProgressMessage) -> Iterator[SequenceProgress]:
 
 
 def _signal(row: SignalRow) -> Signal:
-    limits = {name: value for name, value in (row.limits or {}).items() if name in _LIMITS}
+    limits = row.limits or {}
     return Signal(
         name=row.name,
         type=row.type if row.type in _TYPES else "object",  # type: ignore[arg-type]
@@ -115,10 +115,9 @@ def _signal(row: SignalRow) -> Signal:
         max=row.max,
         precision=row.precision,
         states=tuple((row.states or {}).items()),
-        limits=AlarmLimits(**limits),
+        limits=AlarmLimits(
+            limits.get("lolo"), limits.get("low"), limits.get("high"), limits.get("hihi")
+        ),
         stale_after_s=row.stale_after_s,
         axes=row.axes if row.axes in _AXES else "",  # type: ignore[arg-type]
     )
-
-
-_LIMITS = ("lolo", "low", "high", "hihi")

@@ -17,13 +17,13 @@ import asyncio
 import logging
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager, suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from ssl import SSLContext
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from urc.client.address import ServerAddress, read_token, server_address, trust
 from urc.client.decode import (
@@ -36,6 +36,7 @@ from urc.client.decode import (
     signals_of,
 )
 from urc.client.readings import HubReadings
+from urc.client.remote_alarms import RemoteAlarms
 from urc.client.remote_commands import RemoteCommands
 from urc.client.remote_motion import ControlMessage, RemoteMotion, plain_arguments
 from urc.client.robot import ConnectionLost
@@ -50,6 +51,7 @@ from urc.wire.client_messages import (
 )
 from urc.wire.picture import read_picture
 from urc.wire.server_messages import (
+    AlarmsMessage,
     ErrorMessage,
     HelloMessage,
     LinksMessage,
@@ -66,7 +68,7 @@ _MOST_IMAGES: Final = 64
 _GOODBYE_S: Final = 1.5
 _LINKS_S: Final = 1.0
 """Maximum wait for the state of the transports, which follows the first message, in seconds."""
-_STOP_POST_S: Final = 3.0
+_POST_S: Final = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -138,6 +140,8 @@ class RemoteRobot(HubReadings):
         self.motion = RemoteMotion(socket)
         """The controls of this program."""
         self.motion.is_connecting = self._is_connecting
+        self.alarms = RemoteAlarms(self._post_alarms)
+        """The robot's alarms as the server lists them."""
         self._commands = RemoteCommands(socket)
         self._socket = socket
         self._address = address
@@ -301,6 +305,8 @@ class RemoteRobot(HubReadings):
                 self.motion.wake()
             case LogMessage():
                 self._add_lines(message, now)
+            case AlarmsMessage():
+                self.alarms.take(message)
             case ProgressMessage():
                 for progress in progress_of(message):
                     self.hub.set_progress(progress)
@@ -320,6 +326,7 @@ class RemoteRobot(HubReadings):
         if self._session and hello.session != self._session:
             self._next_line = 0
         self._session = hello.session
+        self.alarms.clear()
         if self._ready.is_set():
             self._note("info", "the connection is back")
         else:
@@ -367,21 +374,38 @@ class RemoteRobot(HubReadings):
 
     async def _post_stop(self) -> bool:
         """Send STOP over HTTP; return whether the robot accepted the stop."""
-        import httpx2  # takes time to import, and only a silent server needs it
+        said = await self._post(self._address.stop(self._robot or self._name), None, "STOP")
+        return bool(said["confirmed"])
+
+    async def _post_alarms(self, verb: str, body: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Send an action on alarms over HTTP, and return the server's answer."""
+        address = self._address.alarms(self._robot or self._name, verb)
+        return await self._post(address, body, "the request")
+
+    async def _post(
+        self, address: str, body: Mapping[str, Any] | None, what: str
+    ) -> Mapping[str, Any]:
+        """Send a request over HTTP, and return its answer.
+
+        Raises:
+            ConnectionLost: the server could not be reached.
+            UrcError: the server refused the request.
+        """
+        import httpx2  # takes time to import, and few programs need it
 
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
         try:
             async with httpx2.AsyncClient(
                 verify=self._context if self._context is not None else True,
                 trust_env=not self._address.is_loopback,
-                timeout=_STOP_POST_S,
+                timeout=_POST_S,
             ) as client:
-                answer = await client.post(
-                    self._address.stop(self._robot or self._name), headers=headers
-                )
+                answer = await client.post(address, headers=headers, json=body)
                 said = answer.json()
         except (httpx2.HTTPError, OSError, ValueError) as error:
-            raise ConnectionLost(f"STOP could not be delivered: {error}") from error
+            raise ConnectionLost(f"{what} could not be delivered: {error}") from error
+        if not isinstance(said, dict):
+            raise UrcError(f"the server answered {answer.status_code}")
         if not answer.is_success:
             raise UrcError(str(said.get("error", f"the server answered {answer.status_code}")))
-        return bool(said["confirmed"])
+        return said

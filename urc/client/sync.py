@@ -31,13 +31,16 @@ from os import PathLike
 from typing import Any, Final, TypeVar
 
 from urc.client.loop_thread import LoopThread
+from urc.client.remote_alarms import RemoteAlarms
 from urc.client.robot import RobotInterface
 from urc.client.stick import TICK_S, VALID_S, MotionEnded, Stick
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Signal, Value
+from urc.problems import UrcError
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry
+from urc.wire.server_messages import AlarmRow
 
-__all__ = ["CALL_S", "SyncRobot", "SyncStick", "connect", "open"]
+__all__ = ["CALL_S", "SyncAlarms", "SyncRobot", "SyncStick", "connect", "open"]
 
 CALL_S: Final = 30.0
 """Default time limit of one call, in seconds."""
@@ -233,6 +236,14 @@ class SyncRobot:
         """
         self._thread.call(self._robot.reset())
 
+    @property
+    def alarms(self) -> "SyncAlarms":
+        """The robot's alarms; raise `UrcError` for a robot that no server lists."""
+        found = getattr(self._robot, "alarms", None)
+        if not isinstance(found, RemoteAlarms):
+            raise UrcError("alarms are listed by a server: use urc.client.sync.open")
+        return SyncAlarms(found, self._thread)
+
     def _here(self, read: Callable[[], _Result]) -> _Result:
         """Return the result of `read`, called on the event loop."""
 
@@ -257,6 +268,52 @@ class SyncRobot:
 
 async def _closed(found: AsyncGenerator[Any, None]) -> None:
     await found.aclose()
+
+
+class SyncAlarms:
+    """The alarms of a robot of a server; see `urc.client.remote_alarms.RemoteAlarms`."""
+
+    def __init__(self, alarms: RemoteAlarms, thread: LoopThread) -> None:
+        self._alarms = alarms
+        self._thread = thread
+
+    @property
+    def active(self) -> tuple[AlarmRow, ...]:
+        """Active alarms that are neither shelved nor suppressed, in first-out order."""
+        return self._thread.call(self._read(lambda: self._alarms.active))
+
+    @property
+    def rows(self) -> dict[str, AlarmRow]:
+        """All alarms that are not normal, by signal."""
+        return self._thread.call(self._read(lambda: dict(self._alarms.rows)))
+
+    def acknowledge(self, *signals: str) -> tuple[str, ...]:
+        """Acknowledge alarms as this program knows them; without names, all that wait for it.
+
+        Raises:
+            UrcError: the server refused, or could not be reached.
+        """
+        return self._thread.call(self._alarms.acknowledge(*signals))
+
+    def shelve(self, *signals: str, for_s: float) -> tuple[str, ...]:
+        """Shelve alarms for a time in seconds, at most 24 hours; return the shelved signals.
+
+        Raises:
+            UrcError: the server refused, or could not be reached.
+        """
+        return self._thread.call(self._alarms.shelve(*signals, for_s=for_s))
+
+    def unshelve(self, *signals: str) -> tuple[str, ...]:
+        """End the shelves of alarms; return the signals that were shelved.
+
+        Raises:
+            UrcError: the server refused, or could not be reached.
+        """
+        return self._thread.call(self._alarms.unshelve(*signals))
+
+    @staticmethod
+    async def _read(read: Callable[[], _Result]) -> _Result:
+        return read()
 
 
 class SyncStick:

@@ -15,16 +15,19 @@ from urc.expressions import Template
 __all__ = [
     "PLAIN",
     "Alarm",
+    "AlarmAttributes",
+    "AlarmLimits",
+    "AlarmPriority",
     "Axes",
     "Conversion",
     "ElementType",
-    "AlarmLimits",
     "NOTHING",
     "Reading",
     "Sample",
     "Signal",
     "SignalType",
     "Value",
+    "state_texts",
 ]
 
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
@@ -40,12 +43,27 @@ Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
 """Value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
 """Axis convention of a value; "": not declared."""
-Alarm = Literal["", "lolo", "low", "high", "hihi"]
-"""Alarm limit that a value has crossed; "": no alarm."""
+Alarm = Literal["", "lolo", "low", "high", "hihi", "minor", "major"]
+"""Alarm limit that a value has crossed, or severity of an alarm state, both named as in EPICS; "":
+no alarm."""
+AlarmPriority = Literal["low", "medium", "high"]
+"""Priority of an alarm, as in ISA-18.2."""
+
+
+class AlarmAttributes(NamedTuple):
+    """Attributes of one alarm for operators, named as in ISA-18.2."""
+
+    priority: AlarmPriority = "medium"
+    cause: str = ""
+    """Usual cause of the alarm."""
+    action: str = ""
+    """Operator action."""
+    suppressed_when: Template | None = None
+    """Expression over signals; the alarm is suppressed by design while it is true."""
 
 
 class AlarmLimits(NamedTuple):
-    """Alarm limits in the unit of the signal, named as in EPICS."""
+    """Alarm limits in the unit of the signal, named as in EPICS, and alarm states."""
 
     lolo: float | None = None
     low: float | None = None
@@ -54,7 +72,42 @@ class AlarmLimits(NamedTuple):
     hysteresis: float = 0.0
     """Hysteresis of the alarm, in the unit of the signal."""
     for_s: float = 0.0
-    """Minimum time beyond a limit before the alarm begins, in seconds."""
+    """On-delay: minimum time beyond a limit before the alarm begins, in seconds."""
+    off_delay_s: float = 0.0
+    """Minimum time of normal values before the alarm ends, in seconds."""
+    states: tuple[str, ...] = ()
+    """Values that cause an alarm, as text; a boolean is ``true`` or ``false``."""
+    attributes: tuple[tuple[str, AlarmAttributes], ...] = ()
+    """Pairs of a limit or alarm state and the attributes of its alarm."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no value can cause an alarm."""
+        limits = (self.lolo, self.low, self.high, self.hihi)
+        return not self.states and all(limit is None for limit in limits)
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether an alarm can begin or end without a new value."""
+        return self.for_s > 0 or self.off_delay_s > 0
+
+    def attributes_of(self, condition: str) -> AlarmAttributes:
+        """Return the attributes of a limit or alarm state; default attributes if it has none."""
+        usual = AlarmAttributes("high" if condition in ("lolo", "hihi") else "medium")
+        return next((one for name, one in self.attributes if name == condition), usual)
+
+
+def state_texts(value: Reading) -> tuple[str, ...]:
+    """Return a value, or each element of an array, as the text that alarm states compare."""
+    if isinstance(value, bool):
+        return ("true" if value else "false",)
+    if isinstance(value, str):
+        return (value,)
+    if isinstance(value, int):
+        return (str(value),)
+    if isinstance(value, tuple):
+        return tuple(text for one in value for text in state_texts(one))
+    return ()
 
 
 class Conversion(NamedTuple):

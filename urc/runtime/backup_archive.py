@@ -34,7 +34,8 @@ __all__ = [
 ]
 
 PARTS: Final = re.compile(
-    r"(?:access\.sqlite|audit\.sqlite|known_hosts|publisher\.pem|contact-times\.json"
+    r"(?:access\.sqlite|alarms\.sqlite|audit\.sqlite|known_hosts|publisher\.pem"
+    r"|contact-times\.json"
     r"|tls/\w[\w.-]{0,100}|robots/[\w%~-][\w.%~-]{0,250}\.json"
     r"|latches/(?:emulated/)?\w[\w.-]{0,100}\.latch\.json"
     r"|packages/(?:state|blocks)\.json|packages/blobs/[0-9a-f]{64}\.zip"

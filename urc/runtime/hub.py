@@ -271,6 +271,7 @@ class Hub:
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
+        self._sinks: list[Callable[[Sequence[Sample]], None]] = []
         self._taps: set[EventTap] = set()
         self._traffic_taps: set[EventTap] = set()
 
@@ -286,6 +287,8 @@ class Hub:
             self._changed[sample.signal] = revision
         if self.streams:
             self.streams.append(taken, revision)
+        for sink in self._sinks:
+            sink(taken)
         for tap in self._taps:
             tap.push(taken)
         self._wake()
@@ -404,6 +407,18 @@ class Hub:
             yield
         finally:
             self._wakers.discard(wake)
+
+    @contextmanager
+    def passed_to(self, sink: Callable[[Sequence[Sample]], None]) -> Iterator[None]:
+        """Call `sink` with all samples of each frame while the context is open.
+
+        `sink` must return immediately and raise nothing.
+        """
+        self._sinks.append(sink)
+        try:
+            yield
+        finally:
+            self._sinks.remove(sink)
 
     @contextmanager
     def tap(self, *, with_traffic: bool = False) -> Iterator[EventTap]:

@@ -105,6 +105,29 @@ def _signals(signals: Mapping[str, Signal]) -> Iterator[str]:
     header = ("signal", "", "type", "unit", "range", "limits", "states", "old after")
     yield from _table(header, rows)
     yield from _descriptions(signals.values())
+    yield from _alarms(signals.values())
+
+
+def _alarms(signals: Iterable[Signal]) -> Iterator[str]:
+    """Yield the alarm response table: priority, cause and action of each alarm."""
+    rows = []
+    for signal in signals:
+        limits = signal.limits
+        for name, text in _LIMITS:
+            if (value := getattr(limits, name)) is not None:
+                rows.append(_alarm(signal, name, text.format(f"{value:g}")))
+        rows += [_alarm(signal, word, _plain(word)) for word in limits.states]
+    if any(cause or action or suppressed for *_, cause, action, suppressed in rows):
+        yield from ("", "### Alarms", "")
+        header = ("signal", "alarm", "priority", "cause", "action", "suppressed when")
+        yield from _table(header, rows)
+
+
+def _alarm(signal: Signal, condition: str, text: str) -> tuple[str, ...]:
+    one = signal.limits.attributes_of(condition)
+    suppressed = "" if one.suppressed_when is None else _code(one.suppressed_when.source)
+    name = _code(signal.name)
+    return (name, text, one.priority, _plain(one.cause), _plain(one.action), suppressed)
 
 
 def _limits(limits: AlarmLimits) -> str:
@@ -115,6 +138,7 @@ def _limits(limits: AlarmLimits) -> str:
     ]
     if told and limits.hysteresis:
         told.append(f"hysteresis {limits.hysteresis:g}")
+    told += [_plain(word) for word in limits.states[:_SHOWN_TEXTS]]
     return ", ".join(told)
 
 

@@ -196,6 +196,20 @@ class ServerRecorder:
         """Record an event of a recording; `file` is its name without a folder."""
         self._record("recording", actor, step, robot, {"file": file}, outcome)
 
+    def alarm(
+        self, actor: Actor, robot: str, step: str, signals: Iterable[str], **about: object
+    ) -> None:
+        """Record an operator's action on alarms.
+
+        Args:
+            actor: the person, device or program.
+            robot: name of the robot.
+            step: the action: ``acknowledged``, ``shelved`` or ``unshelved``.
+            signals: signals of the alarms.
+            about: further facts, such as the time of a shelf.
+        """
+        self._record("alarm", actor, step, robot, {"signals": [*signals], **about})
+
     def audit_exported(self, actor: Actor) -> None:
         """Record the download of the audit log."""
         self._record("audit", actor, "exported")

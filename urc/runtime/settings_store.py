@@ -42,6 +42,8 @@ class StoredSettings(msgspec.Struct, frozen=True):
     package: _Name = ""
     """Package to which the settings belong, such as ``drivers/puppet``; "" for a document given by
     path."""
+    monitors_alarms: bool | None = None
+    """Whether the robot stays connected for its alarms; None for the choice of the server."""
 
 
 class SettingsStore:

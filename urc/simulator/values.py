@@ -49,9 +49,10 @@ def plausible(signal: Signal, now_s: float) -> Reading:
 
 def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: float) -> Value:
     if signal.states:
-        return signal.states[0][1]
+        words = [word for _, word in signal.states]
+        return next((word for word in words if word not in signal.limits.states), words[0])
     if kind == "boolean":
-        return False
+        return "false" in signal.limits.states
     if kind == "string":
         return signal.name
     low, high = _range(signal)

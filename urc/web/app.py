@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import quote
 
 import msgspec
@@ -23,17 +24,23 @@ from starlette.websockets import WebSocket
 
 from urc import __version__
 from urc.model.profile import Profile
+from urc.runtime.alarm_store import AlarmStore
+from urc.runtime.alarm_table import FILE as ALARM_FILE
 from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
+from urc.runtime.clock import LoopClock
 from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
+from urc.runtime.robot_alarms import RobotAlarms
 from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
 from urc.web.access_page import AccessMiddleware
+from urc.web.alarms.notifier import AlarmNotifier
+from urc.web.alarms.routes import AlarmCalls, alarm_key
 from urc.web.api.calls import api_routes
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
@@ -65,6 +72,7 @@ from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
 from urc.web.serve.replies import API, Endpoint, told
 from urc.web.serve.rights import (
+    DRIVE,
     LOCAL,
     MAINTAIN_SERVER,
     SIGNED_IN,
@@ -107,6 +115,7 @@ def build_app(
     recordings: Path | None = None,
     certificates: Certificates | None = None,
     sign_in: SignInOptions = SignInOptions(),  # noqa: B008 - immutable
+    notifier: AlarmNotifier | None = None,
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -127,6 +136,7 @@ def build_app(
         recordings: folder of the recordings; None for a server that records nothing.
         certificates: certificates of HTTPS, whose authority devices may trust; None for plain HTTP.
         sign_in: options of the ways to sign in.
+        notifier: receives new alarms of all robots; None sends no notification.
 
     Raises:
         UrcError: two robots use different widgets of the same name, or a way to sign in needs an
@@ -136,7 +146,8 @@ def build_app(
     if audit is None and data is not None:
         audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
-    fleet = _fleet(robots, data, audit, linger_s)
+    alarms = AlarmStore(data / ALARM_FILE) if data is not None else None
+    fleet = _fleet(robots, _Stores(data, audit, alarms, notifier), linger_s)
     contacts = ContactWatch(lambda: fleet.stations, data)
     routes = _Routes(
         fleet=fleet,
@@ -150,6 +161,9 @@ def build_app(
         recording_calls=RecordingCalls(lambda: fleet.stations, recordings, recorder),
         robot_calls=RobotCalls(lambda: fleet.stations, access.followed, contacts.times),
         contacts=contacts,
+        alarm_calls=AlarmCalls(lambda: fleet.stations, alarms, recorder, notifier),
+        alarms=alarms,
+        notifier=notifier,
         audit=audit,
         recorder=recorder,
         ways_in=WaysIn(access, recorder, sign_in),
@@ -175,23 +189,47 @@ def build_app(
 
 
 def _unread(entry: AuditEntry) -> None:
-    """Ignore the entry, because this server has no audit log."""
+    """Ignore the entry."""
 
 
-def _fleet(
-    robots: Mapping[str, Robot], data: Path | None, audit: AuditLog | None, linger_s: float
-) -> Fleet:
+class _Stores(NamedTuple):
+    """The lasting data of all robots."""
+
+    data: Path | None
+    audit: AuditLog | None
+    alarms: AlarmStore | None
+    notifier: AlarmNotifier | None
+
+
+def _fleet(robots: Mapping[str, Robot], stores: _Stores, linger_s: float) -> Fleet:
     turn = asyncio.Lock()
     return Fleet(
         robots,
         lambda name, robot: RobotService(
             robot,
             linger_s=linger_s,
-            latch=_latch(data, robot),
-            recorder=_recorder(audit, name, robot),
+            latch=_latch(stores.data, robot),
+            recorder=_recorder(stores.audit, name, robot),
             turn=turn,
+            alarms=_alarms(stores, name, robot),
         ),
     )
+
+
+def _alarms(stores: _Stores, name: str, robot: Robot) -> RobotAlarms:
+    """Return the alarms of a robot; those of a playback are neither stored nor notified."""
+    is_live = robot.playback is None
+    found = RobotAlarms(
+        robot.profile.driver,
+        LoopClock(),
+        time.time,
+        key=alarm_key(name, is_emulated=robot.is_emulated),
+        memory=stores.alarms if is_live else None,
+        is_monitored=robot.is_monitored and is_live,
+    )
+    if stores.notifier is not None and is_live:
+        found.on_events = partial(stores.notifier.take, name, robot.profile.title or name, found)
+    return found
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchStore | None:
@@ -280,7 +318,10 @@ class _Routes:
     recording_calls: RecordingCalls
     robot_calls: RobotCalls
     contacts: ContactWatch
+    alarm_calls: AlarmCalls
     ways_in: WaysIn
+    alarms: AlarmStore | None = None
+    notifier: AlarmNotifier | None = None
     audit: AuditLog | None = None
     data: Path | None = None
     trust: WidgetTrust = field(default_factory=WidgetTrust)
@@ -320,6 +361,7 @@ class _Routes:
             "playback": self.recording,
             "playback_move": self.move,
             **self.robot_calls.endpoints(),
+            **self.alarm_calls.endpoints(),
             **self.recording_calls.endpoints(),
         }
 
@@ -394,6 +436,10 @@ class _Routes:
                     await self.manager.close()
         finally:
             self.recorder.server("ended", __version__)
+            if self.notifier is not None:
+                await asyncio.to_thread(self.notifier.close)
+            if self.alarms is not None:
+                await asyncio.to_thread(self.alarms.close)
             if self.audit:  # closed last: it records the stops at the end
                 await asyncio.to_thread(self.audit.close)
 
@@ -454,6 +500,7 @@ class _Routes:
             is_part="part" in query,
             is_emulated=robot.is_emulated,
             has_settings=self.ways.has_managers and robot.playback is None,
+            may_act=visitor_of(request).may(DRIVE, name),
             trust=self.trust,
         )
         return HTMLResponse(html, headers=_PAGE)

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 from urc.runtime.one_shot_commands import OUT_OF_SCOPE
 from urc.web.drive.command_runner import CommandOutcome
 from urc.web.drive.control_service import OperatorSession
+from urc.web.feed.alarm_feed import AlarmPlace
 from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
 from urc.web.feed.fanout import Place
 from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missing_settings
@@ -62,6 +63,7 @@ class BrowserClient:
         self._answers: deque[str] = deque()
         self._pong = ""
         self._place = Place()
+        self._alarm_place = AlarmPlace()
         self._live: LiveSession | None = None
         """The robot's open session; None until the page has received the indexes of the session's
         values."""
@@ -118,6 +120,7 @@ class BrowserClient:
 
     async def _converse(self, live: LiveSession, first: Message | None) -> None:
         self._place = live.fanout.join(self._flushed)
+        self._alarm_place = self._service.alarm_feed.join(self._news.set)
         controls = self._service.controls
         try:
             self._operator = controls.add_page(self._peer, self._news.set)
@@ -139,6 +142,7 @@ class BrowserClient:
             if self._operator is not None:
                 controls.remove_page(self._operator)
             live.fanout.leave(self._flushed)
+            self._service.alarm_feed.leave(self._news.set)
 
     async def _refuse(self, code: int, reason: str) -> None:
         try:
@@ -161,7 +165,8 @@ class BrowserClient:
                 self._news.clear()
                 self._send_shared(live)
                 told = self._service.controls.changes(self._operator) if self._operator else []
-                for text in (*told, *self._take_answers()):
+                alarms = self._service.alarm_feed.news(self._alarm_place)
+                for text in (*told, *alarms, *self._take_answers()):
                     await self._line.send_text(text)
             if live.ended.is_set() and not self._closing:
                 self._closing = (wire.CLOSE_FAILED, "the robot's session ended")

@@ -41,6 +41,8 @@ __all__ = [
     "TokenMessage",
     "SequenceRow",
     "ProgressMessage",
+    "AlarmRow",
+    "AlarmsMessage",
     "ServerMessage",
 ]
 
@@ -77,6 +79,8 @@ class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     stale immediately."""
     axes: str = ""
     """Axis convention of the signal; "" if unknown."""
+    has_alarms: bool = False
+    """Whether a limit or a state of the signal causes an alarm."""
 
 
 class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
@@ -274,6 +278,50 @@ class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True
     sequences: list[SequenceRow]
 
 
+class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
+    """One alarm, as in `urc.alarms.record.AlarmRecord`; times are in ms since 1970."""
+
+    signal: str
+    condition: str
+    priority: str
+    state: str
+    """``unacknowledged``, ``acknowledged``, ``returned``, ``shelved`` or ``suppressed``."""
+    number: int
+    """Number of the activation; the order of the numbers is first-out."""
+    group: int
+    """Number of the burst of alarms."""
+    raised: int
+    """Number that an acknowledgement must repeat."""
+    began: int
+    value: str = ""
+    active: bool = False
+    known: bool = False
+    """Whether the present value is known."""
+    times: int = 1
+    returned: int = 0
+    acknowledged: int = 0
+    acknowledged_by: str = ""
+    shelved_until: int = 0
+    shelved_by: str = ""
+    cause: str = ""
+    action: str = ""
+    title: str = ""
+    """Title of the signal."""
+
+
+class AlarmsMessage(Outbound, tag="alarms", frozen=True):
+    """Changed alarms of the robot; `full`: all alarms that are not normal."""
+
+    now: int
+    """Server time in ms since 1970."""
+    rows: list[AlarmRow]
+    gone: tuple[str, ...] = ()
+    """Signals whose alarm is normal now."""
+    full: bool = False
+    flood: bool = False
+    """Whether more than 10 alarms have come in 10 minutes."""
+
+
 ServerMessage = (
     HelloMessage
     | ValuesMessage
@@ -290,5 +338,6 @@ ServerMessage = (
     | QuestionEndMessage
     | TokenMessage
     | ProgressMessage
+    | AlarmsMessage
 )
 """Every text message of the server."""

@@ -2,73 +2,68 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Alert} Alert */
-import { ALARMS, attribute, button, isStill, part, write } from "urc/kit";
-import { Book } from "./book.js";
-import { hush, say, tone } from "./voice.js";
+import { ALARMS, attribute, button, part, write } from "urc/kit";
+import { hush, say } from "./voice.js";
 
-const LOOK_EVERY_MS = 1000;
-const FLASH_EVERY_MS = 700;
+/** Most drawn alarms; the rest is counted. */
+const MOST_SHOWN = 50;
 
 export default {
   /**
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el, options, signal, follow, memory, t }) {
+  mount({ el, options, signal, follow, alarms, t }) {
     const root = part(el, ".alerts");
     const list = part(el, ".alerts-lines");
     const note = part(el, ".alerts-note");
-    const said = part(el, ".alerts-said");
     const mute = el.querySelector(".alerts-mute");
-    const shelveMs = 60_000 * Number(options["shelve_min"] ?? 10);
-    const book = new Book(memory.read());
+    const shelveMin = Number(options["shelve_min"] ?? 10);
     /** @type {readonly Alert[]} */
     let alerts = [];
+    /** Spoken alarms, by signal. @type {Map<string, number>} */
+    const spoken = new Map();
     let watched = { limited: 1, known: 0 }; // until the page reports it
     let isUp = false;
     let isMuted = false;
 
     function look() {
-      // Before the first value no alert can end: acknowledgements stay.
-      if (alerts.length === 0 && watched.limited > 0 && watched.known === 0) return show();
-      const fresh = book.take(alerts, Date.now());
-      if (fresh.length > 0) tell(fresh);
-      memory.write(book.kept());
+      const fresh = alerts.filter(({ signal: name, state, raised }) => state === "unacknowledged" && spoken.get(name) !== raised);
+      for (const { signal: name, raised } of fresh) spoken.set(name, raised);
+      if (fresh.length > 0 && options["speech"] === true && !isMuted) say(spokenOf(fresh));
       show();
     }
 
     /** @param {Alert[]} fresh */
-    function tell(fresh) {
-      const words = fresh.map((alert) => wordsOf(alert));
-      said.textContent = words.join(". ");
-      if (isMuted) return;
-      if (options["sound"] === true) tone(fresh.some(({ alarm }) => alarm === "lolo" || alarm === "hihi"));
-      if (options["speech"] === true) say(words.join(". "));
+    function spokenOf(fresh) {
+      const words = fresh.slice(0, 3).map((alert) => `${alert.title}: ${wordOf(alert).replace(/^[▲◆]\s*/, "")}`);
+      const more = fresh.length > 3 ? [t("+{count} more", { count: fresh.length - 3 })] : [];
+      return [...words, ...more].join(". ");
     }
 
     /** @param {Alert} alert */
-    function wordsOf({ title, alarm, text, unit, age }) {
-      const word = t(ALARMS[alarm]).replace(/^[▲◆]\s*/, "");
-      return [`${title}: ${word}`, `${text}${unit ? ` ${unit}` : ""}`, age && t("{age} old", { age })].filter(Boolean).join(", ");
+    function wordOf({ alarm, condition }) {
+      return alarm === "major" || alarm === "minor" ? `${t(ALARMS[alarm]).slice(0, 1)} ${condition}` : t(ALARMS[alarm]);
     }
 
     function show() {
-      const nowMs = Date.now();
+      const shown = alerts.slice(0, MOST_SHOWN);
       const old = new Map([...list.children].map((item) => [item.getAttribute("data-signal"), item]));
-      const items = alerts.map((alert) => {
+      const items = shown.map((alert) => {
         const item = old.get(alert.signal) ?? itemOf(alert.signal);
-        draw(item, alert, nowMs);
+        draw(item, alert);
         return item;
       });
       const isSame = items.length === list.childElementCount && items.every((item, place) => list.children[place] === item);
       if (!isSame) list.replaceChildren(...items);
-      const states = alerts.map(({ signal: name }) => book.state(name, nowMs));
-      const count = states.filter((state) => state === "new").length;
+      const count = alerts.filter(isWaiting).length;
       attribute(root, "data-loud", count > 0 ? "true" : "");
-      const shelved = states.filter((state) => state === "shelved").length;
+      const shelved = alerts.filter(({ state }) => state === "shelved").length;
+      const left = alerts.length - shown.length;
       const said = alerts.length === 0 ? [calm()] : [
         t("{count} not acknowledged", { count }),
-        shelved > 0 ? t("{count} put off", { count: shelved }) : "",
+        shelved > 0 ? t("{count} shelved", { count: shelved }) : "",
+        left > 0 ? t("+{count} more", { count: left }) : "",
       ];
       const words = [...said, unknown()].filter(Boolean).join(" · ");
       write(note, alerts.length === 0 ? `— ${words}` : words);
@@ -97,9 +92,14 @@ export default {
       words.className = "alerts-words";
       const more = document.createElement("span");
       more.className = "alerts-more";
-      const seen = deed("alerts-seen urc-act", t("Acknowledge"), () => book.acknowledge(name));
-      const later = deed("alerts-later urc-act", t("Put off {minutes} min", { minutes: shelveMs / 60_000 }), () =>
-        book.shelve(name, Date.now() + shelveMs));
+      const act = (/** @type {(alert: Alert) => void} */ deed) => () => {
+        const alert = alerts.find((one) => one.signal === name);
+        if (alert) deed(alert);
+        hush();
+      };
+      const seen = button("alerts-seen urc-act", t("Acknowledge"), act((alert) => alarms.acknowledge([alert])), { signal });
+      const shelve = act((alert) => alarms.shelve(alert, shelveMin));
+      const later = button("alerts-later urc-act", t("Shelve {minutes} min", { minutes: shelveMin }), shelve, { signal });
       item.append(words, more, seen, later);
       return item;
     }
@@ -107,35 +107,27 @@ export default {
     /**
      * @param {Element} item
      * @param {Alert} alert
-     * @param {number} nowMs
      */
-    function draw(item, alert, nowMs) {
-      const state = book.state(alert.signal, nowMs);
-      attribute(item, "data-alarm", alert.alarm);
-      attribute(item, "data-is", state);
-      attribute(item, "data-old", alert.age ? "true" : "");
-      const value = `${alert.text}${alert.unit ? ` ${alert.unit}` : ""}`;
+    function draw(item, alert) {
+      attribute(item, "data-alarm", alert.isActive ? alert.alarm : "");
+      attribute(item, "data-is", alert.state);
+      attribute(item, "data-old", alert.age || !alert.isKnown ? "true" : "");
+      const isState = alert.alarm === "major" || alert.alarm === "minor";
+      const value = isState ? "" : `: ${alert.text}${alert.unit ? ` ${alert.unit}` : ""}`;
       const old = alert.age ? ` · ${t("{age} old", { age: alert.age })}` : "";
-      write(part(item, ".alerts-words"), `${t(ALARMS[alert.alarm])} · ${alert.title}: ${value}${old}`);
-      const leftMin = Math.ceil((book.untilMs(alert.signal) - nowMs) / 60_000);
-      const words = { new: "", seen: t("✓ acknowledged"), shelved: t("put off for {minutes} min", { minutes: leftMin }) };
-      write(part(item, ".alerts-more"), words[state]);
-      part(item, ".alerts-seen").hidden = state !== "new";
-      part(item, ".alerts-later").hidden = state === "shelved";
-    }
-
-    /**
-     * @param {string} name
-     * @param {string} text
-     * @param {() => void} act
-     */
-    function deed(name, text, act) {
-      const press = () => {
-        act();
-        hush();
-        look();
+      write(part(item, ".alerts-words"), `${alert.isActive ? wordOf(alert) : "✓"} · ${alert.title}${value}${old}`);
+      const name = alert.who;
+      const states = {
+        unacknowledged: alert.action,
+        acknowledged: name ? t("✓ acknowledged by {name}", { name }) : t("✓ acknowledged"),
+        returned: t("back to normal, not acknowledged"),
+        shelved: t("shelved for {minutes} min", { minutes: Math.ceil(alert.leftS / 60) }),
+        suppressed: t("suppressed by design"),
       };
-      return button(name, text, press, { signal });
+      write(part(item, ".alerts-more"), states[alert.state] ?? "");
+      const mayAct = alarms.may();
+      part(item, ".alerts-seen").hidden = !mayAct || !isWaiting(alert);
+      part(item, ".alerts-later").hidden = !mayAct || alert.state === "shelved" || alert.state === "suppressed";
     }
 
     mute?.addEventListener("click", () => {
@@ -156,18 +148,12 @@ export default {
       isUp = news.isUp;
       show();
     });
-    let isDim = false;
-    const flash = setInterval(() => {
-      isDim = !isDim && !isStill();
-      attribute(root, "data-flash", isDim ? "true" : "");
-    }, FLASH_EVERY_MS);
-    const timer = setInterval(look, LOOK_EVERY_MS); // shelved alerts come back
-    return {
-      destroy() {
-        clearInterval(timer);
-        clearInterval(flash);
-        hush();
-      },
-    };
+    follow("lease", show); // who may act
+    return { destroy: hush };
   },
 };
+
+/** @param {Alert} alert */
+function isWaiting({ state }) {
+  return state === "unacknowledged" || state === "returned";
+}

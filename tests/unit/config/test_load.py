@@ -11,7 +11,7 @@ from urc.expressions import compile_template
 from urc.model.driver import Backoff, FramingSpec, Timeouts
 from urc.model.interface import Layout, Slot, WidgetUse
 from urc.model.profile import DocumentTest, Profile
-from urc.model.values import AlarmLimits, Signal
+from urc.model.values import AlarmAttributes, AlarmLimits, Signal
 from urc.problems import ProblemsError
 from urc.runtime.registries import built_in_catalog
 from urc.testing.profile import text
@@ -62,6 +62,7 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
     profile = load_profile(file, built_in_catalog(), WidgetFolder(SHELF))
     wire = profile.driver.transports["wire"]
     (poll,) = profile.driver.polls
+    discharged = "The battery is discharged."
     assert (profile.name, profile.title, profile.file) == ("puppet", "Puppet", str(file))
     assert profile.settings["port"].default == 6789
     assert wire.options == {
@@ -78,7 +79,15 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
         unit="%",
         min=0,
         max=100,
-        limits=AlarmLimits(lolo=10, low=20, hysteresis=2),
+        limits=AlarmLimits(
+            lolo=10,
+            low=20,
+            hysteresis=2,
+            attributes=(
+                ("lolo", AlarmAttributes("high", discharged, "Charge the Puppet now.")),
+                ("low", AlarmAttributes("low", discharged, "Finish the task.")),
+            ),
+        ),
         stale_after_s=3.0,
     )
     assert (poll.name, poll.transport, poll.every_s) == ("polls.0", "wire", 1.0)
@@ -393,3 +402,34 @@ def test_good_document_imports_neither_jsonschema_nor_an_event_loop() -> None:
         check=False,
     )
     assert (done.stderr, done.stdout.strip()) == ("", "[]")
+
+
+def test_attributes_of_limits_are_the_defaults_of_each_alarm(checked: Checker) -> None:
+    """A limit or state overrides single attributes; the rest comes from the signal's limits."""
+    profile = checked.profile(
+        HEAD
+        + WIRE
+        + MESSAGE
+        + """
+signals:
+  battery:
+    type: integer
+    limits:
+      low: { at: 20, priority: low }
+      lolo: { at: 10, action: Land., suppressed_when: mode == 'docked' }
+      off_delay: 2s
+      cause: It is used.
+      suppressed_when: battery == 0
+  mode: { type: string, limits: { states: { lost: { priority: high }, idle: {} } } }
+"""
+    )
+    limits = profile.driver.signals["battery"].limits
+    assert (limits.low, limits.lolo, limits.off_delay_s) == (20, 10, 2.0)
+    low, lolo = limits.attributes_of("low"), limits.attributes_of("lolo")
+    assert (low.priority, low.cause, low.action) == ("low", "It is used.", "")
+    assert (lolo.priority, lolo.cause, lolo.action) == ("high", "It is used.", "Land.")
+    sources = [one.suppressed_when and one.suppressed_when.source for one in (low, lolo)]
+    assert sources == ["battery == 0", "mode == 'docked'"]
+    states = profile.driver.signals["mode"].limits
+    assert states.states == ("lost", "idle")
+    assert [states.attributes_of(one).priority for one in states.states] == ["high", "medium"]

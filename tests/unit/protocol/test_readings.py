@@ -4,7 +4,7 @@ import pytest
 
 from tests.dialogue import Dialogue
 from urc.expressions import compile_expression
-from urc.model.values import AlarmLimits, Conversion, Sample, Signal
+from urc.model.values import AlarmAttributes, AlarmLimits, Conversion, Sample, Signal
 from urc.protocol.readings.readings import Readings
 
 VOLTS = Signal(
@@ -53,6 +53,59 @@ def test_an_alarm_begins_only_when_the_value_has_stayed() -> None:
     limits = AlarmLimits(lolo=10, low=20, for_s=3)
     found = alarms(limits, (0, 15), (2, 15), (3, 15), (4, 5), (6.9, 5), (7, 5), (8, 30), (9, 5))
     assert found == ["", "", "low", "low", "low", "lolo", "", ""]
+
+
+def test_an_alarm_ends_only_when_the_value_has_stayed_normal() -> None:
+    """A value that comes and goes within the off-delay is one alarm, not many."""
+    limits = AlarmLimits(high=80, off_delay_s=5)
+    found = alarms(limits, (0, 85), (1, 70), (3, 85), (4, 70), (8.9, 70), (9, 70), (10, 85))
+    assert found == ["high", "high", "high", "high", "high", "", "high"]
+
+
+def test_an_alarm_ends_without_a_further_reading() -> None:
+    """The end of the off-delay is a deadline, as the end of the on-delay is."""
+    made = readings(Signal("v", limits=AlarmLimits(high=80, off_delay_s=5), stale_after_s=3))
+    made.set_values({"v": 85}, 0)
+    made.set_values({"v": 70}, 2)
+    assert made.deadline == 7
+    assert made.tick(6.9) == []
+    assert [sample.alarm for sample in made.tick(7)] == [""]
+    assert made.deadline is None
+
+
+def test_both_ends_of_an_array_may_be_past_their_limits() -> None:
+    """The lesser alarm has begun as well, so no deadline is left that would never pass."""
+    limits = AlarmLimits(lolo=10, hihi=90, for_s=1)
+    made = readings(Signal("cells", "array", limits=limits, stale_after_s=3))
+    made.set_values({"cells": [5, 95]}, 0)
+    assert [sample.alarm for sample in made.tick(1)] == ["lolo"]
+    assert made.deadline is None
+
+
+def test_a_state_is_an_alarm_or_a_warning_by_its_priority() -> None:
+    """A boolean, a word and a number of a fault code."""
+    fault = AlarmAttributes(priority="high")
+    words = AlarmLimits(states=("stopped", "reduced"), attributes=(("stopped", fault),))
+    made = readings(
+        Signal("mode", "string", limits=words),
+        Signal("bump", "boolean", limits=AlarmLimits(states=("true",))),
+        Signal("code", "integer", limits=AlarmLimits(states=("3", "-1"))),
+        Signal("modes", "array", items="string", limits=words),
+    )
+    turns = (
+        ("mode", "ready", ""), ("mode", "reduced", "minor"), ("mode", "stopped", "major"),
+        ("mode", "ready", ""), ("bump", False, ""), ("bump", True, "minor"), ("code", 2, ""),
+        ("code", 3, "minor"), ("code", -1, "minor"), ("modes", ["ready", "stopped"], "major"),
+    )  # fmt: skip
+    for now, (name, value, alarm) in enumerate(turns):
+        ((sample,), refused) = made.set_values({name: value}, now)
+        assert (sample.alarm, refused) == (alarm, []), (name, value)
+
+
+def test_a_value_that_is_not_available_has_no_alarm() -> None:
+    """Nothing can be judged, so an off-delay does not hold the alarm either."""
+    limits = AlarmLimits(high=80, states=("7",), off_delay_s=5)
+    assert alarms(limits, (0, 85), (1, None), (2, 7)) == ["high", "", "minor"]
 
 
 def test_an_alarm_begins_without_a_further_reading() -> None:

@@ -3,12 +3,14 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
 import pytest
 
 from urc.model.profile import Setting
+from urc.model.values import Signal
 from urc.problems import UrcError
 from urc.runtime.clock import Timer
 from urc.testing.clock import FakeClock, settle
@@ -209,3 +211,49 @@ async def test_an_alarm_that_rings_early_ends_the_session_all_the_same() -> None
             await service.live()
         await clock.advance(2.1)
         assert not robot.is_open
+
+
+async def test_a_monitored_robot_is_connected_with_no_page_open() -> None:
+    """Its alarms are judged; a page that comes and goes changes nothing."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as service:
+        assert robot.opened == 0
+        monitored = replace(service.robot, is_monitored=True)
+        service.replace(monitored)
+        await clock.advance(0.1)
+        assert robot.is_open
+        robot.set_reading("battery", 15, alarm="low")
+        assert [one.state for one in service.alarms.list.records.values()] == ["unacknowledged"]
+        with service.visit():
+            await service.live()
+        await clock.advance(60)
+        assert (robot.opened, robot.is_open) == (1, True)
+        release = asyncio.Event()
+        holding = asyncio.create_task(_hold(service, release))
+        await clock.advance(0.1)
+        assert not robot.is_open, "a test of the settings still gets the robot for itself"
+        release.set()
+        await holding
+        await clock.advance(0.1)
+        assert robot.is_open
+        service.replace(replace(monitored, is_monitored=False))
+        await clock.advance(5)
+        assert not service.is_open
+        record = service.alarms.list.records["battery"]
+        assert (record.state, record.is_known) == ("unacknowledged", False)
+
+
+async def test_a_robot_without_alarms_or_settings_is_not_monitored() -> None:
+    """A connection for nothing would keep other programs from the robot."""
+    clock = FakeClock()
+    silent = {"speed": Signal("speed", stale_after_s=3.0)}
+    for profile in (
+        dashboard_profile(signals=silent),
+        dashboard_profile(settings={"key": Setting("key", "string")}),
+    ):
+        robot = FakeRobot(profile, clock)
+        async with stationed(robot, clock) as service:
+            service.replace(replace(service.robot, is_monitored=True))
+            await clock.advance(5)
+            assert (robot.opened, robot.is_open) == (0, False)

@@ -85,7 +85,7 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
         "names": ["volts", "note"],
         "signals": [
             {"name": "volts", "type": "number", "unit": "V", "limits": {"low": 11.0},
-             "stale_after_s": 3, "sources": ["wire"]},
+             "stale_after_s": 3, "sources": ["wire"], "has_alarms": True},
             {"name": "note", "type": "string", "states": {"0": "off"},
              "stale_after_s": 2, "sources": ["radio"]},
         ],

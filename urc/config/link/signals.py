@@ -18,6 +18,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
     """Check every computed signal at `part`; `check` checks the names in a template."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():
+        _link_suppression(inner, driver.signals[name], driver, check)
         formula = driver.signals[name].formula
         if formula is None:
             continue
@@ -46,6 +47,21 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
                 f"{name!r} depends on itself: {' → '.join(cycle)}",
                 hint="compute a signal only from signals that do not depend on it",
             )
+
+
+def _link_suppression(part: Node, signal: Signal, driver: Driver, check: _Check) -> None:
+    """Check the names in the expressions that suppress alarms of a signal."""
+    limits = part.get("limits")
+    if limits is None or signal.limits.is_empty:
+        return
+    checked = set()
+    for name, attributes in signal.limits.attributes:
+        own = limits.named("states").get(name) or limits.must(name)
+        is_own = isinstance(own.data, dict) and "suppressed_when" in own.data
+        place = own if is_own else limits
+        if attributes.suppressed_when is not None and place.path not in checked:
+            checked.add(place.path)
+            check(place.must("suppressed_when"), attributes.suppressed_when, driver.signals)
 
 
 def _set_by_frames(driver: Driver) -> dict[str, str]:

@@ -9,7 +9,7 @@ from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit, fit_argument, fit_hint, known_argument
 from urc.model.driver import Command, Driver
 from urc.model.profile import DialogueStep, DocumentTest, Expected, ExpectedState, Setting
-from urc.model.values import AlarmLimits, Signal, Value
+from urc.model.values import Signal, Value
 
 __all__ = ["link_test"]
 
@@ -144,7 +144,7 @@ def _state(name: str, part: Node, driver: Driver, problems: Problems) -> Expecte
         return _expected(name, part, driver, problems)
     signal = driver.signals.get(name)
     alarm = part.text("alarm")
-    if signal is not None and alarm not in ("", "none") and signal.limits == AlarmLimits():
+    if signal is not None and alarm not in ("", "none") and signal.limits.is_empty:
         text = f"signal {name!r} has no limits"
         problems.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
     if "value" in part.data and part.text("age") == "never":

@@ -1,16 +1,16 @@
 """Parser of a signal: mapping → `Signal`, with its conversion, limits, axes and formula."""
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Final
 
 from urc.config.node import Node, Problems
 from urc.config.parse.conversion import CONVERSION_KEYS, parse_conversion, parse_states
-from urc.config.values import check_range, check_within
+from urc.config.parse.limits import parse_limits
+from urc.config.values import check_range
 from urc.expressions import Template
 from urc.model.axes import ANGLE_UNITS
 from urc.model.driver import Poll
-from urc.model.values import AlarmLimits, Signal
+from urc.model.values import Signal
 
 __all__ = ["parse_signal", "with_ages"]
 
@@ -34,6 +34,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
             part, "misplaced-key", f"'precision' has no effect for {kind}", at="precision", key=True
         )
     axes = _axes(part, kind, problems)
+    states = parse_states(part, element, problems)
     return Signal(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -42,8 +43,8 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         min=low,
         max=high,
         precision=precision,
-        states=parse_states(part, element, problems),
-        limits=_limits(part, element, (low, high), problems),
+        states=states,
+        limits=parse_limits(part, element, (low, high), states, problems),
         stale_after_s=problems.duration(part, "stale_after", 0.0, least=0.05),
         description=part.text("description"),
         conversion=parse_conversion(part, problems, element),
@@ -188,54 +189,3 @@ def _formula(part: Node, problems: Problems) -> Template | None:
                 hint="put the conversion into the formula under 'value'",
             )
     return problems.expression(inner)
-
-
-def _check_hysteresis(part: Node, values: Mapping[str, float | None], problems: Problems) -> None:
-    """Warn of an alarm that ends only after the start of the opposite alarm."""
-    width = part.number("hysteresis") or 0.0
-    low = values["low"] if values["low"] is not None else values["lolo"]
-    high = values["high"] if values["high"] is not None else values["hihi"]
-    if low is not None and high is not None and width >= high - low > 0:
-        problems.warn(
-            part,
-            "wide-hysteresis",
-            f"the alarm at {low:g} would end only at {low + width:g}, after the alarm at {high:g}"
-            " has started",
-            at="hysteresis",
-            hint=f"make the hysteresis smaller than {high - low:g}, the distance between the two"
-            " limits",
-        )
-
-
-def _limits(
-    part: Node, kind: str, bounds: tuple[float | None, float | None], problems: Problems
-) -> AlarmLimits:
-    inner = part.get("limits")
-    if inner is None:
-        return AlarmLimits()
-    if kind not in _NUMBERS:
-        problems.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
-        return AlarmLimits()
-    names = ("lolo", "low", "high", "hihi")
-    values = {name: inner.number(name) for name in names}
-    given = [(name, value) for name, value in values.items() if value is not None]
-    for (name, value), (after, more) in pairwise(given):
-        if value >= more:
-            problems.error(
-                inner,
-                "wrong-order",
-                f"{after} {more:g} is not above {name} {value:g}",
-                at=after,
-                hint="the order is lolo < low < high < hihi",
-            )
-    for name, value in given:
-        check_within(value, *bounds, inner.must(name), problems)
-    _check_hysteresis(inner, values, problems)
-    return AlarmLimits(
-        lolo=values["lolo"],
-        low=values["low"],
-        high=values["high"],
-        hihi=values["hihi"],
-        hysteresis=inner.number("hysteresis") or 0.0,
-        for_s=problems.duration(inner, "for", 0.0, least=0.0),
-    )

@@ -1,69 +1,116 @@
 """Alarm states of signals over time.
 
 Callers pass the time, because the module reads no clock. A value equal to the limit causes an
-alarm. The alarm ends when the value is inside the limit by ``hysteresis``. The key ``for`` delays
-the alarm until the value has been beyond the limit for this time. A delayed alarm begins at
-`AlarmMonitor.deadline`, even without another sample.
+alarm, and so does an alarm state. The alarm ends when the value is inside the limit by
+``hysteresis``. The key ``for`` delays the alarm until the value has been beyond the limit for this
+time, and ``off_delay`` delays its end. A delayed change happens at `AlarmMonitor.deadline`, even
+without another sample.
 """
 
-from urc.model.values import Alarm, AlarmLimits, Reading
+from urc.model.values import Alarm, AlarmLimits, Reading, state_texts
 
 __all__ = ["AlarmMonitor"]
 
-_LEVELS: tuple[Alarm, ...] = ("lolo", "hihi", "low", "high")
+_LEVELS: tuple[Alarm, ...] = ("lolo", "hihi", "major", "low", "high", "minor")
 """Alarm levels in order of severity, most severe first."""
+_STATE_LEVELS: tuple[Alarm, ...] = ("major", "minor")
 _LOWER = ("lolo", "low")
-_DEEPER = {"lolo": "low", "hihi": "high"}
 
 
 class AlarmMonitor:
     """The alarm state of one signal."""
 
-    __slots__ = ("_due", "_for_s", "_levels", "_within", "alarm")
+    __slots__ = (
+        "_begun",
+        "_due",
+        "_ends",
+        "_for_s",
+        "_levels",
+        "_off_s",
+        "_within",
+        "_words",
+        "alarm",
+    )  # fmt: skip
 
     def __init__(self, limits: AlarmLimits) -> None:
         self.alarm: Alarm = ""
         self._for_s = limits.for_s
+        self._off_s = limits.off_delay_s
         self._within = limits.hysteresis
         self._levels: list[tuple[Alarm, float]] = [
-            (level, limit) for level in _LEVELS if (limit := getattr(limits, level)) is not None
+            (level, limit)
+            for level in _LEVELS
+            if (limit := getattr(limits, level, None)) is not None
         ]
+        self._words: dict[str, Alarm] = {
+            word: "major" if limits.attributes_of(word).priority == "high" else "minor"
+            for word in limits.states
+        }
         self._due: dict[Alarm, float] = {}
         """Start times of pending and active alarms, by crossed level."""
+        self._ends: dict[Alarm, float] = {}
+        """End times of active alarms whose value is normal again, by level."""
+        self._begun: frozenset[Alarm] = frozenset()
+        """Levels whose alarm has begun."""
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may begin an alarm; None if only a sample can change the alarm."""
-        active = (self.alarm, _DEEPER.get(self.alarm, ""))
-        return min((due for level, due in self._due.items() if level not in active), default=None)
+        """Time at which `tick` may change the alarm; None if only a sample can change it."""
+        pending = [due for level, due in self._due.items() if level not in self._begun]
+        return min((*pending, *self._ends.values()), default=None)
 
     def update(self, value: Reading, now: float) -> Alarm:
         """Process a new value, and return its alarm."""
-        span = _span(value)
-        if span is None:
+        if value is None:  # not available, so no alarm can be judged
             self._due.clear()
-            self.alarm = ""
-            return ""
+            self._ends.clear()
+            return self.tick(now)
+        if self._words:
+            reached = {self._words[one] for one in state_texts(value) if one in self._words}
+            for level in _STATE_LEVELS:
+                self._cross(level, now, is_past=level in reached)
+        if self._levels:
+            span = _span(value)
+            if span is None:
+                for level, _ in self._levels:
+                    self._due.pop(level, None)
+                    self._ends.pop(level, None)
+            else:
+                self._cross_limits(span, now)
+        return self.tick(now)
+
+    def _cross_limits(self, span: tuple[float, float], now: float) -> None:
         lowest, highest = span
-        held = (self.alarm, _DEEPER.get(self.alarm, ""))
         for level, limit in self._levels:
             is_lower = level in _LOWER
-            past = lowest <= limit if is_lower else highest >= limit
-            if not past and level in held:
+            is_past = lowest <= limit if is_lower else highest >= limit
+            if not is_past and level in self._begun:
                 # A value past "lolo" is past "low", too, so returning from "lolo" keeps "low"
                 # active.
                 back = self._within
-                past = lowest < limit + back if is_lower else highest > limit - back
-            if not past:
-                self._due.pop(level, None)
-            elif level not in self._due:
-                self._due[level] = now + self._for_s
-        return self.tick(now)
+                is_past = lowest < limit + back if is_lower else highest > limit - back
+            self._cross(level, now, is_past=is_past)
+
+    def _cross(self, level: Alarm, now: float, *, is_past: bool) -> None:
+        if is_past:
+            self._ends.pop(level, None)
+            self._due.setdefault(level, now + self._for_s)
+        elif self._off_s and level in self._begun:
+            self._ends.setdefault(level, now + self._off_s)
+        else:
+            self._due.pop(level, None)
 
     def tick(self, now: float) -> Alarm:
         """Return the alarm of the newest value at `now`."""
-        begun = (level for level in _LEVELS if self._due.get(level, now + 1) <= now)
-        self.alarm = next(begun, "")
+        if self._ends:
+            for level in [level for level, end in self._ends.items() if end <= now]:
+                del self._ends[level], self._due[level]
+        due = self._due
+        if not due:
+            self._begun, self.alarm = frozenset(), ""
+            return ""
+        self._begun = frozenset(level for level, time in due.items() if time <= now)
+        self.alarm = next((level for level in _LEVELS if level in self._begun), "")
         return self.alarm
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from urc.expressions import ExpressionError, Template, defaulted_names
-from urc.model.values import NOTHING, Alarm, AlarmLimits, Reading, Sample, Signal
+from urc.model.values import NOTHING, Alarm, Reading, Sample, Signal
 from urc.protocol.readings.alarms import AlarmMonitor
 from urc.protocol.readings.data_change_filter import DataChangeFilter
 from urc.protocol.values.convert import BadValue
@@ -49,14 +49,14 @@ class Readings:
         self._alarm_monitors = {
             name: AlarmMonitor(one.limits)
             for name, one in signals.items()
-            if one.limits != AlarmLimits()
+            if not one.limits.is_empty
         }
         self._change_filter = {
             name: DataChangeFilter(one)
             for name, one in signals.items()
             if one.deadband or one.debounce_s
         }
-        self._timed = tuple(name for name in self._alarm_monitors if signals[name].limits.for_s > 0)
+        self._timed = tuple(name for name in self._alarm_monitors if signals[name].limits.is_timed)
         self._last: dict[str, Sample] = {}
         """Newest samples of formula inputs and of signals in `_timed`, by signal."""
         self._namespace: dict[str, object] = dict(names)

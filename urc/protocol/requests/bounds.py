@@ -56,7 +56,9 @@ def calm_s(driver: Driver) -> float:
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
         return 0.0
-    if any(one.limits.for_s or one.deadband or one.debounce_s for one in driver.signals.values()):
+    if any(
+        one.limits.is_timed or one.deadband or one.debounce_s for one in driver.signals.values()
+    ):
         return 0.0
     if any(spec.keepalive or spec.min_gap_s for spec in driver.transports.values()):
         return 0.0  # a gap may be nearly over when the next request arrives

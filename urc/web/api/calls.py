@@ -7,6 +7,15 @@ A route of the API is made only here, and each call names its right.
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
 
+from urc.web.alarms.wire import (
+    AcknowledgeAsked,
+    AlarmAction,
+    AlarmHistory,
+    AlarmOverview,
+    RobotAlarmList,
+    ShelveAsked,
+    UnshelveAsked,
+)
 from urc.web.api.wire import (
     CommandAnswer,
     CommandAsked,
@@ -203,6 +212,64 @@ CALLS: Final[tuple[Call, ...]] = (
         WATCH,
         "The operator who drives a robot, and the state of its STOP latch.",
         ControlState,
+    ),
+    # Alarms
+    Call(
+        "alarms_overview",
+        "/api/v1/alarms",
+        SIGNED_IN,
+        "The numbers of alarms of all robots that you may watch.",
+        AlarmOverview,
+    ),
+    Call(
+        "alarms",
+        f"{_ROBOT}/alarms",
+        WATCH,
+        "The alarms of a robot that are not normal, the most urgent first. The call does not"
+        " connect the robot.",
+        RobotAlarmList,
+    ),
+    Call(
+        "alarm_history",
+        f"{_ROBOT}/alarms/history",
+        WATCH,
+        "Events of a robot's alarms, newest first.",
+        AlarmHistory,
+        query=(
+            Query("kinds", "Kinds of events, separated by commas."),
+            *(one for one in _FILTERS if one.name in ("text", "since", "until", "before", "last")),
+        ),
+        errors=(400,),
+    ),
+    Call(
+        "alarms_acknowledge",
+        f"{_ROBOT}/alarms/acknowledge",
+        DRIVE,
+        "Acknowledge alarms as you saw them. An alarm that was raised again is left out.",
+        AlarmAction,
+        AcknowledgeAsked,
+        "POST",
+        errors=(409,),
+    ),
+    Call(
+        "alarms_shelve",
+        f"{_ROBOT}/alarms/shelve",
+        DRIVE,
+        "Shelve alarms for at most 24 hours. At the end, an active alarm is raised again.",
+        AlarmAction,
+        ShelveAsked,
+        "POST",
+        errors=(409,),
+    ),
+    Call(
+        "alarms_unshelve",
+        f"{_ROBOT}/alarms/unshelve",
+        DRIVE,
+        "End the shelves of alarms.",
+        AlarmAction,
+        UnshelveAsked,
+        "POST",
+        errors=(409,),
     ),
     Call(
         "timeline",

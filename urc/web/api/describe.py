@@ -62,7 +62,7 @@ def summary(
         connected=service.is_open,
         detail=by_state[state].detail if state in _ABNORMAL else "",
         battery=battery_of(service, battery_signal(profile)),
-        alarms=active_alarms(service),
+        alarms=active_alarms(name, service),
         used_at=times.used_at,
         seen_at=times.seen_at,
     )

@@ -1,6 +1,6 @@
 """The state of a robot in a few words, for the menu and for lists: battery, alarms and order.
 
-Layer 5. Pure. Nothing here connects a robot: without a session, battery and alarms are unknown.
+Layer 5. Pure. Nothing here connects a robot: without a session, the battery is unknown.
 """
 
 from collections.abc import Iterable
@@ -9,6 +9,7 @@ from typing import Final
 from urc.model.driver import Driver
 from urc.model.profile import Profile
 from urc.model.values import Sample, Signal
+from urc.web.alarms.counts import count_of
 from urc.web.api.wire import ActiveAlarms, BatteryLevel, RobotSummary
 from urc.web.fleet.robots import RobotService
 
@@ -18,7 +19,6 @@ _NAMES: Final = ("battery", "battery_level", "battery_percentage", "state_of_cha
 """Names of a battery signal without a battery widget, in order of preference."""
 _UNITS: Final = ("%", "V")
 _NUMBERS: Final = ("integer", "number")
-_HIGH: Final = ("lolo", "hihi")
 
 
 def battery_signal(profile: Profile) -> str:
@@ -57,25 +57,19 @@ def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
     return BatteryLevel(shown, signal.unit, sample.alarm)
 
 
-def active_alarms(service: RobotService) -> ActiveAlarms:
-    """Return the number of signals beyond a limit, and the worst kind of limit.
+def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
+    """Return the number of alarms that operators must see, and their highest priority.
 
-    Values older than the signal permits don't count.
+    Alarms that wait for an acknowledgement count, too; shelved and suppressed ones don't. The
+    server knows them without a session.
+
+    Args:
+        name: name of the robot in paths.
+        service: the robot.
     """
-    live = service.open_session
-    if live is None:
-        return ActiveAlarms()
-    hub, now = live.session.hub, service.clock.now()
-    found = [
-        sample.alarm
-        for name, signal in hub.signals.items()
-        if (sample := hub.latest(name)) is not None
-        and sample.alarm
-        and not _is_stale(sample, signal, now)
-    ]
-    if not found:
-        return ActiveAlarms()
-    return ActiveAlarms(len(found), "high" if any(one in _HIGH for one in found) else "low")
+    records = service.alarms.list.records.values()
+    worst = count_of(name, records).worst
+    return ActiveAlarms(sum(one.is_annunciated for one in records), worst)
 
 
 def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
@@ -89,7 +83,7 @@ def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
 
 def _rank(robot: RobotSummary) -> tuple[int, int, float]:
     """Return the rank of a robot; connected robots keep their places while they are used."""
-    severity = {"": 3, "low": 2, "medium": 1, "high": 0}[robot.alarms.worst]
+    severity = {"high": 0, "medium": 1, "low": 2}.get(robot.alarms.worst, 3)
     is_away = not robot.connected
     return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 import msgspec
 
 from urc.model.role import Role
+from urc.model.values import Alarm
 from urc.wire.client_messages import Arguments, Verb
 
 __all__ = [
@@ -64,7 +65,7 @@ class BatteryLevel(ApiMessage, frozen=True):
 
     value: float
     unit: str
-    alarm: Literal["", "lolo", "low", "high", "hihi"] = ""
+    alarm: Alarm = ""
     """Exceeded limit of the signal."""
 
 
@@ -72,7 +73,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
     """The alarms of a robot at this moment."""
 
     count: int = 0
-    worst: Literal["", "low", "medium", "high"] = ""
+    worst: str = ""
     """Highest priority of all alarms; "" without an alarm."""
 
 
@@ -222,7 +223,8 @@ class SignalValue(ApiMessage, frozen=True):
     """Age of the value; null: no value has arrived yet."""
     stale: bool
     """Whether the value is missing, or older than the signal permits."""
-    alarm: Literal["", "lolo", "low", "high", "hihi"] = ""
+    alarm: Alarm = ""
+    """Crossed limit, or severity of an alarm state; empty: no alarm."""
 
 
 class SignalValues(ApiMessage, frozen=True):

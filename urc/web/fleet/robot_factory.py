@@ -7,7 +7,7 @@ Reading files takes time, so the event loop calls the factory in a thread.
 import logging
 from collections.abc import Callable, Mapping
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,6 +50,8 @@ class RobotOptions:
     profile."""
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
+    monitors: bool = False
+    """Whether robots stay connected for their alarms, unless their settings say otherwise."""
 
 
 class ResolvedSettings(NamedTuple):
@@ -123,7 +125,10 @@ class RobotFactory:
                 name,
                 secret,
             )
-        return self.robot_options.make(self.furnished(profile, chosen.interface), filled.values)
+        made = self.robot_options.make(self.furnished(profile, chosen.interface), filled.values)
+        choice = chosen.monitors_alarms
+        is_monitored = self.robot_options.monitors if choice is None else choice
+        return replace(made, is_monitored=is_monitored) if is_monitored else made
 
     def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
         """Return the resolved settings of a robot, or raise `UrcError`.

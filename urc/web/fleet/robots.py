@@ -8,6 +8,7 @@ the page disconnects the robot.
 import asyncio
 import logging
 import secrets
+import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import (
@@ -30,9 +31,11 @@ from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchStore
+from urc.runtime.robot_alarms import RobotAlarms
 from urc.web.drive.command_runner import CommandRunner
 from urc.web.drive.control_service import ControlService
 from urc.web.drive.two_person import TwoPersonRule
+from urc.web.feed.alarm_feed import AlarmFeed
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.feed.fanout import Fanout
 
@@ -149,6 +152,8 @@ class Robot:
     state."""
     playback: Playback | None = None
     """The recording that plays in place of the robot; None for a robot."""
+    is_monitored: bool = False
+    """Whether the robot stays connected for its alarms, with no page open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +209,7 @@ class RobotService:
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
         turn: asyncio.Lock | None = None,
+        alarms: RobotAlarms | None = None,
     ) -> None:
         """Prepare the station; the session opens for the first client.
 
@@ -215,6 +221,7 @@ class RobotService:
             latch: store that preserves a latched STOP over a restart; None to store nothing.
             recorder: receives the events of the audit log; None to record nothing.
             turn: lock that all robots of a server share, so that sessions start one by one.
+            alarms: the alarms of the robot; None for alarms that are not stored.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -222,6 +229,8 @@ class RobotService:
         self.consent = TwoPersonRule(lambda: self.controls.operators, self.clock)
         self.controls.once.on_stopped = self.consent.stop
         self.commands = CommandRunner(self.controls, self.consent, self.clock)
+        self.alarms = alarms or RobotAlarms(robot.profile.driver, self.clock, time.time)
+        self.alarm_feed = AlarmFeed(self.alarms, self.clock)
         self._linger_s = linger_s
         self._turn = turn or asyncio.Lock()
         self._visitors = 0
@@ -364,9 +373,17 @@ class RobotService:
             (self.robot, latch), self._successor = self._successor, None
             self._last_picture = None  # it may be of another robot
             self.controls.renew(self.robot.profile.driver, latch)
+            self.alarms.renew(self.robot.profile.driver, is_monitored=self._wants_monitoring)
 
     async def run(self) -> None:
         """Supervise the session until cancelled."""
+        self.alarms.start()
+        try:
+            await self._supervise()
+        finally:
+            self.alarms.stop()
+
+    async def _supervise(self) -> None:
         while True:
             self._succeed()
             await self._wait_for(present=True)
@@ -398,16 +415,18 @@ class RobotService:
         live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event(), self.clock.now())
         self._coming().set_result(live)
         self.controls.recorder.attend(session.hub, self.clock.now)
+        names = {"settings": self.robot.settings}
         try:
-            async with asyncio.TaskGroup() as group:
-                tasks = [
-                    group.create_task(work)
-                    for work in (live.fanout.run(), self.controls.serve(session))
-                ]
-                await self._until_deserted()
-                self._next = None  # later clients wait for the next session
-                for task in tasks:
-                    task.cancel()
+            with self.alarms.attending(session.hub, names):
+                async with asyncio.TaskGroup() as group:
+                    tasks = [
+                        group.create_task(work)
+                        for work in (live.fanout.run(), self.controls.serve(session))
+                    ]
+                    await self._until_deserted()
+                    self._next = None  # later clients wait for the next session
+                    for task in tasks:
+                        task.cancel()
         finally:
             self._next = None
             self._keep_picture(session.hub)
@@ -427,11 +446,11 @@ class RobotService:
                 self._stirred.set()
 
             alarm = self.clock.call_at(self.clock.now() + self._linger_s, ring)
-            while not (self._visitors or self._is_unwanted or rung.is_set()):
+            while not (self._has_clients or self._is_unwanted or rung.is_set()):
                 self._stirred.clear()
                 await self._stirred.wait()
             alarm.cancel()
-            if not self._visitors or self._is_unwanted:
+            if not self._has_clients or self._is_unwanted:
                 return
 
     @property
@@ -441,13 +460,28 @@ class RobotService:
 
     async def _wait_for(self, *, present: bool) -> None:
         """Wait until a session is needed or, if not `present`, until no session is needed."""
-        while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
+        while not (self._is_wanted if present else not self._has_clients or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()
 
     @property
     def _is_wanted(self) -> bool:
-        return (self._visitors > 0 and not self._held_off) or self._successor is not None
+        return (self._has_clients and not self._held_off) or self._successor is not None
+
+    @property
+    def _has_clients(self) -> bool:
+        """Return whether a page or program, or the monitoring of alarms, needs the robot."""
+        return self._visitors > 0 or self.is_monitored
+
+    @property
+    def is_monitored(self) -> bool:
+        """Whether the robot stays connected for its alarms."""
+        is_ready = self.alarms.has_limits and not missing_settings(self.robot)
+        return self._wants_monitoring and is_ready
+
+    @property
+    def _wants_monitoring(self) -> bool:
+        return self.robot.is_monitored and self.robot.playback is None
 
     def _coming(self) -> asyncio.Future[LiveSession]:
         if self._next is None:

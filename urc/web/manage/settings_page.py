@@ -92,6 +92,8 @@ class SettingsPage:
     versions: tuple[Option, ...]
     """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
+    monitoring: tuple[Option, ...]
+    """Whether the robot stays connected for its alarms; empty for a robot without alarms."""
     groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
     """Names of the transports in the connection test."""
@@ -143,6 +145,7 @@ def settings_page(
         driver=driver,
         versions=_versions(versions, kept.version),
         interfaces=_interfaces(profile, kept.interface),
+        monitoring=_monitoring(profile, kept.monitors_alarms),
         groups=tuple(
             _group(title, [_field(one, kept, given, withheld) for one in settings])
             for title, settings in groups_of(profile).items()
@@ -153,6 +156,16 @@ def settings_page(
         fault=fault,
     )
     return render("settings.html.j2", page)
+
+
+def _monitoring(profile: Profile, chosen: bool | None) -> tuple[Option, ...]:
+    if all(one.limits.is_empty for one in profile.driver.signals.values()):
+        return ()
+    return (
+        Option("", t("As this server was started"), chosen is None),
+        Option("true", t("Always: stay connected"), chosen is True),
+        Option("false", t("Only while a page is open"), chosen is False),
+    )
 
 
 def _versions(versions: Sequence[str], chosen: str) -> tuple[Option, ...]:

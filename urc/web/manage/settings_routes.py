@@ -5,6 +5,7 @@ robot is switched off.
 """
 
 import asyncio
+import json
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import PurePath
@@ -195,6 +196,7 @@ class SettingsRoutes:
             settings=texts | old,
             destination=before.destination,
             package=package,
+            monitors_alarms=said.monitors_alarms,
         )
         found = factory.filled(profile, kept)
         for name in untouched.keys() & found.withheld:
@@ -237,6 +239,8 @@ def _changes(
         for name in ("version", "interface")
         if getattr(before, name) != getattr(after, name)
     }
+    if before.monitors_alarms != after.monitors_alarms:
+        changes["monitors_alarms"] = json.dumps(after.monitors_alarms)
     for name in sorted(before.settings.keys() | after.settings.keys()):
         text = after.settings.get(name, "")
         if text != before.settings.get(name, ""):

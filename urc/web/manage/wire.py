@@ -291,6 +291,8 @@ class SettingsAsked(ManageMessage, frozen=True):
     """Whether to test the connection before saving."""
     anyway: bool = False
     """Whether to save the settings even if the connection test fails."""
+    monitors_alarms: bool | None = None
+    """Whether the robot stays connected for its alarms; null for the choice of the server."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):

@@ -18,10 +18,11 @@ _NUMBER: Final = {"type": "number"}
 _COUNT: Final = {"type": "integer", "minimum": 0}
 _FLAG: Final = {"type": "boolean"}
 _WORDS: Final = ("lolo", "low", "high", "hihi")
+_SEVERITIES: Final = ("minor", "major")
 _ALARM: Final = {
     "if": {"type": "array"},
-    "then": {"items": {"enum": ["", *_WORDS]}},
-    "else": {"enum": _WORDS},
+    "then": {"items": {"enum": ["", *_WORDS, *_SEVERITIES]}},
+    "else": {"enum": [*_WORDS, *_SEVERITIES]},
 }
 _ELEMENTS: Final = ["integer", "number", "boolean", "string"]
 _TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]

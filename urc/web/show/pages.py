@@ -91,6 +91,10 @@ class RobotPage:
     cells: tuple[Cell, ...]
     stop_url: str
     """URL for STOP requests while the socket is down."""
+    alarms_url: str
+    """Path of the robot's alarms in the API."""
+    may_act: bool
+    """Whether the page may acknowledge and shelve alarms."""
     lines: str
     """Transports over which STOP reaches the robot, as a JSON list."""
     can_move: bool
@@ -130,6 +134,7 @@ def robot_page(
     is_part: bool = False,
     is_emulated: bool = False,
     has_settings: bool = False,
+    may_act: bool = True,
     trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface of a robot.
@@ -147,6 +152,7 @@ def robot_page(
         is_part: whether an open page requests this page to replace its interface.
         is_emulated: whether the robot is emulated, which the page shows next to the title.
         has_settings: whether the server has a page for the settings of the robot.
+        may_act: whether the visitor has the role ``drive`` at the robot.
         trust: rule that distinguishes third-party widgets from trusted widgets.
     """
     uses = _uses(profile, interface)
@@ -175,6 +181,8 @@ def robot_page(
         debug=debug_part(profile, wire) if interface is DEBUGGING else None,
         cells=_cells(profile, interface, uses, trust),
         stop_url=f"/api/v1/robots/{place}/stop",
+        alarms_url=f"/api/v1/robots/{place}/alarms",
+        may_act=may_act and not is_watching,
         lines=json.dumps(motion_lines(profile.driver)),
         can_move=can_move(profile.driver) and not playback,
         playback=playback,

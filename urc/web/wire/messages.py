@@ -24,6 +24,7 @@ Messages from the server to the page, listed by their tag ``t``::
     ask     a question for a second person; ``asked``: it is over
     token   the reply to ``prepare``: allows one command, once, within 5 s
     progress the state of the sequences
+    alarms  changed alarms of the robot; the first message has all alarms
 
 Images are sent as binary messages; see `urc.web.wire.picture`.
 
@@ -37,11 +38,11 @@ from typing import TypeVar
 
 import msgspec
 
-from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Sample, Signal
 from urc.runtime.connection_cause import cause_of
 from urc.runtime.hub import LinkStatus, LogEntry
+from urc.runtime.signal_sources import sources_of
 from urc.web.wire.text import cut, encoded, encoded_bytes, milliseconds, repaired
 from urc.wire.client_messages import INBOUND_BYTES, ClientMessage, CommandRequest, Ping
 from urc.wire.server_messages import (
@@ -127,7 +128,7 @@ def decode(text: str | bytes) -> Inbound:
 
 def encode_hello(profile: Profile, session: str, now_s: float) -> str:
     """Return the first message, which defines the meaning of all indexes."""
-    sources = _sources(profile.driver)
+    sources = sources_of(profile.driver)
     signals = profile.driver.signals
     return encoded(
         HelloMessage(
@@ -277,28 +278,5 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> SignalRow:
         stale_after_s=signal.stale_after_s,
         sources=sources,
         axes=signal.axes,
+        has_alarms=not signal.limits.is_empty,
     )
-
-
-def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
-    """Return the transports of each signal, taken from the fields of all messages."""
-    asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
-    reads = [(message.transport, message.read) for message in driver.messages.values()]
-    reads += [(each.transport, each.reply.read) for each in asked if each.reply]
-    found: dict[str, dict[str, None]] = {}
-    for transport, read in reads:
-        for field in read.fields:
-            found.setdefault(field, {})[transport] = None
-    for name in driver.signals:
-        _add_sources(name, driver, found)
-    return {name: tuple(transports) for name, transports in found.items()}
-
-
-def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
-    """Return the transports that supply a signal; a computed signal uses its inputs' transports."""
-    signal = driver.signals.get(name)
-    if signal is not None and signal.formula is not None and name not in found:
-        found[name] = {}
-        for other in sorted(signal.formula.names):
-            found[name] |= _add_sources(other, driver, found)
-    return found.get(name, {})

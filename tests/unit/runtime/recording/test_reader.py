@@ -80,7 +80,7 @@ def opened(file: Path) -> Recording | None:
 def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(file: Path, tmp_path: Path) -> None:
     whole, cut = file.read_bytes(), tmp_path / "cut.mcap"
     read = set()
-    for size in range(0, len(whole), 97):
+    for size in range(0, len(whole) - 8, 97):  # the last 8 bytes only mark the end
         cut.write_bytes(whole[:size])
         found = opened(cut)
         if found is None:

@@ -33,6 +33,7 @@ const SIGNS = {
   STOP: mark("■ STOP"),
   reset: mark("◆ reset"),
   ran: mark("→ command"),
+  alarm: mark("◆ alarm"),
   lost: mark("▲ lost"),
   pruned: mark("○ old entries"),
   "signed in": mark("● signed in"),

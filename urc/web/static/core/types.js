@@ -7,7 +7,8 @@
  * @typedef {Value | readonly Value[] | Readonly<Record<string, unknown>>} Held Value of a signal: a
  *   plain value, an array's elements, or an object's fields. An image or blob is an object with its
  *   number of `bytes`.
- * @typedef {"" | "lolo" | "low" | "high" | "hihi"} Alarm The exceeded limit.
+ * @typedef {"" | "lolo" | "low" | "high" | "hihi" | "minor" | "major"} Alarm The exceeded limit, or the
+ *   severity of an alarm state.
  * @typedef {"live" | "stale" | "gone" | "none"} State
  *   live: recent. stale: old, or its link is down; shown grey with its age. gone: too old to be shown.
  *   none: never received, or not available according to the robot.
@@ -22,6 +23,7 @@
  * @property {number} [precision]
  * @property {Record<string, string>} [states]
  * @property {Partial<Record<"lolo" | "low" | "high" | "hihi", number>>} [limits]
+ * @property {boolean} [has_alarms] Whether a limit or a state causes an alarm.
  * @property {number} [stale_after_s]
  * @property {string[]} [sources]
  * @property {"FLU" | "FRD" | "ENU" | "NED" | "bearing"} [axes] Axis convention.
@@ -252,6 +254,8 @@
  *   when the next one comes, so draw it at once.
  * @property {(input: string, places: readonly number[]) => void} look Selects the visible images of an
  *   input by their indexes from 0; the server sends no others. By default, all.
+ * @property {{may: () => boolean, acknowledge: (alerts: readonly Alert[]) => void, shelve: (alert: Alert, minutes: number) => void, open: () => void}} alarms
+ *   Actions of the operator on alarms: whether they are allowed, acknowledge, shelve, and open the list.
  * @property {(text: string, names?: Record<string, string | number>) => string} t Returns the text in the
  *   user's language, with "{name}" replaced.
  * @property {(input: string) => {symbol: string, factor: (value: number) => number}} unit Displayed unit
@@ -264,7 +268,7 @@
  * @property {{lines: readonly LogLine[], missing: number}} log The newest lines, oldest first, and
  *   the number of lines lost on their way to this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease The lease.
- * @property {readonly Alert[]} alarms All signals beyond a limit, the worst first.
+ * @property {readonly Alert[]} alarms All alarms of the robot that are not normal, the most urgent first.
  * @property {{limited: number, known: number}} watched Number of signals with a limit, and of those with
  *   a recent value.
  * @property {{isUp: boolean, tripMs: number | null, failures: number, skewMs: number | null, messages: number, bytes: number}} latency
@@ -288,7 +292,19 @@
  * @property {string} text The value for people.
  * @property {string} unit
  * @property {string} age Age of the value for people, such as "4 s"; "" while it is live.
- * @property {number} since Time of the first value beyond this limit, in seconds on the page's clock.
+ * @property {number} since Begin of the alarm, in seconds on the page's clock.
+ * @property {string} condition The exceeded limit, or the alarm state.
+ * @property {"low" | "medium" | "high"} priority
+ * @property {"unacknowledged" | "acknowledged" | "returned" | "shelved" | "suppressed"} state
+ * @property {boolean} isActive Whether the value is abnormal.
+ * @property {boolean} isKnown Whether the present value is known.
+ * @property {number} raised Number of this alarm, for its acknowledgement.
+ * @property {number} number Number of the activation; the order of the numbers is first-out.
+ * @property {number} times Number of activations.
+ * @property {string} cause
+ * @property {string} action Operator action.
+ * @property {string} who Name of the operator who acknowledged or shelved it.
+ * @property {number} leftS Time until the end of its shelf, in seconds.
  *
  * @typedef {object} StopState
  * @property {"" | "sending" | "sent" | "confirmed" | "latched" | "failed"} phase Progress of STOP: sent,

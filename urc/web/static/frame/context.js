@@ -77,6 +77,7 @@ export function contextOf(frame, options) {
       }
       frame.follow(what, listener);
     },
+    alarms: Object.freeze({ may: () => false, acknowledge: refused, shelve: refused, open: refused }),
     picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
       picture(frame, input, show);
     },
@@ -85,6 +86,10 @@ export function contextOf(frame, options) {
     unit: (/** @type {string} */ input) => unit(frame, input),
     style: loadStyle,
   });
+}
+
+function refused() {
+  throw new Error(t("a widget in a frame cannot do that: {wish}", { wish: "alarms" }));
 }
 
 /**

@@ -5,13 +5,13 @@
  * @typedef {import("../core/types.js").Reply} Reply
  * @typedef {import("../core/types.js").Value} Value
  */
-import { AlarmAnnouncer } from "./alarm_announcer.js";
 import { ConfirmDialog } from "../control/confirm_dialog.js";
 import { backSafely } from "./leave_page.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "../control/controls.js";
 import { Drive } from "../control/drive.js";
-import { Alerts, PageTopics, Log, Themes, watched } from "./page_topics.js";
+import { PageAlarms } from "../alarms/page_alarms.js";
+import { PageTopics, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
 import { offerHints } from "./hints.js";
 import { Host } from "../widgets/host.js";
@@ -41,7 +41,6 @@ const root = part(document, "[data-robot]");
 const store = new Store();
 const badge = new Badge(part(root, "[data-badge]"));
 const panel = new Panel(part(root, "[data-panel]"));
-const alarms = new AlarmAnnouncer(part(root, "[data-alarms]"));
 
 /** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
 const waiting = new Map();
@@ -83,7 +82,6 @@ stop.onPressed = forgetQuestions;
 let sequences = {};
 const controls = bar instanceof HTMLElement ? new Controls(root, bar, drive, stop) : null;
 const log = new Log();
-const alerts = new Alerts();
 const themes = new Themes(wake);
 const follows = new PageTopics(
   {
@@ -96,7 +94,7 @@ const follows = new PageTopics(
       const value = { lease: drive.lease, isMine: drive.isMine, refusal: drive.refusal };
       return { look: JSON.stringify(value), value };
     },
-    alarms: () => alerts.news(store, performance.now()),
+    alarms: () => alarms.news(),
     watched: () => watched(store, performance.now()),
     latency: () => {
       const { isUp, tripMs, failures, skewMs, messages, bytes } = socket;
@@ -108,7 +106,19 @@ const follows = new PageTopics(
   },
   wake,
 );
+const strip = part(root, "[data-alarm-strip]");
+const alarms = new PageAlarms({
+  root,
+  strip,
+  said: part(root, "[data-alarms]"),
+  store,
+  path: strip.dataset["path"] ?? "",
+  lease: () => drive.lease,
+  wake,
+  tell: (text) => tell(text),
+});
 const host = new Host(store, {
+  alarms,
   run,
   asks,
   steer: (command, verb) => void socket.send({ t: "steer", command, verb }),
@@ -167,7 +177,7 @@ function draw() {
   badge.frame(store, socket);
   panel.frame(store, socket.reason);
   lost.frame(store, socket, nowMs, badge.isReplay);
-  alarms.frame(store, nowMs);
+  alarms.frame(nowMs);
   stop.frame();
   controls?.frame(nowMs);
   wakeLock.want(drive.isMine);
@@ -194,7 +204,6 @@ function take(message) {
   switch (message.t) {
     case "v":
       store.values(message, nowMs);
-      if (message.s || alarms.isAny) break; // alarms are shown outside of widgets, too
       wakeWidgets();
       return;
     case "hello":
@@ -203,7 +212,11 @@ function take(message) {
       session = message.session;
       sequences = {};
       screenName.tell();
+      alarms.clear();
       shown = "[]"; // a new connection sends no images before a request
+      break;
+    case "alarms":
+      alarms.take(message);
       break;
     case "links":
       store.setLinks(message.links, nowMs);

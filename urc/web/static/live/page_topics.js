@@ -3,8 +3,6 @@
  * Data of the page besides signals, for its followers: at once, and after every change, always in an
  * animation frame. Topics without followers cost nothing.
  *
- * @typedef {import("../core/types.js").Alarm} Alarm
- * @typedef {import("../core/types.js").Alert} Alert
  * @typedef {import("../core/types.js").Line} Line
  * @typedef {import("../core/types.js").LogLine} LogLine
  * @typedef {import("../core/types.js").Topics} Topics
@@ -98,39 +96,6 @@ export class Log {
   }
 }
 
-/** @type {Record<Alarm, number>} */
-const RANKS = { "": 9, lolo: 0, hihi: 0, low: 1, high: 1 };
-
-/** The signals beyond a limit, with the start of each alarm. */
-export class Alerts {
-  constructor() {
-    /** @type {Map<string, {alarm: Alarm, since: number}>} */
-    this.known = new Map();
-  }
-
-  /**
-   * @param {Store} store
-   * @param {number} nowMs
-   */
-  news(store, nowMs) {
-    /** @type {Alert[]} */
-    const found = [];
-    for (const name of this.known.keys()) {
-      if (!store.samples.has(name)) this.known.delete(name);
-    }
-    for (const name of store.samples.keys()) {
-      const { alarm, text, unit, age, signal } = store.reading(name, nowMs);
-      const before = this.known.get(name);
-      if (!alarm) this.known.delete(name);
-      else if (before?.alarm !== alarm) this.known.set(name, { alarm, since: nowMs / 1000 });
-      const since = this.known.get(name)?.since ?? 0;
-      if (alarm) found.push({ signal: name, title: signal.title || name, alarm, text, unit, age, since });
-    }
-    found.sort((one, other) => RANKS[one.alarm] - RANKS[other.alarm] || other.since - one.since);
-    return { look: JSON.stringify(found), value: found };
-  }
-}
-
 /**
  * Return the number of signals with a limit, and of those with a known value. The others may be beyond
  * their limit.
@@ -139,7 +104,7 @@ export class Alerts {
  * @param {number} nowMs
  */
 export function watched(store, nowMs) {
-  const limited = [...store.signals.values()].filter(({ limits }) => Object.keys(limits ?? {}).length > 0);
+  const limited = [...store.signals.values()].filter(({ has_alarms }) => has_alarms);
   const known = limited.filter(({ name }) => store.state(name, nowMs) === "live");
   const value = { limited: limited.length, known: known.length };
   return { look: JSON.stringify(value), value };

@@ -78,6 +78,7 @@ async function send({ test, anyway = false }) {
       settings: filled(),
       version: chosen("version"),
       interface: chosen("interface"),
+      monitorsAlarms: { true: true, false: false }[chosen("monitoring")] ?? null,
       test,
       anyway,
     });

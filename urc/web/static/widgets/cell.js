@@ -39,6 +39,7 @@
  * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
+ * @property {import("../alarms/demo_alarms.js").AlarmDoor} alarms
  * @property {Store} store
  */
 import { RenderBudget } from "./render_budget.js";

@@ -57,6 +57,13 @@ export function contextOf(cell) {
     follow: (/** @type {keyof Topics} */ what, /** @type {(news: any) => void} */ listener) => {
       doors.follows.listen(what, cell.guarded(listener), end.signal);
     },
+    alarms: Object.freeze({
+      may: () => doors.alarms.mayAct,
+      acknowledge: (/** @type {readonly import("../core/types.js").Alert[]} */ alerts) => void doors.alarms.acknowledge(alerts),
+      shelve: (/** @type {import("../core/types.js").Alert} */ { signal }, /** @type {number} */ minutes) =>
+        doors.alarms.shelve([signal], minutes),
+      open: () => doors.alarms.open(),
+    }),
     picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
       picture(cell, input, show);
     },

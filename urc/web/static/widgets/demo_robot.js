@@ -33,7 +33,8 @@
  */
 import { ConfirmDialog } from "../control/confirm_dialog.js";
 import { Drive } from "../control/drive.js";
-import { Alerts, PageTopics, watched } from "../live/page_topics.js";
+import { DemoAlarms } from "../alarms/demo_alarms.js";
+import { PageTopics, watched } from "../live/page_topics.js";
 import { Host } from "./host.js";
 import { Input } from "../control/input.js";
 import { StopButton } from "../control/stop.js";
@@ -132,6 +133,7 @@ export class DemoRobot {
     socket.drive = this.drive;
     this.input = new Input(this.drive);
     this.stop = new StopButton(this.drive, this.input, this.store, []);
+    this.alarms = new DemoAlarms(this.store, this.news.follow.alarms, say, wake);
     this.follows = new PageTopics(this.sources(), wake);
     this.host = new Host(this.store, this.doors(bar, wake, say));
     this.host.isAllInSight = true;
@@ -150,6 +152,7 @@ export class DemoRobot {
       again: wake,
       input,
       follows,
+      alarms: this.alarms,
       asks: new ConfirmDialog(bar, (message) => {
         say(JSON.stringify(message));
         return true;
@@ -186,7 +189,6 @@ export class DemoRobot {
   /** @returns {import("../live/page_topics.js").Sources} */
   sources() {
     const { follow } = this.news;
-    const alerts = new Alerts();
     /** @type {Topics} */
     const calm = {
       links: { isUp: true, links: [LINE] },
@@ -204,7 +206,7 @@ export class DemoRobot {
       const value = follow[what] ?? calm[what];
       made[what] = () => ({ look: "", value });
     }
-    if (!follow.alarms) made.alarms = () => alerts.news(this.store, performance.now());
+    made.alarms = () => this.alarms.news();
     if (!follow.watched) made.watched = () => watched(this.store, performance.now());
     if (!follow.lease) {
       made.lease = () => {

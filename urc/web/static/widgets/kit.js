@@ -33,6 +33,8 @@ export const ALARMS = Object.freeze({
   low: mark("◆ Low"),
   high: mark("◆ High"),
   hihi: mark("▲ Very high"),
+  minor: mark("◆ Warning"),
+  major: mark("▲ Alarm"),
 });
 
 /**

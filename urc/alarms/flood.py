@@ -1,0 +1,51 @@
+"""Floods and bursts of alarms, as in ISA-18.2.
+
+Layer 3. Pure. A flood begins with more than 10 alarms in 10 minutes, the most that one operator can
+handle. A flood ends with fewer than 5 alarms in 10 minutes. A burst is a sequence of alarms with
+short gaps, which often have one cause: the first alarm of the burst.
+"""
+
+from collections import deque
+from typing import Final
+
+__all__ = ["BURST_GAP_S", "FLOOD_BEGINS", "FLOOD_ENDS", "FLOOD_S", "FloodDetector"]
+
+FLOOD_S: Final = 600.0
+FLOOD_BEGINS: Final = 10
+"""Most alarms in `FLOOD_S` without a flood."""
+FLOOD_ENDS: Final = 5
+"""A flood ends with fewer alarms than this in `FLOOD_S`."""
+BURST_GAP_S: Final = 5.0
+"""Longest time between two alarms of one burst, in seconds."""
+
+
+class FloodDetector:
+    """The rate of one robot's alarms."""
+
+    def __init__(self, group: int = 0) -> None:
+        """Begin without alarms; `group` is the number of the last burst before a restart."""
+        self.is_flooded = False
+        self.group = group
+        """Number of the present burst."""
+        self._times: deque[float] = deque(maxlen=FLOOD_BEGINS + 1)
+        """Times of the newest alarms; the oldest of them decides about the beginning."""
+
+    def count(self, now: float) -> None:
+        """Count one alarm."""
+        if not self._times or not 0 <= now - self._times[-1] <= BURST_GAP_S:
+            self.group += 1
+        self._times.append(now)
+        if len(self._times) > FLOOD_BEGINS and now - self._times[0] <= FLOOD_S:
+            self.is_flooded = True
+
+    @property
+    def deadline(self) -> float | None:
+        """Time at which the flood ends without further alarms; None without a flood."""
+        return self._times[-FLOOD_ENDS] + FLOOD_S if self.is_flooded else None
+
+    def tick(self, now: float) -> None:
+        """End a flood whose rate has fallen; a clock that was set back ends it, too."""
+        end = self.deadline
+        if end is not None and not end - FLOOD_S <= now < end:
+            self.is_flooded = False
+            self._times.clear()

@@ -1,0 +1,142 @@
+"""The state of one alarm, and the events of its history.
+
+Layer 3. Pure. All times are in UTC seconds since 1970, because shelves end at a time of day and
+states survive a restart.
+"""
+
+from typing import Final, Literal, NamedTuple
+
+from urc.model.values import Alarm, AlarmLimits, AlarmPriority, Reading, state_texts
+
+__all__ = [
+    "EVENT_KINDS",
+    "PRIORITIES",
+    "AlarmEvent",
+    "AlarmEventKind",
+    "AlarmRecord",
+    "AlarmState",
+    "condition_of",
+    "severity",
+    "text_of_value",
+]
+
+PRIORITIES: Final[tuple[AlarmPriority, ...]] = ("high", "medium", "low")
+"""Priorities, the most urgent first."""
+AlarmState = Literal[
+    "normal", "unacknowledged", "acknowledged", "returned", "shelved", "suppressed"
+]
+"""State of an alarm; ``returned``: returned to normal, but not acknowledged."""
+AlarmEventKind = Literal[
+    "raised", "changed", "returned", "acknowledged", "shelved", "unshelved", "suppressed",
+    "unsuppressed", "unknown", "removed", "flood began", "flood ended",
+]  # fmt: skip
+"""Kind of an event. ``changed``: less severe than before. ``unknown``: the value is not known any
+more. ``removed``: the robot's document declares the alarm no longer."""
+EVENT_KINDS: Final[tuple[AlarmEventKind, ...]] = (
+    "raised", "changed", "returned", "acknowledged", "shelved", "unshelved", "suppressed",
+    "unsuppressed", "unknown", "removed", "flood began", "flood ended",
+)  # fmt: skip
+_MILD: Final = ("low", "high", "minor")
+_SAME_SIDE: Final = {("lolo", "low"), ("hihi", "high")}
+_LONGEST_VALUE: Final = 100
+
+
+class AlarmRecord(NamedTuple):
+    """The state of the alarm of one signal."""
+
+    signal: str
+    condition: str
+    """Crossed limit or alarm state, now or before the return to normal."""
+    priority: AlarmPriority
+    number: int
+    """Number of the activation within the robot; the order of these numbers is first-out."""
+    group: int
+    """Number of the burst of alarms to which the activation belongs."""
+    began_at: float
+    raised: int
+    """Number of the last event that asks for an acknowledgement; see `AlarmList.acknowledge`."""
+    value: str = ""
+    """Value at the last change, as text."""
+    is_active: bool = True
+    is_known: bool = True
+    """Whether the present value is known; an alarm of an unknown value stays in the list."""
+    is_acknowledged: bool = False
+    is_suppressed: bool = False
+    times: int = 1
+    """Number of activations since the alarm was last normal."""
+    returned_at: float = 0.0
+    """Time of the last return to normal; 0 while the alarm is active."""
+    acknowledged_at: float = 0.0
+    acknowledged_by: str = ""
+    shelved_until: float = 0.0
+    """End of the shelf; 0 for an alarm that is not shelved."""
+    shelved_by: str = ""
+
+    @property
+    def state(self) -> AlarmState:
+        """State of the alarm; shelving and suppression hide the other states."""
+        if self.shelved_until:
+            return "shelved"
+        if self.is_active:
+            if self.is_suppressed:
+                return "suppressed"
+            return "acknowledged" if self.is_acknowledged else "unacknowledged"
+        return "normal" if self.is_acknowledged else "returned"
+
+    @property
+    def is_annunciated(self) -> bool:
+        """Whether operators must see the alarm."""
+        return self.state in ("unacknowledged", "acknowledged", "returned")
+
+
+class AlarmEvent(NamedTuple):
+    """One event of the history."""
+
+    at: float
+    signal: str
+    """Name of the signal; "" for a flood."""
+    kind: AlarmEventKind
+    condition: str = ""
+    priority: AlarmPriority = "medium"
+    value: str = ""
+    state: AlarmState = "normal"
+    """State of the alarm after the event."""
+    who: str = ""
+    """Name of the person or program that acted; "" for an event of the robot."""
+    principal: str = ""
+    until: float = 0.0
+    """End of a shelf."""
+    times: int = 1
+    """Number of equal activations that the event represents."""
+
+
+def condition_of(alarm: Alarm, value: Reading, limits: AlarmLimits) -> str:
+    """Return the limit or the alarm state behind the alarm of a sample; "" without an alarm."""
+    if alarm not in ("major", "minor"):
+        return alarm
+    wanted = "high" if alarm == "major" else ""
+    words = [word for word in state_texts(value) if word in limits.states]
+    graver = (word for word in words if limits.attributes_of(word).priority == wanted)
+    # During an off-delay, the value has left the alarm state already.
+    return next(graver, words[0] if words else alarm)
+
+
+def severity(condition: str, priority: AlarmPriority) -> tuple[int, int]:
+    """Return the order of an alarm by severity; the smallest is the most severe."""
+    return PRIORITIES.index(priority), int(condition in _MILD)
+
+
+def is_easing(before: str, after: str) -> bool:
+    """Return whether a change of the condition only eases an alarm, as from lolo to low."""
+    return (before, after) in _SAME_SIDE
+
+
+def text_of_value(value: Reading) -> str:
+    """Return a short text of a value."""
+    if isinstance(value, bytes):
+        return f"{len(value)} bytes"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return ("" if value is None else str(value))[:_LONGEST_VALUE]

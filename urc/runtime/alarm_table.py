@@ -1,0 +1,258 @@
+"""The SQLite file of alarms: the present states of all robots' alarms, and the history.
+
+Layer 4. All functions block: servers call them in a thread. The states are JSON objects, so a newer
+version of URC may add attributes: an older one skips unknown attributes.
+"""
+
+import json
+import logging
+import os
+import sqlite3
+import time
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Final, NamedTuple, get_args
+
+from urc.alarms.record import AlarmEvent, AlarmRecord
+from urc.model.values import AlarmPriority
+from urc.problems import UrcError
+
+__all__ = [
+    "FILE",
+    "MOST_EVENTS",
+    "AlarmQuery",
+    "AlarmRow",
+    "AlarmSearchTimeout",
+    "alarm_file",
+    "append_events",
+    "load_records",
+    "prune_events",
+    "save_records",
+    "search_alarms",
+]
+
+FILE: Final = "alarms.sqlite"
+"""Name of the file in the data folder."""
+MOST_EVENTS: Final = 100_000
+"""Number of newest events that the history keeps."""
+_SPARE: Final = 1000
+"""Events beyond the limit that are deleted together."""
+_VERSION: Final = 1
+_LOCKED_S: Final = 1.0
+_LONGEST_S: Final = 5.0
+"""Maximum time of one search, in seconds."""
+_STEPS: Final = 50_000
+_COLUMNS: Final = AlarmEvent._fields
+_TYPES: Final = {"at": "REAL", "until": "REAL", "times": "INTEGER"}
+_CREATE: Final = (
+    "CREATE TABLE states (robot TEXT NOT NULL, signal TEXT NOT NULL, record TEXT NOT NULL,"
+    " PRIMARY KEY (robot, signal)) WITHOUT ROWID",
+    "CREATE TABLE events (id INTEGER PRIMARY KEY, robot TEXT NOT NULL, "
+    + ", ".join(f"{name} {_TYPES.get(name, 'TEXT')} NOT NULL" for name in _COLUMNS)
+    + ")",
+    "CREATE INDEX by_robot ON events (robot, id)",
+    f"PRAGMA user_version = {_VERSION}",
+)
+_INSERT: Final = (
+    f"INSERT INTO events (robot, {', '.join(_COLUMNS)})"  # noqa: S608 - names of our own
+    f" VALUES ({', '.join('?' * (len(_COLUMNS) + 1))})"
+)
+_SELECT: Final = f"SELECT id, {', '.join(_COLUMNS)} FROM events"  # noqa: S608 - as above
+
+log = logging.getLogger(__name__)
+
+
+class AlarmSearchTimeout(UrcError):
+    """A search that takes too long."""
+
+
+class AlarmRow(NamedTuple):
+    """One event of the history, with its number."""
+
+    id: int
+    event: AlarmEvent
+
+
+class AlarmQuery(NamedTuple):
+    """The events to find, of one robot."""
+
+    robot: str
+    text: str = ""
+    """Text in signal, kind, condition, value or name, regardless of the case of ASCII letters."""
+    kinds: tuple[str, ...] = ()
+    """Kinds of events; empty for all."""
+    signals: tuple[str, ...] = ()
+    """Names of signals that match in addition to `text`, because their titles contain it."""
+    since: float = 0.0
+    """Start of the period, as UTC time in seconds since 1970."""
+    until: float = float("inf")
+    """End of the period; events at this time are not included."""
+    before: int = 0
+    """Number of an event; only older events are returned. 0 starts with the newest event."""
+    last: int = 100
+    """Maximum number of events."""
+
+
+def alarm_file(file: Path) -> sqlite3.Connection:
+    """Return a connection for writing; create the file, readable to its owner only.
+
+    Raises:
+        sqlite3.DatabaseError: the file is not a file of alarms.
+        OSError: the file cannot be created.
+    """
+    # Created before SQLite does, because SQLite's other files copy the mode of this one.
+    os.close(os.open(file, os.O_RDWR | os.O_CREAT, 0o600))
+    for name in ("", "-wal", "-shm"):
+        with suppress(FileNotFoundError):
+            os.chmod(f"{file}{name}", 0o600)
+    base = sqlite3.connect(file, timeout=_LOCKED_S, isolation_level=None)
+    try:
+        base.execute("PRAGMA journal_mode = WAL")
+        base.execute("PRAGMA synchronous = FULL")  # an acknowledgement survives a power failure
+        base.execute("PRAGMA journal_size_limit = 1048576")
+        _create(base)
+    except sqlite3.Error:
+        base.close()
+        raise
+    return base
+
+
+def _create(base: sqlite3.Connection) -> None:
+    base.execute("BEGIN IMMEDIATE")
+    try:
+        (version,) = base.execute("PRAGMA user_version").fetchone()
+        if version == 0:
+            for statement in _CREATE:
+                base.execute(statement)
+        elif version > _VERSION:
+            raise sqlite3.OperationalError("a newer version of URC made this file")
+        base.execute("COMMIT")
+    except sqlite3.Error:
+        with suppress(sqlite3.Error):
+            base.execute("ROLLBACK")
+        raise
+
+
+def save_records(
+    base: sqlite3.Connection, records: Mapping[tuple[str, str], AlarmRecord | None]
+) -> None:
+    """Write records by robot and signal, inside a transaction; None deletes a record."""
+    gone = [key for key, record in records.items() if record is None]
+    base.executemany("DELETE FROM states WHERE robot = ? AND signal = ?", gone)
+    there = [
+        (*key, json.dumps(record._asdict(), ensure_ascii=True))
+        for key, record in records.items()
+        if record is not None
+    ]
+    base.executemany("INSERT OR REPLACE INTO states VALUES (?, ?, ?)", there)
+
+
+def append_events(base: sqlite3.Connection, events: Iterable[tuple[str, AlarmEvent]]) -> None:
+    """Append pairs of robot and event, inside a transaction."""
+    base.executemany(_INSERT, [(robot, *event) for robot, event in events])
+
+
+def prune_events(base: sqlite3.Connection, most: int = MOST_EVENTS) -> None:
+    """Delete the oldest events beyond `most`, inside a transaction."""
+    first, last = base.execute("SELECT min(id), max(id) FROM events").fetchone()
+    if first is not None and last - first >= most + _SPARE:
+        base.execute("DELETE FROM events WHERE id <= ?", (last - most,))
+
+
+def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
+    """Return the stored records of all robots with their robots; [] without a file.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    with _opened(file) as base:
+        if base is None:
+            return []
+        rows = base.execute("SELECT robot, record FROM states").fetchall()
+    found = ((robot, _record(text)) for robot, text in rows)
+    return [(robot, one) for robot, one in found if one is not None]
+
+
+def search_alarms(file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S) -> list[AlarmRow]:
+    """Return the newest events of a query, newest first; [] without a file.
+
+    Raises:
+        OSError: the file cannot be read.
+        AlarmSearchTimeout: the search takes longer than `longest_s`.
+    """
+    where, values = _condition(query)
+    with _opened(file) as base:
+        if base is None:
+            return []
+        ends_at = time.monotonic() + longest_s
+        base.set_progress_handler(lambda: time.monotonic() > ends_at, _STEPS)
+        try:
+            order = " ORDER BY id DESC LIMIT ?"
+            rows = base.execute(_SELECT + where + order, (*values, query.last)).fetchall()
+        except sqlite3.OperationalError:
+            if time.monotonic() > ends_at:
+                raise AlarmSearchTimeout(
+                    f"the search takes more than {longest_s:g} s: choose a shorter period"
+                ) from None
+            raise
+    return [AlarmRow(number, AlarmEvent._make(row)) for number, *row in rows]
+
+
+def _condition(query: AlarmQuery) -> tuple[str, list[object]]:
+    parts, values = ["robot = ? AND at >= ? AND at < ?"], [query.robot, query.since, query.until]
+    found: list[object] = [*values]
+    if query.kinds:
+        parts.append(f"kind IN ({_marks(query.kinds)})")
+        found += query.kinds
+    if query.text:
+        texts = ("signal", "kind", "condition", "value", "who")
+        pattern = query.text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
+        either = [f"{name} LIKE ? ESCAPE '!'" for name in texts]
+        found += [f"%{pattern}%"] * len(texts)
+        if query.signals:
+            either.append(f"signal IN ({_marks(query.signals)})")
+            found += query.signals
+        parts.append(f"({' OR '.join(either)})")
+    if query.before:
+        parts.append("id < ?")
+        found.append(query.before)
+    return " WHERE " + " AND ".join(parts), found
+
+
+def _marks(values: Collection[str]) -> str:
+    return ", ".join("?" * len(values))
+
+
+def _record(text: str) -> AlarmRecord | None:
+    """Return a stored record; None for a damaged one."""
+    try:
+        given = json.loads(text)
+        known = {name: given[name] for name in AlarmRecord._fields if name in given}
+        record = AlarmRecord(**known)
+        usual = AlarmRecord("", "", "medium", 0, 0, 0.0, 0)
+        are_right = all(
+            type(one) is type(other) or {type(one), type(other)} == {int, float}
+            for one, other in zip(record, usual, strict=True)
+        )
+    except (ValueError, TypeError, KeyError):
+        are_right = False
+    if not are_right or record.priority not in get_args(AlarmPriority):
+        log.warning("a stored alarm is damaged: %.100s", text)
+        return None
+    return record
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[sqlite3.Connection | None]:
+    """Open a file for reading; give None without a file, and turn errors into `OSError`."""
+    if not file.is_file():
+        yield None
+        return
+    place = f"{file.absolute().as_uri()}?mode=ro"
+    try:
+        with closing(sqlite3.connect(place, uri=True, timeout=_LOCKED_S)) as base:
+            (version,) = base.execute("PRAGMA user_version").fetchone()
+            yield base if version else None
+    except sqlite3.Error as error:
+        raise OSError(f"{file} cannot be read: {error}") from error
