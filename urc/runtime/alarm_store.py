@@ -24,6 +24,7 @@ from urc.runtime.alarm_table import (
     prune_events,
     save_records,
 )
+from urc.runtime.sqlite_file import set_aside
 
 __all__ = ["AlarmStore"]
 
@@ -171,11 +172,8 @@ class AlarmStore:
         except sqlite3.OperationalError:
             raise  # possibly temporary: a full disk, or a folder without write permission
         except sqlite3.DatabaseError as error:
-            aside = self.file.with_suffix(".broken")
+            aside = set_aside(self.file)
             log.warning("%s is no file of alarms (%s); renamed to %s", self.file, error, aside.name)
-            self.file.replace(aside)
-            for ending in ("-wal", "-shm"):
-                Path(f"{self.file}{ending}").unlink(missing_ok=True)
             return alarm_file(self.file)
 
     def _write(

@@ -6,7 +6,6 @@ version of URC may add attributes: an older one skips unknown attributes.
 
 import json
 import logging
-import os
 import sqlite3
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -17,6 +16,7 @@ from typing import Final, NamedTuple, get_args
 from urc.alarms.record import AlarmEvent, AlarmRecord
 from urc.model.values import AlarmPriority
 from urc.problems import UrcError
+from urc.runtime.sqlite_file import open_for_reading, open_for_writing
 
 __all__ = [
     "FILE",
@@ -39,7 +39,6 @@ MOST_EVENTS: Final = 100_000
 _SPARE: Final = 1000
 """Events beyond the limit that are deleted together."""
 _VERSION: Final = 1
-_LOCKED_S: Final = 1.0
 _LONGEST_S: Final = 5.0
 """Maximum time of one search, in seconds."""
 _STEPS: Final = 50_000
@@ -101,16 +100,9 @@ def alarm_file(file: Path) -> sqlite3.Connection:
         sqlite3.DatabaseError: the file is not a file of alarms.
         OSError: the file cannot be created.
     """
-    # Created before SQLite does, because SQLite's other files copy the mode of this one.
-    os.close(os.open(file, os.O_RDWR | os.O_CREAT, 0o600))
-    for name in ("", "-wal", "-shm"):
-        with suppress(FileNotFoundError):
-            os.chmod(f"{file}{name}", 0o600)
-    base = sqlite3.connect(file, timeout=_LOCKED_S, isolation_level=None)
+    base = open_for_writing(file)
     try:
-        base.execute("PRAGMA journal_mode = WAL")
         base.execute("PRAGMA synchronous = FULL")  # an acknowledgement survives a power failure
-        base.execute("PRAGMA journal_size_limit = 1048576")
         _create(base)
     except sqlite3.Error:
         base.close()
@@ -249,9 +241,8 @@ def _opened(file: Path) -> Iterator[sqlite3.Connection | None]:
     if not file.is_file():
         yield None
         return
-    place = f"{file.absolute().as_uri()}?mode=ro"
     try:
-        with closing(sqlite3.connect(place, uri=True, timeout=_LOCKED_S)) as base:
+        with closing(open_for_reading(file)) as base:
             (version,) = base.execute("PRAGMA user_version").fetchone()
             yield base if version else None
     except sqlite3.Error as error:

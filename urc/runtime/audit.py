@@ -24,6 +24,7 @@ from typing import Final
 from urc.private_files import make_private
 from urc.runtime.audit_entry import AuditEntry, cleaned
 from urc.runtime.audit_table import Retention, append, connected, prune
+from urc.runtime.sqlite_file import set_aside
 
 __all__ = ["FILE", "AuditLog"]
 
@@ -143,13 +144,10 @@ class AuditLog:
         except sqlite3.OperationalError:
             raise  # possibly temporary: a full disk, or a folder without write permission
         except sqlite3.DatabaseError as error:
-            aside = _free(self.file.with_suffix(".broken"))
+            aside = set_aside(self.file)
             log.warning(
                 "%s is not an audit file (%s); it was renamed to %s", self.file, error, aside.name
             )
-            self.file.replace(aside)
-            for ending in ("-wal", "-shm"):
-                Path(f"{self.file}{ending}").unlink(missing_ok=True)
             return connected(self.file)
 
     def _write(self, base: sqlite3.Connection, batch: Sequence[AuditEntry]) -> None:
@@ -190,12 +188,3 @@ class AuditLog:
             self._wakes.wait_for(lambda: self._is_closing, _RETRY_S)
             if self._is_closing:
                 self._waiting.clear()
-
-
-def _free(file: Path) -> Path:
-    """Return a path that no file has yet: a damaged log is never overwritten."""
-    number = 2
-    free = file
-    while free.exists():
-        free, number = file.with_name(f"{file.name}{number}"), number + 1
-    return free

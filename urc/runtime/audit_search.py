@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 
 from urc.problems import UrcError
 from urc.runtime.audit_entry import COLUMNS, AuditEntry
-from urc.runtime.audit_table import AuditRow, reading, row_of, select
+from urc.runtime.audit_table import AuditRow, row_of, select
+from urc.runtime.sqlite_file import open_for_reading
 
 __all__ = ["MOST", "AuditQuery", "SearchTimeout", "condition", "opened", "search"]
 
@@ -120,7 +121,7 @@ def opened(file: Path) -> Iterator[sqlite3.Connection | None]:
         yield None
         return
     try:
-        with closing(reading(file)) as base:
+        with closing(open_for_reading(file)) as base:
             yield base
     except sqlite3.Error as error:
         raise OSError(f"{file} cannot be read: {error}") from error

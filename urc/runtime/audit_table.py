@@ -6,7 +6,6 @@ deleted entry. The chain can therefore be checked from its new beginning.
 """
 
 import json
-import os
 import sqlite3
 from collections.abc import Iterable
 from contextlib import suppress
@@ -14,10 +13,10 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from urc.runtime.audit_entry import COLUMNS, FIRST_COLUMNS, VERSION, AuditEntry, link
+from urc.runtime.sqlite_file import open_for_writing
 
 __all__ = [
     "FOLLOWS",
-    "LOCKED_S",
     "PRUNED",
     "AuditRow",
     "Retention",
@@ -25,19 +24,15 @@ __all__ = [
     "connected",
     "is_migrated",
     "prune",
-    "reading",
     "row_of",
     "select",
 ]
 
-LOCKED_S: Final = 1.0
-"""Maximum wait for other readers and writers of the file, in seconds."""
 PRUNED: Final = "pruned"
 """Kind of the entry about deleted entries."""
 FOLLOWS: Final = "SELECT id, chain FROM entries ORDER BY id DESC LIMIT 1"
 _SHARE: Final = 10
 """Divisor for the number of rows that a full file loses: 10 deletes a tenth of the rows."""
-_PAGE: Final = 4096
 _TYPES: Final = {"at": "REAL", "epoch": "INTEGER", "times": "INTEGER", "lasted_s": "REAL"}
 _LATER: Final = (
     *(f"{name} TEXT NOT NULL DEFAULT ''" for name in COLUMNS[FIRST_COLUMNS:]),
@@ -88,17 +83,9 @@ def connected(file: Path) -> sqlite3.Connection:
         sqlite3.DatabaseError: the file is not an audit log.
         OSError: the file cannot be created.
     """
-    # Created before SQLite does, because SQLite's other files copy the mode of this one.
-    os.close(os.open(file, os.O_RDWR | os.O_CREAT, 0o600))
-    for name in ("", "-wal", "-shm"):
-        with suppress(FileNotFoundError):
-            os.chmod(f"{file}{name}", 0o600)
-    base = sqlite3.connect(file, timeout=LOCKED_S, isolation_level=None)
+    base = open_for_writing(file)
     try:
-        base.execute(f"PRAGMA page_size = {_PAGE}")
-        base.execute("PRAGMA journal_mode = WAL")
         base.execute("PRAGMA synchronous = NORMAL")
-        base.execute("PRAGMA journal_size_limit = 1048576")
         if not is_migrated(base):
             _migrate(base)
         base.execute(FOLLOWS)  # fails if the file is not an audit file
@@ -106,11 +93,6 @@ def connected(file: Path) -> sqlite3.Connection:
         base.close()
         raise
     return base
-
-
-def reading(file: Path) -> sqlite3.Connection:
-    """Return a connection for reading a file that a server may be writing."""
-    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=LOCKED_S)
 
 
 def select(base: sqlite3.Connection) -> str:
@@ -219,4 +201,5 @@ def _pruning(count: int, last: int, chain: str, at: float, reason: str) -> Audit
 def _size(base: sqlite3.Connection) -> int:
     (pages,) = base.execute("PRAGMA page_count").fetchone()
     (free,) = base.execute("PRAGMA freelist_count").fetchone()
-    return int(pages - free) * _PAGE
+    (page,) = base.execute("PRAGMA page_size").fetchone()
+    return int(pages - free) * int(page)

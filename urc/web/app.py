@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
-from typing import NamedTuple
 from urllib.parse import quote
 
 import msgspec
@@ -29,18 +28,15 @@ from urc.runtime.alarm_table import FILE as ALARM_FILE
 from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
-from urc.runtime.audit_recorder import AuditRecorder
-from urc.runtime.clock import LoopClock
 from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
-from urc.runtime.robot_alarms import RobotAlarms
 from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
 from urc.web.access_page import AccessMiddleware
 from urc.web.alarms.notifier import AlarmNotifier
-from urc.web.alarms.routes import AlarmCalls, alarm_key
+from urc.web.alarms.routes import AlarmCalls
 from urc.web.api.calls import api_routes
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
@@ -66,6 +62,7 @@ from urc.web.people.people_routes import PeopleRoutes
 from urc.web.people.proxy_middleware import ProxyMiddleware
 from urc.web.people.sign_in_page import Stoppable
 from urc.web.people.ways_in import SignInOptions, WaysIn
+from urc.web.robot_services import Stores, fleet_of, latch_of
 from urc.web.serve.access import Access
 from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
 from urc.web.serve.certificates import Certificates
@@ -147,7 +144,7 @@ def build_app(
         audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     alarms = AlarmStore(data / ALARM_FILE) if data is not None else None
-    fleet = _fleet(robots, _Stores(data, audit, alarms, notifier), linger_s)
+    fleet = fleet_of(robots, Stores(data, audit, alarms, notifier), linger_s)
     contacts = ContactWatch(lambda: fleet.stations, data)
     routes = _Routes(
         fleet=fleet,
@@ -175,7 +172,7 @@ def build_app(
     access.on_bad_token = partial(record_bad_token, recorder)
 
     def renew(name: str, robot: Robot) -> None:
-        routes.renew(name, robot, _latch(data, robot))
+        routes.renew(name, robot, latch_of(data, robot))
 
     if robot_options is not None:
         routes.manager = Manager(RobotFactory(robot_options), fleet, time.monotonic, renew)
@@ -190,60 +187,6 @@ def build_app(
 
 def _unread(entry: AuditEntry) -> None:
     """Ignore the entry."""
-
-
-class _Stores(NamedTuple):
-    """The lasting data of all robots."""
-
-    data: Path | None
-    audit: AuditLog | None
-    alarms: AlarmStore | None
-    notifier: AlarmNotifier | None
-
-
-def _fleet(robots: Mapping[str, Robot], stores: _Stores, linger_s: float) -> Fleet:
-    turn = asyncio.Lock()
-    return Fleet(
-        robots,
-        lambda name, robot: RobotService(
-            robot,
-            linger_s=linger_s,
-            latch=_latch(stores.data, robot),
-            recorder=_recorder(stores.audit, name, robot),
-            turn=turn,
-            alarms=_alarms(stores, name, robot),
-        ),
-    )
-
-
-def _alarms(stores: _Stores, name: str, robot: Robot) -> RobotAlarms:
-    """Return the alarms of a robot; those of a playback are neither stored nor notified."""
-    is_live = robot.playback is None
-    found = RobotAlarms(
-        robot.profile.driver,
-        LoopClock(),
-        time.time,
-        key=alarm_key(name, is_emulated=robot.is_emulated),
-        memory=stores.alarms if is_live else None,
-        is_monitored=robot.is_monitored and is_live,
-    )
-    if stores.notifier is not None and is_live:
-        found.on_events = partial(stores.notifier.take, name, robot.profile.title or name, found)
-    return found
-
-
-def _latch(data: Path | None, robot: Robot) -> LatchStore | None:
-    if data is None or not can_move(robot.profile.driver):
-        return None
-    folder = data / "latches"
-    return LatchStore(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
-
-
-def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder | None:
-    if audit is None:
-        return None
-    secrets = secret_texts(robot.profile, robot.settings)
-    return AuditRecorder(name, audit.add, utc=time.time, secrets=secrets)
 
 
 class _Dashboard(Starlette):

@@ -195,7 +195,7 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
-    monkeypatch.setattr("urc.runtime.audit_table.LOCKED_S", 0.05)
+    monkeypatch.setattr("urc.runtime.sqlite_file.LOCKED_S", 0.05)
     with AuditLog(file) as log:
         log.add(entry(1))
         assert log.settle()

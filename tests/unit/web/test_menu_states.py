@@ -76,7 +76,7 @@ def test_a_connected_robot_shows_battery_and_alarms_and_comes_first(
         assert found["puppet"]["battery"] == {"value": 7.0, "unit": "%", "alarm": "lolo"}
 
 
-def test_a_stale_value_is_neither_a_battery_nor_an_alarm(
+def test_a_stale_value_is_no_battery_but_its_alarm_stays(
     client: TestClient, robots: dict[str, FakeRobot]
 ) -> None:
     with client.websocket_connect("ws://localhost:8080/ws?robot=puppet", headers=OURS) as line:
@@ -86,7 +86,7 @@ def test_a_stale_value_is_neither_a_battery_nor_an_alarm(
         client.portal.call(old)
         found = states(client)["puppet"]
         assert found["battery"] is None
-        assert found["alarms"] == {"count": 0, "worst": ""}
+        assert found["alarms"] == {"count": 1, "worst": "high"}
 
 
 def test_the_cause_of_a_lost_link_is_told(client: TestClient, robots: dict[str, FakeRobot]) -> None:
