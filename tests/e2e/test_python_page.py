@@ -16,7 +16,23 @@ pytestmark = pytest.mark.anyio
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
-HERE, SERVER, STICK, SYNC = BLOCKS
+HERE, SERVER, STICK, ALARMS, SYNC = BLOCKS
+
+ALARM_PROGRAM = """
+import asyncio
+import urc.client
+
+async def main():
+    async with urc.client.open("{address}", "cart", token_file="cart.token") as robot:
+        while not robot.alarms.active:
+            await asyncio.sleep(0.05)
+{block}
+        while (row := robot.alarms.rows["level"]).state != "shelved":
+            await asyncio.sleep(0.05)
+        print(row.signal, row.state, row.acknowledged > 0)
+
+asyncio.run(main())
+"""
 
 
 async def ran(program: str, cart: Cart, folder: Path) -> str:
@@ -65,6 +81,23 @@ async def test_the_robot_of_a_server(program: str, tmp_path: Path) -> None:
         moves = [(at_s, line) for at_s, line in cart.heard if line == "V 0.3 0"]
         assert moves[-1][0] - moves[0][0] > 1.5
         assert cart.newest("V") == STOPPED
+
+
+async def test_the_alarms_of_a_server(tmp_path: Path) -> None:
+    """A level below its limit is listed, acknowledged and shelved."""
+    (tmp_path / "cart.token").write_text(KEY, "ascii")
+    async with carted(tmp_path) as (cart, file):
+        limits = 'unit: "%", limits: { low: 90, action: Charge it. }'
+        file.write_text(file.read_text("utf-8").replace('unit: "%"', limits, 1), "utf-8")
+        async with served_robot(file) as address:
+            program = ALARM_PROGRAM.format(address=address, block=indented(at(ALARMS)))
+            said = (await ran(program, cart, tmp_path)).splitlines()
+    assert said == ["level low medium Charge it.", "level shelved True"]
+
+
+def indented(block: str) -> str:
+    """Return the block as the body of the program's innermost `with`."""
+    return "".join(f"        {line}\n" for line in block.splitlines())
 
 
 def test_the_stick_of_the_page_is_python() -> None:

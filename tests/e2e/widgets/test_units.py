@@ -13,7 +13,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from tests.e2e.drawn import PIXELS_OF
 from urc.model.interface import WidgetUse
-from urc.model.values import Signal
+from urc.model.values import AlarmLimits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -22,6 +22,7 @@ SIGNALS = {
     signal.name: signal
     for signal in (
         Signal("pace", "number", unit="m/s"),
+        Signal("dash", "number", unit="m/s", limits=AlarmLimits(hihi=8)),
         Signal("rise", "number", unit="m"),
         Signal("gap", "number", unit="mm", precision=0),
         Signal("ticks", "integer", min=0, max=20000),
@@ -106,12 +107,12 @@ async def test_figures_keep_what_means_something_in_every_unit(new_page: PageMak
 
 async def test_an_alarm_is_read_out_in_the_unit_that_is_shown(new_page: PageMaker) -> None:
     """A screen reader hears the number with its own unit."""
-    async with shown(new_page, value("pace")) as (robot, page):
-        robot.set_reading("pace", 3.0)
+    async with shown(new_page, value("dash")) as (robot, page):
+        robot.set_reading("dash", 3.0)
         await choose(page, "imperial")
         await until_text(page, ".value-text", "6.711")
-        robot.set_reading("pace", 9.0, alarm="hihi")
-        await until_text(page, "[data-alarms]", "pace very high: 20.13 mph")
+        robot.set_reading("dash", 9.0, alarm="hihi")
+        await until_text(page, "[data-alarms]", "dash: Very high, 20.13 mph")
 
 
 async def test_the_history_of_a_value_is_the_same_line_in_other_units(new_page: PageMaker) -> None:
