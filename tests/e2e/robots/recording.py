@@ -18,7 +18,7 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.runtime.document_tests import sample_settings
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.session import Session
+from urc.runtime.session import Motion, Session
 from urc.simulator.emulated_profile import stand_in
 from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 from urc.testing.entry import ACCESS
@@ -27,6 +27,8 @@ from urc.web.app import Robot, build_app, serve
 __all__ = ["FOLDER", "Overheard", "alive"]
 
 FOLDER = Path(__file__).parents[3] / "robots"
+LONGEST_LEASE_S = 1.0
+"""Longest lease of a document."""
 
 
 class Overheard:
@@ -86,19 +88,25 @@ class _Overheard(EmulatedRobot):
         return line
 
 
-def _calm(profile: Profile) -> Profile:
-    """Return a robot with the longest lease: a browser on a busy machine pauses for some ticks."""
+def _calm(profile: Profile, lease_s: float) -> Profile:
+    """Return a robot with another lease: a browser on a busy machine pauses for some ticks."""
     commands = {
-        name: one if one.hold is None else one._replace(hold=one.hold._replace(lease_s=1.0))
+        name: one if one.hold is None else one._replace(hold=one.hold._replace(lease_s=lease_s))
         for name, one in profile.driver.commands.items()
     }
     return profile._replace(driver=profile.driver._replace(commands=commands))
 
 
 @asynccontextmanager
-async def alive(name: str, data: Path, patch: pytest.MonkeyPatch) -> AsyncIterator[Overheard]:
-    """Emulate a robot, and serve it with the guard, as `urc demo` does."""
-    profile = _calm(load_profile(str(FOLDER / f"{name}.yaml"), built_in_catalog()))
+async def alive(
+    name: str, data: Path, patch: pytest.MonkeyPatch, *, lease_s: float = LONGEST_LEASE_S
+) -> AsyncIterator[Overheard]:
+    """Emulate a robot, and serve it with the guard, as `urc demo` does.
+
+    The guard takes no longer lease than a document may have: with one, motion is in this process.
+    """
+    profile = _calm(load_profile(str(FOLDER / f"{name}.yaml"), built_in_catalog()), lease_s)
+    motion: Motion = "here" if lease_s > LONGEST_LEASE_S else "guarded"
     settings = sample_settings(profile.settings)
     transports = built_in_catalog().transports
     overheard = Overheard(profile)
@@ -109,7 +117,7 @@ async def alive(name: str, data: Path, patch: pytest.MonkeyPatch) -> AsyncIterat
         async def session() -> AsyncIterator[Session]:
             overheard.sessions += 1
             try:
-                async with Session(redirected, settings, transports, motion="guarded") as opened:
+                async with Session(redirected, settings, transports, motion=motion) as opened:
                     yield opened
             finally:
                 overheard.sessions -= 1

@@ -14,6 +14,8 @@ import { said, t } from "../core/words.js";
 
 /** @type {Verb[]} */
 const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
+/** Verbs after which the operator wants to drive. @type {ReadonlySet<Verb>} */
+const BEFORE_DRIVING = new Set(["reset", "take", "ask", "force"]);
 
 export class Controls {
   /**
@@ -21,10 +23,14 @@ export class Controls {
    * @param {HTMLElement} el
    * @param {Drive} drive
    * @param {StopButton} stop
+   * @param {import("./input.js").Input} input
    */
-  constructor(root, el, drive, stop) {
+  constructor(root, el, drive, stop, input) {
     this.el = el;
     this.drive = drive;
+    this.input = input;
+    /** Whether the next Tab from a held control goes to Reset. */
+    this.isResetNext = false;
     this.who = part(el, "[data-who]");
     this.latched = part(root, "[data-latched]");
     this.latchedText = part(root, "[data-latched-text]");
@@ -42,6 +48,33 @@ export class Controls {
     whenPressed(this.stop, () => stop.press());
     this.stop.removeAttribute("data-early-stop"); // armed: early_stop.js leaves it alone
     stop.follow((state) => this.showStop(state));
+    addEventListener("keydown", (event) => this.tabToReset(event));
+  }
+
+  /**
+   * Let the first Tab after STOP go from a held control to Reset: the way there is long, and STOP must not
+   * move the focus itself, because a second press of Space would then press Reset.
+   *
+   * @param {KeyboardEvent} event
+   */
+  tabToReset(event) {
+    const reset = this.buttons[0]?.[1];
+    if (event.key !== "Tab" || event.shiftKey || !this.isResetNext || !reset || reset.hidden) return;
+    if (event.defaultPrevented || !this.input.owns(event.target)) return;
+    event.preventDefault();
+    this.isResetNext = false;
+    reset.focus();
+  }
+
+  /**
+   * Move the focus of the keyboard from a button that disappears.
+   *
+   * @param {Verb} verb
+   */
+  moveFocus(verb) {
+    const next = this.buttons.find(([, button]) => !button.hidden)?.[1];
+    if (BEFORE_DRIVING.has(verb) || !next) this.input.focus();
+    else next.focus();
   }
 
   /** @param {number} nowMs */
@@ -65,16 +98,21 @@ export class Controls {
       no: isAsked,
       leave: isMine && !isAsked,
     };
+    const left = this.buttons.find(([verb, button]) => !shown[verb] && button.matches(":focus-visible"))?.[0];
     for (const [verb, button] of this.buttons) {
       if (button.hidden === shown[verb]) button.hidden = !shown[verb];
     }
+    if (left) this.moveFocus(left);
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
     const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS);
     if (this.who.textContent !== text) this.who.textContent = text;
     const stopped = isLatched ? this.stoppedWords() : "";
     if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
     if (this.latchedText.textContent !== stopped) this.latchedText.textContent = stopped;
-    if (this.latched.hidden === isLatched) this.latched.hidden = !isLatched;
+    if (this.latched.hidden === isLatched) {
+      this.latched.hidden = !isLatched;
+      this.isResetNext = isLatched;
+    }
     const state = isLatched ? "latched" : isMine ? "mine" : isOthers ? "others" : "free";
     if (this.el.dataset["state"] !== state) this.el.dataset["state"] = state;
   }

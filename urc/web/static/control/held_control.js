@@ -177,10 +177,15 @@ export class HeldControl {
    * @param {EventTarget | null} target
    */
   isHeard(target) {
-    const { el, keysOn = [], page } = this.spec;
-    if (target instanceof Node && [el, ...keysOn].some((place) => place.contains(target))) return true;
-    const which = page?.() ?? "none";
+    if (this.contains(target)) return true;
+    const which = this.spec.page?.() ?? "none";
     return which === "all" ? !takesText(target) : which === "free" && !takesKeys(target);
+  }
+
+  /** Whether an element is a part of this control. @param {EventTarget | null} target */
+  contains(target) {
+    const { el, keysOn = [] } = this.spec;
+    return target instanceof Node && [el, ...keysOn].some((place) => place.contains(target));
   }
 
   /** @param {string} code */

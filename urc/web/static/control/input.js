@@ -41,6 +41,8 @@ export class Input {
     /** Cells of dead-man controls, also of unmounted or failed ones. @type {Set<HTMLElement>} */
     this.gated = new Set();
     this.pads = new Gamepads(() => this.run());
+    /** The control that was held last. @type {HeldControl | null} */
+    this.last = null;
     this.isRunning = false;
     this.frameMs = 0;
     /** Number of the sampling loop; callbacks of an older loop do nothing. */
@@ -109,6 +111,19 @@ export class Input {
     return [...this.grips].some((grip) => grip.hand);
   }
 
+  /** Whether an element belongs to a held control. @param {EventTarget | null} target */
+  owns(target) {
+    return [...this.grips].some((grip) => grip.contains(target));
+  }
+
+  /** Give the focus to the control that was held last, or else to the first one on the screen. */
+  focus() {
+    const found = [...(this.last ? [this.last] : []), ...this.grips].find(({ spec: { el } }) => {
+      return el.tabIndex >= 0 && el.checkVisibility();
+    });
+    found?.spec.el.focus();
+  }
+
   /** @param {HeldControl} grip */
   isGuarded(grip) {
     if ([...this.gates].some((gate) => gate.isHeld)) return true;
@@ -119,6 +134,7 @@ export class Input {
   /** @param {HeldControl} grip */
   begin(grip) {
     const { control } = grip;
+    this.last = grip;
     control.grips.add(grip);
     if (grip.output.refusal) this.spend(control, grip.output.refusal);
     if (control.phase === "idle" || (control.phase === "spent" && control.grips.size === 1)) {
@@ -374,5 +390,6 @@ export class Input {
   forget(grip) {
     grip.drop(ANY);
     this.grips.delete(grip);
+    if (this.last === grip) this.last = null;
   }
 }

@@ -1,7 +1,8 @@
 // @ts-check
 /**
- * The background of a page, and the views over it: a tap on a view swaps it with the background. Held
- * controls stay held; the choice is stored on the device.
+ * The background of a page, and the views over it: a tap on a view swaps it with the background. With the
+ * focus on a held control, V swaps the next view. Held controls stay held; the choice is stored on the
+ * device.
  */
 import { t } from "../core/words.js";
 
@@ -24,6 +25,18 @@ export function swapViews(stage) {
 }
 
 /**
+ * Swap the background with the next view: the keyboard's way while a key holds a stick.
+ *
+ * @param {HTMLElement} stage
+ */
+export function nextView(stage) {
+  const views = [...stage.querySelectorAll('.urc-cell[data-footprint="view"]')];
+  const at = views.findIndex((one) => one instanceof HTMLElement && one.dataset["place"] === "ground");
+  const next = views[(at + 1) % views.length]?.querySelector(".urc-swap");
+  if (at >= 0 && next instanceof HTMLElement) next.click();
+}
+
+/**
  * @param {HTMLElement} view
  * @param {HTMLElement[]} views
  */
@@ -32,6 +45,7 @@ function addButton(view, views) {
   button.type = "button";
   button.className = "urc-swap";
   button.textContent = "⤢";
+  button.setAttribute("aria-keyshortcuts", "V");
   button.setAttribute("aria-label", t("Show {title} large", { title: titleOf(view) }));
   button.addEventListener("click", () => {
     const ground = views.find((one) => one.dataset["place"] === "ground");

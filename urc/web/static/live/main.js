@@ -23,6 +23,7 @@ import { ScreenName } from "./screen_name.js";
 import { Socket } from "./socket.js";
 import { ViewSwitch } from "./view_switch.js";
 import { StopButton } from "../control/stop.js";
+import { tapWithAnyFinger } from "../control/second_finger.js";
 import { Store } from "./store.js";
 import { offerSystems } from "../core/units.js";
 import { said, t } from "../core/words.js";
@@ -80,7 +81,7 @@ const asks = new ConfirmDialog(part(root, "[data-bands]"), (message) => socket.s
 stop.onPressed = forgetQuestions;
 /** States of the sequences. @type {Record<string, import("../core/types.js").Progress>} */
 let sequences = {};
-const controls = bar instanceof HTMLElement ? new Controls(root, bar, drive, stop) : null;
+const controls = bar instanceof HTMLElement ? new Controls(root, bar, drive, stop, input) : null;
 const log = new Log();
 const themes = new Themes(wake);
 const follows = new PageTopics(
@@ -344,6 +345,7 @@ backSafely(part(root, "[data-back]"), {
 offerSystems((system) => store.setUnits(system));
 stop.takeOver(root);
 offerHints(root);
+tapWithAnyFinger();
 socket.open();
 setInterval(wake, AGE_EVERY_MS);
 

@@ -8,10 +8,11 @@
  *
  * @typedef {object} More
  * @property {import("../widgets/host.js").Host} host
+ * @property {Pick<import("../control/input.js").Input, "letGo" | "owns">} input
  * @property {() => void} wake
  */
 import { part } from "./badge.js";
-import { swapViews } from "./ground.js";
+import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
 import { tabsOf } from "./tabs.js";
 import { said, t } from "../core/words.js";
@@ -31,6 +32,11 @@ export class ViewSwitch {
       letGo: (reason) => doors.input.letGo(reason),
       leave: () => this.leave(),
       enter: () => this.enter(),
+    });
+    // On the window: controls that use the key themselves come first.
+    addEventListener("keydown", (event) => {
+      if (event.code !== "KeyV" || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+      if (!event.defaultPrevented && doors.input.owns(event.target)) nextView(this.el);
     });
     addEventListener("urc-let-go", (event) => {
       if (event instanceof CustomEvent) doors.input.letGo(said(String(event.detail)));
