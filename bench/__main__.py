@@ -24,6 +24,7 @@ NAMES = (
     "browser_peers",
     "browser_widgets",
     "browser_roslibjs",
+    "page_layouts",
     "motion_path",
     "motion_cost",
     "motion_stop",
@@ -43,6 +44,7 @@ PROGRAMS = {
     "browser_peers": "chromium",
     "browser_widgets": "chromium",
     "browser_roslibjs": "chromium",
+    "page_layouts": "chromium",
     "motion_input": "chromium",
 }
 """Required program of each benchmark in addition to Python, by its name in `scripts.needs`."""

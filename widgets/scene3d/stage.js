@@ -42,6 +42,8 @@ export class ViewSwitch {
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.ask());
     this.size = 1;
+    /** Centre of the model, relative to the robot's position. */
+    this.centre = new three.Vector3();
     this.view = view;
     this.drawnMs = -Infinity;
     this.isAsked = false;
@@ -92,15 +94,19 @@ export class ViewSwitch {
     this.measure();
   }
 
-  /** Measure the model: its size determines the distance of the camera. */
+  /** Measure the model: its size and centre determine the position of the camera. */
   measure() {
     if (!this.model) return;
     const turn = this.robot.quaternion.clone();
     this.robot.quaternion.identity();
     this.robot.updateMatrixWorld(true);
-    const size = new this.three.Box3().setFromObject(this.model).getSize(new this.three.Vector3()).length();
+    const extent = new this.three.Box3().setFromObject(this.model);
+    const size = extent.getSize(new this.three.Vector3()).length();
     this.robot.quaternion.copy(turn);
-    this.size = Number.isFinite(size) && size > 0 ? size : 1;
+    const isKnown = Number.isFinite(size) && size > 0;
+    this.size = isKnown ? size : 1;
+    this.centre.set(0, 0, 0);
+    if (isKnown) extent.getCenter(this.centre).sub(this.robot.position);
     this.look(this.view);
   }
 
@@ -133,7 +139,7 @@ export class ViewSwitch {
     this.ground.position.set(Math.round(place[0]), Math.round(place[1]), 0);
     if (this.view === "orbit") {
       this.camera.position.add(moved);
-      this.controls.target.copy(this.robot.position);
+      this.controls.target.copy(this.robot.position).add(this.centre);
       this.controls.update();
     } else this.stand(yaw);
     this.ask();
@@ -149,12 +155,12 @@ export class ViewSwitch {
 
   /** @param {number} yaw */
   stand(yaw) {
-    const { position } = this.robot;
+    const target = this.robot.position.clone().add(this.centre);
     const [x, y, z] = cameraAt(this.view, yaw, this.size);
     this.camera.up.set(this.view === "top" ? 1 : 0, 0, this.view === "top" ? 0 : 1);
-    this.camera.position.set(position.x + x, position.y + y, position.z + z);
-    this.camera.lookAt(position);
-    this.controls.target.copy(position);
+    this.camera.position.set(target.x + x, target.y + y, target.z + z);
+    this.camera.lookAt(target);
+    this.controls.target.copy(target);
   }
 
   /**

@@ -63,6 +63,7 @@ class Scene {
     this.root = part(el, ".scene3d");
     this.face = part(el, ".scene3d-face");
     this.text = part(el, ".scene3d-text");
+    this.joints = part(el, ".scene3d-joints");
     this.note = part(el, ".scene3d-note");
     /** @type {import("./pose.js").Convention} */
     this.convention = options["convention"] === "FRD" ? "FRD" : "FLU";
@@ -76,6 +77,8 @@ class Scene {
     this.turned = [0, 0, 0, 1];
     /** @type {[number, number, number]} */
     this.at = [0, 0, 0];
+    /** Whether the camera stands where it shows the first known posture. */
+    this.isFitted = false;
     /** Serial number of the drawn points; -1 without points. */
     this.pointsSerial = -1;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
@@ -196,6 +199,10 @@ class Scene {
       if (model && name !== undefined && value !== null) model.set(name, value);
     });
     stage.setPose(this.at, turn, angles(turn).yaw);
+    if (model && !this.isFitted && values.some((value) => value !== null)) {
+      this.isFitted = true;
+      stage.measure();
+    }
   }
 
   /** @returns {(number | null)[]} */
@@ -237,8 +244,9 @@ class Scene {
     const isShown = worst !== undefined && (worst.state === "live" || worst.state === "stale");
     const level = turn && words.length === 0 ? t("level") : "";
     const bent = joints > 0 ? t("joints: {count}", { count: joints }) : "";
-    const said = [level, ...words, bent].filter(Boolean).join(" · ");
-    write(this.text, isShown && said ? said : DASH);
+    const said = [level, ...words].filter(Boolean).join(" · ");
+    write(this.text, isShown && (said || bent) ? said : DASH);
+    write(this.joints, isShown ? bent : "");
     const count = model?.missing.length ?? 0;
     const missing = count > 0 ? ["◆", t("shapes that are missing: {count}", { count })].join(" ") : "";
     const note = worst ? noteOf(worst, t) : "";

@@ -7,8 +7,12 @@
   const isShown = (el) => el.checkVisibility() && boxOf(el).width > 0;
   const stage = document.querySelector("[data-stage]");
   const room = boxOf(stage);
+  // An alarm or a latched STOP is a band below the bar, for as long as it lasts.
+  const bands = document.querySelector(".urc-bands");
+  const band = bands ? boxOf(bands) : new DOMRect();
   let [ground, inside, bars] = [0, 0, 0];
   for (let y = STEP / 2; y < innerHeight; y += STEP) {
+    if (y >= band.top && y < band.bottom) continue;
     for (let x = STEP / 2; x < innerWidth; x += STEP) {
       if (y < room.top || y >= room.bottom) {
         bars += 1;
@@ -35,6 +39,32 @@
     const { left, right, top, bottom } = boxOf(cell);
     const over = Math.max(room.left - left, right - room.right, scrolls ? 0 : bottom - room.bottom, scrolls ? 0 : room.top - top);
     if (over > SLACK) faults.push(`${name(cell)} is ${Math.round(over)} px out of the stage`);
+  }
+  // Texts that their own box cuts: an ellipsis, or lines that are hidden. Lists that scroll are no cut.
+  const walker = document.createTreeWalker(document.querySelector("main") ?? document.body, NodeFilter.SHOW_TEXT);
+  const range = document.createRange();
+  while (walker.nextNode()) {
+    const node = walker.currentNode;
+    const text = node.textContent.trim();
+    const owner = node.parentElement;
+    if (!text || !owner || owner.closest(".urc-hidden, script, style, template, option, [data-text-cut]")) continue;
+    if (!owner.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
+    range.selectNodeContents(node);
+    const box = range.getBoundingClientRect();
+    if (box.width === 0) continue;
+    for (let el = owner; el && el !== document.body && el !== stage; el = el.parentElement) {
+      const style = getComputedStyle(el);
+      if (/auto|scroll/.test(style.overflowX + style.overflowY) || style.clipPath !== "none") break;
+      const isClipping = style.overflowX === "hidden" || style.overflowX === "clip";
+      if (!isClipping) continue;
+      const frame = boxOf(el);
+      // Rows wholly out of sight, as the rest of a long legend, are left out, not cut.
+      if (box.top >= frame.bottom - 1 || box.bottom <= frame.top + 1) break;
+      const across = Math.max(frame.left - box.left, box.right - frame.right);
+      const down = Math.max(frame.top - box.top, box.bottom - frame.bottom);
+      if (across > 2 || down > box.height / 3) faults.push(`“${text}” is cut by ${el.className || el.tagName}: ${Math.round(across)}, ${Math.round(down)} px`);
+      break;
+    }
   }
   if (stage.scrollWidth > stage.clientWidth + SLACK) faults.push("the stage scrolls sideways");
   const sticks = [...document.querySelectorAll(".joystick-face")].filter(isShown).map(boxOf);

@@ -382,7 +382,7 @@ async def test_a_model_bends_as_the_robot_does(new_page: PageMaker, tmp_path: Pa
     async with shown(page, signals, use) as robot:
         await page.wait_for_selector(".scene3d[data-model='urdf']")
         robot.set_reading("elbow", 0.0)
-        await until_text(page, ".scene3d-text", "joints: 1")
+        await until_text(page, ".scene3d-joints", "joints: 1")
         drawn = "document.querySelector('.scene3d-picture').dataset.frames"
         # It comes to rest: twenty frames of the page without one of the scene.
         before = await page.evaluate(RESTED)

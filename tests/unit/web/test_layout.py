@@ -28,7 +28,7 @@ def test_the_picture_keeps_its_margins_on_a_wide_screen() -> None:
 def test_a_phone_gets_no_margins() -> None:
     """The one cell fills the phone."""
     text = css(("landscape", Layout(2, 3, (Slot("battery", 1, 2),))), slots=("battery",))
-    phone = text.split("@media (max-width: 599.98px)")[1]
+    phone = text.split("@media (max-width: 37.499rem)")[1]
     assert f"grid-template-rows:{ROW};grid-template-columns:{COLUMN}}}" in phone
     assert "grid-area:1/1/2/2" in phone
 
@@ -37,7 +37,7 @@ def test_more_than_two_columns_are_stacked_on_a_phone_in_reading_order() -> None
     """Unless the author drew a phone grid."""
     slots = (Slot("c", 1, 0, 1, 3), Slot("a", 0, 0), Slot("b", 0, 2), Slot("m", 0, 1))
     text = css(("landscape", Layout(2, 3, slots)), slots=("a", "m", "b", "c"))
-    phone = text.split("@media (max-width: 599.98px)")[1]
+    phone = text.split("@media (max-width: 37.499rem)")[1]
     for index, row in enumerate((1, 2, 3, 4)):
         assert f'[data-place="{index}"]{{display:grid;grid-area:{row}/1/{row + 1}/2;' in phone
 
@@ -47,7 +47,7 @@ def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
     wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
     phone = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 1, 1, 2)))
     text = css(("landscape", wide), ("phone_portrait", phone), slots=("a", "b", "c"))
-    rules = text.split("@media (max-width: 599.98px)")[1]
+    rules = text.split("@media (max-width: 37.499rem)")[1]
     assert '[data-place="0"]{display:grid;grid-area:1/2/2/4;' in rules
     assert '[data-place="1"]{display:none}' in rules
 
@@ -56,7 +56,7 @@ def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
     """Without its margins; else it shows the wide one, in lower rows."""
     wide = Layout(3, 1, (Slot("a", 0, 0), Slot("b", 1, 0), Slot("c", 2, 0)))
     low = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 2)))
-    rule = "@media (max-height: 479.98px)"
+    rule = "@media (max-height: 29.999rem)"
     drawn = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b", "c")).split(rule)[1]
     assert '[data-place="0"]{display:grid;grid-area:1/2/2/3;' in drawn
     assert '[data-place="1"]{display:none}' in drawn.split("@media")[0]
@@ -86,7 +86,7 @@ def test_the_left_hand_gets_the_columns_the_other_way_round() -> None:
     assert '[data-place="0"]{display:grid;grid-area:1/1/2/3;' in right
     assert '[data-place="0"]{display:grid;grid-area:1/2/2/4;' in left
     assert '[data-place="1"]{display:grid;grid-area:1/1/2/2;' in left
-    stacked = text.split("@media (max-width: 599.98px)")[2]
+    stacked = text.split("@media (max-width: 37.499rem)")[2]
     assert '[data-place="0"]{display:grid;grid-area:1/1/2/2;' in stacked
 
 
@@ -145,7 +145,7 @@ def test_over_a_background_a_widget_is_at_the_side_of_its_slot() -> None:
 
 def test_a_phone_in_portrait_has_the_background_above_the_widgets() -> None:
     wide = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
-    phone = over(wide, "a", "b").split("@media (max-width: 599.98px)")[1]
+    phone = over(wide, "a", "b").split("@media (max-width: 37.499rem)")[1]
     assert "grid-template-rows:minmax(var(--urc-ground-height),1fr) " in phone
     assert '[data-place="1"]{display:grid;grid-area:2/1/3/2;' in phone
 
@@ -175,7 +175,7 @@ def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:
     wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
     tall = Layout(2, 1, (Slot("b", 0, 0), Slot("a", 1, 0)))
     phone = css(("landscape", wide), ("portrait", tall), slots=("a", "b"))
-    rules = phone.split("@media (max-width: 599.98px)")[1]
+    rules = phone.split("@media (max-width: 37.499rem)")[1]
     assert '[data-place="0"]{display:grid;grid-area:2/1/3/2;' in rules
 
 

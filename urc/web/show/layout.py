@@ -29,8 +29,8 @@ from urc.model.widget import Footprint
 
 __all__ = ["grid_css", "mirrored", "needs_turning"]
 
-PHONE = "(max-width: 599.98px)"
-SHORT = "(max-height: 479.98px)"
+PHONE = "(max-width: 37.499rem)"
+SHORT = "(max-height: 29.999rem)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
 LEFT_HAND = ':root[data-hand="left"]'
@@ -44,7 +44,7 @@ _PHONE_WINDOW = "minmax(min-content,.01fr)"
 """Size of an empty or growing row on a phone in portrait: the background takes nearly all space."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: as much as the widgets below leave."""
-_LOW_OVER = ("stick", "button", "value")
+_LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that reach down next to STOP over a background; without one, only sticks do."""
 _SIDES = ("start", "center", "end")
 
