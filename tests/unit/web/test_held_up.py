@@ -2,11 +2,16 @@
 
 import pytest
 
-from tests.unit.web.test_controls import scene
+from tests.unit.web.test_controls import Scene, scene
 from urc.testing.clock import settle
 from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
+
+
+def told(it: Scene) -> list[tuple[str, str]]:
+    """Return the entries of the robot's log with their levels."""
+    return [(note.level, note.text) for note in it.hub.notes]
 
 
 async def test_a_server_that_was_held_up_stops_what_moves() -> None:
@@ -17,7 +22,7 @@ async def test_a_server_that_was_held_up_stops_what_moves() -> None:
         it.tick(ann)
         await it.clock.advance(0.05)
         await it.clock.hold_up(0.2)
-        assert [note.text for note in it.hub.notes] == ["the server was blocked for 150 ms"]
+        assert told(it) == [("info", "the server was blocked for 150 ms")]
         it.tick(ann)
         assert it.backend.texts[-1] == "drive speed=0.5"
         await it.clock.hold_up(0.7)
@@ -26,7 +31,7 @@ async def test_a_server_that_was_held_up_stops_what_moves() -> None:
         it.tick(ann)
         assert it.backend.texts[-1] == "drive stop"
         assert it.controls.watch.count == 2
-        assert len(it.hub.notes) == 1
+        assert told(it)[1:] == [("warning", "the server was blocked for 600 ms")]
 
 
 async def test_a_server_that_was_held_up_says_no_stop_twice() -> None:

@@ -455,8 +455,10 @@ class ControlService:
                     operator.forget(command)
                     operator.moved_s.pop(command, None)
                     operator.notice(command, wire.encode_stopped(command, "expired"))
-        if is_first:
-            self._log("warning", f"the server was blocked for {late_s * 1000:.0f} ms")
+        is_warning = late_s > TOO_LATE_S
+        if is_first or is_warning:
+            level: Literal["info", "warning"] = "warning" if is_warning else "info"
+            self._log(level, f"the server was blocked for {late_s * 1000:.0f} ms")
 
     def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         if self._hub is not None:
