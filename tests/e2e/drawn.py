@@ -1,11 +1,16 @@
 """Pictures that tests push, and the pixels that they look for."""
 
+import asyncio
+import io
 import struct
 import zlib
 
+from PIL import Image
 from playwright.async_api import Page
 
-__all__ = ["BLUE", "GREEN", "GREY", "PIXELS_OF", "RED", "plain", "png", "until_pixel"]
+__all__ = ["BLUE", "GREEN", "GREY", "PIXELS_OF", "RED", "plain", "png", "until_pixel", "until_seen"]
+
+WAIT_S = 30.0
 
 RED, BLUE, GREEN, GREY = (200, 0, 0), (0, 0, 200), (0, 200, 0), (90, 90, 90)
 
@@ -58,3 +63,15 @@ async def until_pixel(page: Page, selector: str, x: float, y: float, is_one: str
         f"(given) => {{ const [r, g, b, a] = ({PIXEL})(given); return {is_one}; }}",
         arg=[selector, x, y],
     )
+
+
+async def until_seen(
+    page: Page, selector: str, x: float, y: float, colour: tuple[int, int, int]
+) -> None:
+    """Wait until a place of an element has a colour on the screen, scaled and turned as it is."""
+    async with asyncio.timeout(WAIT_S):
+        while True:
+            shot = await page.locator(selector).screenshot()
+            image = Image.open(io.BytesIO(shot)).convert("RGB")
+            if image.getpixel((int(x * image.width), int(y * image.height))) == colour:
+                return

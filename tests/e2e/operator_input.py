@@ -14,8 +14,6 @@ DECISION_S, TOUCH_S, KEY_S = 1.35, 1.10, 0.28
 """Times of the keystroke-level model (Card, Moran and Newell, 1980), in seconds: the choice of the
 next step (M), pointing at a target (P), and a key press of an average typist (K)."""
 
-SWIPE_SHARE = 0.5
-"""Share of the screen's height that one swipe moves."""
 UNCOVERED = """(el) => {
   const { left, right, top, bottom } = el.getBoundingClientRect();
   const [x, y] = [(left + right) / 2, (top + bottom) / 2];
@@ -103,21 +101,6 @@ class OperatorInput:
     async def lift(self, finger: int = 1) -> None:
         """Lift a finger."""
         await self._fingers.lift(finger)
-
-    async def swipe_to(self, target: Locator) -> None:
-        """Swipe up until a target is on the screen."""
-        size = self.page.viewport_size
-        assert size is not None
-        x, far = size["width"] / 2, size["height"] * SWIPE_SHARE
-        while await target.evaluate(UNCOVERED) is None:
-            assert self.swipes < 100, "it is not on the page"
-            self.decide()
-            self.swipes += 1
-            await self._fingers.put(1, x, size["height"] * 0.75)
-            for step in range(1, 9):
-                await self._fingers.put(1, x, size["height"] * 0.75 - far * step / 8)
-            await self._fingers.lift(1)
-            await self.page.wait_for_timeout(300)
 
     async def press(self, key: str) -> None:
         """Press a key."""

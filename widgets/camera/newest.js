@@ -3,11 +3,16 @@
  * Decoder for the images of the chosen camera, one at a time: the newest wins, none is queued.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Picture} Picture
+ *
+ * @typedef {object} Shown
+ * @property {Blob} blob
+ * @property {number} width pixels
+ * @property {number} height
  */
 
 export class Newest {
   /**
-   * @param {(bitmap: ImageBitmap) => void} show shows an image; the bitmap stays open until the next one
+   * @param {(bitmap: ImageBitmap) => void} show shows an image, and may keep its bitmap
    * @param {(error: unknown) => void} failed
    */
   constructor(show, failed) {
@@ -20,7 +25,7 @@ export class Newest {
     this.isOver = false;
     /** Number of the camera: images of an earlier one are not shown. */
     this.source = 0;
-    /** @type {ImageBitmap | null} */
+    /** @type {Shown | null} */
     this.shown = null;
   }
 
@@ -41,7 +46,7 @@ export class Newest {
       try {
         const bitmap = await createImageBitmap(blob);
         if (this.isOver || source !== this.source) bitmap.close();
-        else this.replace(bitmap);
+        else this.replace(bitmap, blob);
       } catch (error) {
         if (!this.isOver && source === this.source) this.failed(error);
       }
@@ -49,11 +54,14 @@ export class Newest {
     this.isBusy = false;
   }
 
-  /** @param {ImageBitmap} bitmap */
-  replace(bitmap) {
-    this.shown?.close();
-    this.shown = bitmap;
+  /**
+   * @param {ImageBitmap} bitmap
+   * @param {Blob} blob
+   */
+  replace(bitmap, blob) {
+    this.shown = { blob, width: bitmap.width, height: bitmap.height };
     this.show(bitmap);
+    bitmap.close();
   }
 
   /** Forget the present camera. */
@@ -61,7 +69,6 @@ export class Newest {
     this.source += 1;
     this.serial = -1;
     this.next = null;
-    this.shown?.close();
     this.shown = null;
   }
 

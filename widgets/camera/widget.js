@@ -5,9 +5,10 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./frame.js").Fit} Fit */
-import { DASH, attribute, board, button, many, noteOf, part, write } from "urc/kit";
+import { DASH, attribute, button, many, noteOf, part, write } from "urc/kit";
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
+import { Screen } from "./screen.js";
 
 const LOOK_AGAIN_MS = 200;
 const FULL_COLOUR_MS = 5000;
@@ -45,6 +46,7 @@ class Camera {
     const canvas = el.querySelector("canvas");
     if (!canvas) throw new Error("the template has no canvas");
     this.canvas = canvas;
+    this.screen = new Screen(canvas);
     this.look = {
       fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
       rotate: Number(options["rotate"] ?? 0),
@@ -63,10 +65,11 @@ class Camera {
     /** Note for the hand that turns the camera. */
     this.hand = "";
     this.pictures = new Newest(
-      () => {
+      (bitmap) => {
         this.fault = "";
         this.rate?.add(performance.now() / 1000);
-        this.draw();
+        if (this.screen.show(bitmap)) this.draw();
+        if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },
       () => {
@@ -183,6 +186,7 @@ class Camera {
     if (index === this.chosen) return;
     this.chosen = index;
     this.pictures.leave();
+    this.screen.clear();
     this.lookAtChosen();
     this.fault = "";
     this.switches?.forEach((button, place) => attribute(button, "aria-pressed", String(place === index)));
@@ -201,18 +205,16 @@ class Camera {
     return isGround && !this.isWhole ? "zoom" : "contain";
   }
 
+  /** Place the image in its box: the browser scales it, so that no frame is drawn again. */
   draw() {
     const size = { width: this.face.clientWidth, height: this.face.clientHeight };
-    if (size.width === 0 || size.height === 0) return;
-    const pen = board(this.canvas, size);
-    const bitmap = this.pictures.shown;
-    if (!bitmap) return;
-    if (this.shutter) this.shutter.disabled = false;
-    const lie = place(bitmap, size, { ...this.look, fit: this.fit() });
-    pen.translate(lie.x, lie.y);
-    pen.scale(lie.flip, 1);
-    pen.rotate(lie.angle);
-    pen.drawImage(bitmap, -lie.width / 2, -lie.height / 2, lie.width, lie.height);
+    const { shown } = this.pictures;
+    if (!shown || size.width === 0 || size.height === 0) return;
+    const { x, y, width, height, angle, flip } = place(shown, size, { ...this.look, fit: this.fit() });
+    const { style } = this.canvas;
+    style.width = `${width}px`;
+    style.height = `${height}px`;
+    style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
   }
 
   tell() {
@@ -240,8 +242,9 @@ class Camera {
   }
 
   async keep() {
-    const bitmap = this.pictures.shown;
-    if (!bitmap) return;
+    const { shown } = this.pictures;
+    if (!shown) return;
+    const bitmap = await createImageBitmap(shown.blob);
     const { rotate, mirror } = this.look;
     const isLying = (rotate / 90) % 2 === 1;
     const canvas = document.createElement("canvas");
@@ -252,6 +255,7 @@ class Camera {
     pen?.scale(lie.flip, 1);
     pen?.rotate(lie.angle);
     pen?.drawImage(bitmap, -lie.width / 2, -lie.height / 2, lie.width, lie.height);
+    bitmap.close();
     const blob = await new Promise((/** @type {BlobCallback} */ done) => canvas.toBlob(done, "image/png"));
     if (!blob || this.signal.aborted) return;
     const link = document.createElement("a");

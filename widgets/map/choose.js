@@ -121,15 +121,15 @@ export class Choice {
   show() {
     const { mode, places, t } = this;
     const isWay = mode === "way" || mode === "sure";
-    this.bar.hidden = mode === "look" && !this.outcome;
-    this.no.hidden = mode === "look";
-    this.undo.hidden = !isWay;
-    this.undo.disabled = places.length === 0 || this.isBusy;
-    this.yes.hidden = mode === "look";
-    this.no.disabled = this.isBusy;
+    attribute(this.bar, "hidden", mode === "look" && !this.outcome ? "" : null);
+    attribute(this.no, "hidden", mode === "look" ? "" : null);
+    attribute(this.undo, "hidden", isWay ? null : "");
+    attribute(this.undo, "disabled", places.length === 0 || this.isBusy ? "" : null);
+    attribute(this.yes, "hidden", mode === "look" ? "" : null);
+    attribute(this.no, "disabled", this.isBusy ? "" : null);
     const reason = mode === "look" ? "" : this.hindrance();
     const isShort = mode === "way" ? places.length < 2 : places.length < 1;
-    this.yes.disabled = reason !== "" || isShort || this.isBusy;
+    attribute(this.yes, "disabled", reason !== "" || isShort || this.isBusy ? "" : null);
     write(this.yes, mode === "way" ? t("Send …") : mode === "sure" ? t("Send") : t("Go there"));
     attribute(this.bar, "data-mode", mode);
     const text = reason && places.length > 0 ? `▲ ${reason}` : this.question();

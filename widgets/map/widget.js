@@ -49,6 +49,8 @@ class Chart {
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
+    /** What was drawn last; "" after a move of the map. */
+    this.drawn = "";
     this.trail = new Trail(Number(options["trail"] ?? 1000), Number(options["trail_step"] ?? 0.2), false);
     /** @type {Place[]} */
     this.fence = [];
@@ -107,6 +109,7 @@ class Chart {
     this.layers = this.makeLayers();
     this.theme();
     this.map.on("dragstart", () => this.follow(false));
+    this.map.on("moveend", () => { this.drawn = ""; });
     if ("goto" in outputs || "waypoints" in outputs) this.listen();
     if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
   }
@@ -228,18 +231,21 @@ class Chart {
       this.hasPlace = false;
       return;
     }
+    style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
+    attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
+    const look = `${place} ${accuracy} ${isLive}`;
+    if (look === this.drawn && this.hasPlace) return; // most readings of a robot at rest
     if (isLive && this.trail.add(place)) layers.trail.setLatLngs(this.trail.places);
     if (!this.hasPlace) layers.robot.addTo(map);
     layers.robot.setLatLng(place);
     layers.ring.setLatLng(place).setRadius(accuracy ?? 0);
     if (accuracy !== null && accuracy > 0) layers.ring.addTo(map);
     else layers.ring.remove();
-    attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
-    style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
     const isFirst = !this.hasPlace && this.trail.places.length <= 1;
     this.hasPlace = true;
     if (isFirst && this.fence.length === 0) this.grid?.setOrigin(this.isLocal ? [0, 0] : place);
     if (this.isFollowing) map.panTo(place, { animate: false });
+    this.drawn = look; // after the end of the move, which clears it
   }
 
   drawChoice() {

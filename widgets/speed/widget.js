@@ -39,7 +39,7 @@ export default {
         style(root, "--speed-zero", zero.toFixed(4));
         style(root, "--speed-from", Math.min(zero, place).toFixed(4));
         style(root, "--speed-long", Math.abs(place - zero).toFixed(4));
-        wanted.hidden = goal === null;
+        attribute(wanted, "hidden", goal === null ? "" : null);
         if (goal !== null) style(root, "--speed-wanted", share(goal, least, most).toFixed(4));
 
         attribute(root, "data-state", reading.state);

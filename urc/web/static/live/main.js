@@ -184,6 +184,11 @@ function draw() {
   wakeLock.want(drive.isMine);
 }
 
+/** Whether a signal is drawn with each reading. @param {string} name */
+function shows(name) {
+  return stage.debug !== null || host.shows(name);
+}
+
 /** Request the visible images, and no others. */
 function askPictures() {
   const signals = [...host.pictures(), ...stage.pictures()];
@@ -204,8 +209,7 @@ function take(message) {
   const nowMs = performance.now();
   switch (message.t) {
     case "v":
-      store.values(message, nowMs);
-      wakeWidgets();
+      if (store.values(message, nowMs, shows)) wakeWidgets();
       return;
     case "hello":
       store.each.begin(message.session);

@@ -34,6 +34,8 @@ const GONE_AFTER = 10;
  * changed meanwhile.
  */
 const CUT_OFF_MS = 60_000;
+/** Age up to which an equal value is not drawn: the page draws all ages in this interval anyway. */
+const STEADY_MS = 250;
 /** Largest drift between two good clocks. */
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
@@ -113,23 +115,31 @@ export class Store {
   /**
    * @param {Values} frame
    * @param {number} nowMs
+   * @param {(name: string) => boolean} [shows] whether the page shows a signal
+   * @returns {boolean} whether to draw them at once; equal values of a robot at rest only have a new age
    */
-  values(frame, nowMs) {
+  values(frame, nowMs, shows = () => true) {
     const sentMs = nowMs - this.lagMs(frame.n, nowMs);
+    let isNew = frame.e !== undefined;
     frame.i.forEach((index, place) => {
       const name = this.names[index];
       if (name === undefined) return;
       const missed = this.each.take(frame.e, index, name);
       if (missed < 0) return;
       this.serial += 1;
+      const [value, alarm] = [frame.v[place] ?? null, frame.s?.[place] ?? ""];
+      const last = this.samples.get(name);
+      const isSteady = last?.value === value && last.alarm === alarm && nowMs - last.timeMs <= STEADY_MS;
+      isNew ||= !isSteady && shows(name);
       this.samples.set(name, {
-        value: frame.v[place] ?? null,
-        alarm: frame.s?.[place] ?? "",
+        value,
+        alarm,
         timeMs: sentMs - (typeof frame.a === "number" ? frame.a : (frame.a[place] ?? 0)),
         serial: this.serial,
       });
       this.each.tell(name, missed);
     });
+    return isNew;
   }
 
   /**

@@ -201,6 +201,11 @@ export class Cell {
     return this.images.names;
   }
 
+  /** Whether a signal is one of its inputs. @param {string} name */
+  shows(name) {
+    return this.inputs.some(({ signals }) => signals.includes(name));
+  }
+
   /**
    * Return the urgency of a call: 0 none, 1 new values, 2 a change that must not wait (a size, an output,
    * a value that is no longer live, the start or end of an alarm).

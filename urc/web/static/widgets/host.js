@@ -102,6 +102,12 @@ export class Host {
     }
   }
 
+  /** Whether a widget has a signal as its input. @param {string} name */
+  shows(name) {
+    for (const cell of this.cells.values()) if (cell.shows(name)) return true;
+    return false;
+  }
+
   /**
    * Let the widgets draw their news; if one frame is too short for all, in turn.
    *
