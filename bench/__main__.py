@@ -24,6 +24,7 @@ NAMES = (
     "browser_peers",
     "browser_widgets",
     "browser_roslibjs",
+    "browser_turtlebot",
     "page_layouts",
     "motion_path",
     "motion_cost",
@@ -44,6 +45,7 @@ PROGRAMS = {
     "browser_peers": "chromium",
     "browser_widgets": "chromium",
     "browser_roslibjs": "chromium",
+    "browser_turtlebot": "chromium",
     "page_layouts": "chromium",
     "motion_input": "chromium",
 }

@@ -1,7 +1,7 @@
-"""A rosbridge server with a robot, and a roslib page: ``python rosbridge.py`` prints its port.
+"""A rosbridge server with a robot, and two pages: ``python rosbridge.py`` prints its port.
 
-Each subscriber of a topic gets messages at the topic's rate. The page is ``roslib.html``, with the
-modules of ``node_modules``.
+Each subscriber of a topic gets messages at the topic's rate. The pages are ``roslib.html``, with
+the modules of ``node_modules``, and ``picture.html``.
 """
 
 import asyncio
@@ -26,6 +26,7 @@ from websockets.http11 import Request, Response
 
 HERE = Path(__file__).resolve().parent
 MODULES = HERE.parents[1] / "node_modules"
+PAGES = {"/roslib": HERE / "roslib.html", "/picture": HERE / "picture.html"}
 PICTURE = (640, 480)
 GRAIN, QUALITY = 11, 75
 """Noise and JPEG quality that result in images of about 47 kB."""
@@ -151,11 +152,11 @@ async def meet(line: ServerConnection) -> None:
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Answer a request for the page or a module; return None for a WebSocket handshake."""
+    """Answer a request for a page or a module; return None for a WebSocket handshake."""
     if "Upgrade" in request.headers:
         return None
     path = request.path.partition("?")[0]
-    file = HERE / "roslib.html" if path == "/roslib" else (MODULES / path[1:]).resolve()
+    file = PAGES.get(path) or (MODULES / path[1:]).resolve()
     if not file.is_file():
         return Response(http.HTTPStatus.NOT_FOUND, "Not Found", Headers(), b"")
     data = file.read_bytes()
