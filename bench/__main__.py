@@ -26,6 +26,9 @@ NAMES = (
     "browser_roslibjs",
     "browser_turtlebot",
     "page_layouts",
+    "browser_frames",
+    "browser_firefox",
+    "browser_webkit",
     "motion_path",
     "motion_cost",
     "motion_stop",
@@ -42,14 +45,17 @@ NAMES = (
 )
 
 PROGRAMS = {
-    "browser_peers": "chromium",
-    "browser_widgets": "chromium",
-    "browser_roslibjs": "chromium",
-    "browser_turtlebot": "chromium",
-    "page_layouts": "chromium",
-    "motion_input": "chromium",
+    "browser_peers": ("chromium",),
+    "browser_widgets": ("chromium",),
+    "browser_roslibjs": ("chromium",),
+    "browser_turtlebot": ("chromium",),
+    "browser_frames": ("webkit-driver", "xvfb"),
+    "browser_firefox": ("firefox", "node", "puppeteer"),
+    "browser_webkit": ("webkit-driver", "xvfb"),
+    "page_layouts": ("chromium",),
+    "motion_input": ("chromium",),
 }
-"""Required program of each benchmark in addition to Python, by its name in `scripts.needs`."""
+"""Required programs of each benchmark in addition to Python, by their names in `scripts.needs`."""
 
 
 def main() -> int:
@@ -79,14 +85,15 @@ def main() -> int:
 
 def bring_programs(names: Sequence[str]) -> set[str]:
     """Install the programs for these benchmarks; return the benchmarks without their program."""
-    wanted = {PROGRAMS[name] for name in names if name in PROGRAMS}
+    wanted = {program for name in names for program in PROGRAMS.get(name, ())}
     brought = bring([need for need in NEEDS if need.name in wanted])
     os.environ.update(brought.environment)
     missing = {need.name for need in brought.left_out}
-    left_out = {name for name in names if PROGRAMS.get(name) in missing}
+    left_out = {name for name in names if missing.intersection(PROGRAMS.get(name, ()))}
     for name in sorted(left_out):
         remedy = f"to install it: {brought.remedy}"
-        print(f"bench: {name} skipped: no {PROGRAMS[name]}; {remedy}", file=sys.stderr)
+        lacks = ", ".join(sorted(missing.intersection(PROGRAMS[name])))
+        print(f"bench: {name} skipped: no {lacks}; {remedy}", file=sys.stderr)
     return left_out
 
 

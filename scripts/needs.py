@@ -20,6 +20,7 @@ __all__ = ["AXE", "NEEDS", "Brought", "Need", "bring"]
 APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
 AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
+PUPPETEER = Path(__file__).resolve().parents[1] / "node_modules" / "puppeteer-core"
 LANGUAGE_SERVER = (
     Path(__file__).resolve().parents[1]
     / "node_modules"
@@ -74,6 +75,26 @@ NEEDS = (
         package="chromium-headless-shell",
         purpose="tests in a browser",
         variable="URC_HEADLESS_SHELL",
+    ),
+    Need(
+        name="firefox",
+        executables=("firefox-esr", "firefox"),
+        package="firefox-esr",
+        purpose="tests of the pages in Firefox",
+        variable="URC_FIREFOX",
+    ),
+    Need(
+        name="webkit-driver",
+        executables=("WebKitWebDriver",),
+        package="webkit2gtk-driver",
+        purpose="tests of the pages in WebKit",
+    ),
+    Need(
+        # WebKitGTK's browser has no mode without windows.
+        name="xvfb",
+        executables=("Xvfb",),
+        package="xvfb",
+        purpose="tests of the pages in WebKit",
     ),
     Need(
         name="netcat",
@@ -228,6 +249,13 @@ NEEDS = (
         package="",
         purpose="tests of the pages' accessibility",
         other=lambda: os.fspath(AXE) if AXE.is_file() else None,
+    ),
+    Need(
+        name="puppeteer",
+        executables=(),
+        package="",
+        purpose="tests of the pages in Firefox",
+        other=lambda: os.fspath(PUPPETEER) if PUPPETEER.is_dir() else None,
     ),
 )
 

@@ -20,7 +20,16 @@ from urc.access.grants import parse_grant
 from urc.access.store import AccessStore
 from urc.testing.entry import ACCESS, HERE
 
-__all__ = ["enter", "entering", "headers_for", "known_here", "learn", "signed_in", "without_key"]
+__all__ = [
+    "enter",
+    "entering",
+    "headers_for",
+    "known_here",
+    "learn",
+    "signed_in",
+    "with_key",
+    "without_key",
+]
 
 _PRINTED = re.compile(r"(dashboard )(https?://[^/\s]+)/\?key=(\S+)")
 _NOTICED_S = 30
@@ -64,6 +73,11 @@ def entering(page: Page) -> None:
         return await goto(url, **how)
 
     setattr(page, "goto", opened)  # noqa: B010 - a method, for this page alone
+
+
+def with_key(address: str) -> str:
+    """Return the address of the dashboard of a process with its key, as the process printed it."""
+    return f"{_origin(address)}/?key={_key_of(address)}"
 
 
 def without_key(context: BrowserContext) -> None:

@@ -205,8 +205,11 @@ def test_a_benchmark_with_a_page_brings_its_browser(name: str) -> None:
     assert spec.origin is not None
     tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
     imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    programs = bench.PROGRAMS.get(name, ())
     has_page = bool(imported & {"bench.browser_page", "tests.e2e.browser"})
-    assert (bench.PROGRAMS.get(name) == "chromium") == has_page
+    assert ("chromium" in programs) == has_page
+    assert ("firefox" in programs) == ("tests.e2e.browsers.firefox" in imported)
+    assert ("webkit-driver" in programs) == ("tests.e2e.browsers.webkit" in imported)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,14 @@
+"""The pages in Firefox; see `bench.other_browsers`."""
+
+from collections.abc import Sequence
+
+from bench.harness import Result
+from bench.other_browsers import checked
+from tests.e2e.browsers.firefox import firefox_window
+
+__all__ = ["run"]
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Check the pages."""
+    return checked(firefox_window, full=full)

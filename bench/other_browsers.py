@@ -1,0 +1,117 @@
+"""The pages in a browser other than Chromium: every shipped robot, and a rover that is driven.
+
+Each page must be live with all widgets, fit on the narrowest screen, and follow each theme, with no
+error in the console. Each release must stop the rover before its lease ends.
+"""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, closing
+from pathlib import Path
+
+from bench.figures import tell
+from bench.harness import Result
+from tests.e2e.browsers.demo import ROBOTS, demo_in
+from tests.e2e.browsers.rover import Rover
+from tests.e2e.browsers.scene import LEASE_S, NARROW, THEMES, WIDTHS, Scene, until
+from tests.e2e.browsers.window import Window
+
+__all__ = ["checked"]
+
+DESKTOP = (1280, 800)
+FEW = ("absolem", "tello", "ur-e-series")
+RELEASES, RELEASES_IF_FULL = 3, 20
+STOPS, STOPS_IF_FULL = 1, 5
+RESTARTS, RESTARTS_IF_FULL = 1, 3
+HARMLESS = ("WebGL context", "ResizeObserver loop completed")
+"""Parts of messages that are no faults.
+
+Firefox draws no WebGL without a graphics processor; the widgets then draw flat, or say so. WebKit
+reports a size that it will tell a widget in the next frame.
+"""
+
+
+def checked(
+    opened: Callable[[], AbstractContextManager[Window]], *, full: bool
+) -> Sequence[Result]:
+    """Check all pages in one browser, or a few of them, and drive."""
+    with opened() as window, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
+        window.resize(*DESKTOP)
+        faults = _pages(window, Path(folder) / "demo", ROBOTS if full else FEW)
+        slowest_s, count = _driven(window, Path(folder), full=full)
+    versions = {window.name: window.version}
+    return [
+        Result(
+            name=f"{window.name}: faults of {len(ROBOTS if full else FEW)} robots' pages",
+            ratio=float(len(faults)),
+            goal=0.0,
+            baseline_ms=0.0,
+            subject_ms=0.0,
+            spread=1.0,
+            rounds=1,
+            versions=versions,
+        ),
+        Result(
+            name=f"{window.name}: slowest stop after a release / lease",
+            ratio=round(slowest_s / LEASE_S, 3),
+            goal=1.0,
+            baseline_ms=LEASE_S * 1000,
+            subject_ms=round(slowest_s * 1000, 1),
+            spread=1.0,
+            rounds=count,
+            versions=versions,
+        ),
+    ]
+
+
+def _pages(window: Window, data: Path, robots: Sequence[str]) -> list[str]:
+    faults: list[str] = []
+    data.mkdir()
+    with demo_in(window, data) as demo:
+        for robot in robots:
+            before = len(window.faults())
+            try:
+                demo.open(robot)
+                _fits(window)
+                _follows_themes(window)
+            except AssertionError as error:
+                faults.append(f"{robot}: {error}")
+            told = window.faults()[before:]
+            faults += [f"{robot}: {one}" for one in told if not _is_harmless(one)]
+    for fault in faults:
+        tell({"browser": window.name, "fault": fault})
+    return faults
+
+
+def _is_harmless(fault: str) -> bool:
+    return any(part in fault for part in HARMLESS)
+
+
+def _fits(window: Window) -> None:
+    size = window.resize(*NARROW)
+    until(lambda: window.evaluate("innerWidth") == size[0], f"{size[0]} px wide")
+    content, shown = window.evaluate(WIDTHS)
+    assert content <= shown, f"{content} px wide on {shown} px"
+    window.resize(*DESKTOP)
+
+
+def _follows_themes(window: Window) -> None:
+    grounds = set()
+    for theme in THEMES:
+        window.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
+        grounds.add(window.evaluate("getComputedStyle(document.body).backgroundColor"))
+    assert len(grounds) == len(THEMES), f"themes share their ground: {sorted(grounds)}"
+
+
+def _driven(window: Window, folder: Path, *, full: bool) -> tuple[float, int]:
+    """Return the slowest stop after a release, in seconds, and the number of releases."""
+    releases = RELEASES_IF_FULL if full else RELEASES
+    with Rover() as rover, closing(Scene(window, rover, folder)) as scene:
+        scene.open()
+        scene.sees_pictures_and_values()
+        slowest_s = max(scene.drives() for _ in range(releases))
+        for _ in range(STOPS_IF_FULL if full else STOPS):
+            scene.stops_and_resets()
+        for _ in range(RESTARTS_IF_FULL if full else RESTARTS):
+            scene.is_lost_and_back()
+    return slowest_s, releases
