@@ -54,7 +54,9 @@ def verified_claims(
     audiences = audience if isinstance(audience, list) else [audience]
     party = claims.get("azp")
     if claims.get("iss") != issuer:
-        raise AccessError("the provider's token names another issuer than the options")
+        raise AccessError(
+            "the provider's token names a different issuer from the one in the options"
+        )
     if client_id not in audiences or (party is None and len(audiences) > 1):
         raise AccessError("the provider's token is for another server")
     if party is not None and party != client_id:

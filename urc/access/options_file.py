@@ -33,7 +33,7 @@ class OptionsFile:
             keys: all keys that the file may have.
 
         Raises:
-            ProblemsError: the file cannot be read, or is no mapping with these keys.
+            ProblemsError: the file cannot be read, or is not a mapping with these keys.
         """
         self._document: Document = read_document(file, _LIMITS)
         self.folder = Path(file).resolve().parent

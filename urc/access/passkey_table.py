@@ -53,8 +53,8 @@ class PasskeyTable:
         """Add a passkey; return it with its name in the form that is kept.
 
         Raises:
-            AccessError: the name is invalid, the owner is no person of this server or has too many
-                passkeys, or the passkey is known.
+            AccessError: the name is invalid, the passkey is known, or the owner is not a person of
+                this server or has too many passkeys.
         """
         passkey = passkey._replace(name=parse_name(passkey.name))
         with self._store.transaction() as base:

@@ -400,7 +400,7 @@ class GuardedConnection:
         try:
             while self.scheduler.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
-                # Overlapping attempts get more time: a slower network is no reason to give up.
+                # Overlapping attempts get more time: a slower network is not a reason to give up.
                 enough_s = _LOG_IN_S if self._is_slow_to_open else _LONGEST_S
                 is_hurried = self._hurry.is_used
                 self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)

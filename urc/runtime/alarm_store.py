@@ -173,7 +173,9 @@ class AlarmStore:
             raise  # possibly temporary: a full disk, or a folder without write permission
         except sqlite3.DatabaseError as error:
             aside = set_aside(self.file)
-            log.warning("%s is no file of alarms (%s); renamed to %s", self.file, error, aside.name)
+            log.warning(
+                "%s is not a file of alarms (%s); renamed to %s", self.file, error, aside.name
+            )
             return alarm_file(self.file)
 
     def _write(

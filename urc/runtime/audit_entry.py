@@ -73,7 +73,7 @@ def shown(data: bytes, most: int = 64) -> str:
 
 
 def cleaned(entry: AuditEntry) -> AuditEntry:
-    """Return an entry that the file returns unchanged: short texts in UTF-8, finite numbers."""
+    """Return an entry that survives a round trip through the file: short UTF-8, finite numbers."""
     return AuditEntry._make(
         _text(one) if isinstance(one, str) else _number(one) if isinstance(one, float) else one
         for one in entry._replace(at=float(entry.at), lasted_s=float(entry.lasted_s))

@@ -158,7 +158,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
     port = _own(options.get("port"), profile) if spec.type == "serial" else ""
     if port and (not _DEVICE.fullmatch(port) or ".." in port):
         yield phrase(
-            "{line} opens a file that is no serial port: {text}", line=spec.name, text=port
+            "{line} opens a file that is not a serial port: {text}", line=spec.name, text=port
         )
     if options.get("agent") and _own(options["agent"], profile):
         yield phrase("{line} logs in with the keys of your SSH agent", line=spec.name)

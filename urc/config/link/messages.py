@@ -178,7 +178,7 @@ def _answers(part: Node) -> list[Node]:
 
 
 def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
-    """Report response headers on a transport without response headers."""
+    """Report the use of response headers if the transport has none."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,

@@ -209,7 +209,7 @@ def _query(request: Request, service: RobotService, signals: Mapping[str, Signal
         raise ApiError(400, str(error).replace("'what'", "'kinds'")) from None
     for kind in asked.what:
         if kind not in _KINDS:
-            raise ApiError(400, f"{kind!r} is no kind of event; kinds: {', '.join(_KINDS)}")
+            raise ApiError(400, f"{kind!r} is not a kind of event; kinds: {', '.join(_KINDS)}")
     text = asked.text.casefold()
     titled = [name for name, one in signals.items() if text and text in _title(one).casefold()]
     return AlarmQuery(

@@ -120,7 +120,7 @@ class Access:
             scheme, _, word = value.decode("latin-1").partition(" ")
             if name == b"authorization" and scheme.lower() == "bearer":
                 who = self.control.identify(word.strip())
-                is_token = who.way == "token"  # a cookie's secret is no token
+                is_token = who.way == "token"  # a cookie's secret is not a token
                 return Visitor(self, self._seen(who) if is_token else NOBODY, is_program=True)
         known = list(_cookies(pairs))
         found = (
