@@ -8,15 +8,15 @@ import json
 import logging
 import sqlite3
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Final, NamedTuple, get_args
 
 from urc.alarms.record import AlarmEvent, AlarmRecord
 from urc.model.values import AlarmPriority
 from urc.problems import UrcError
-from urc.runtime.sqlite_file import open_for_reading, open_for_writing
+from urc.runtime.sqlite_file import open_for_writing, opened_for_reading
 
 __all__ = [
     "FILE",
@@ -158,7 +158,7 @@ def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
     Raises:
         OSError: the file cannot be read.
     """
-    with _opened(file) as base:
+    with opened_for_reading(file) as base:
         if base is None:
             return []
         rows = base.execute("SELECT robot, record FROM states").fetchall()
@@ -174,7 +174,7 @@ def search_alarms(file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S) 
         AlarmSearchTimeout: the search takes longer than `longest_s`.
     """
     where, values = _condition(query)
-    with _opened(file) as base:
+    with opened_for_reading(file) as base:
         if base is None:
             return []
         ends_at = time.monotonic() + longest_s
@@ -233,17 +233,3 @@ def _record(text: str) -> AlarmRecord | None:
         log.warning("a stored alarm is damaged: %.100s", text)
         return None
     return record
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file for reading; give None without a file, and turn errors into `OSError`."""
-    if not file.is_file():
-        yield None
-        return
-    try:
-        with closing(open_for_reading(file)) as base:
-            (version,) = base.execute("PRAGMA user_version").fetchone()
-            yield base if version else None
-    except sqlite3.Error as error:
-        raise OSError(f"{file} cannot be read: {error}") from error

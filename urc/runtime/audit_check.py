@@ -16,8 +16,9 @@ from typing import Any, Final, NamedTuple
 
 from urc.problems import printable_json
 from urc.runtime.audit_entry import COLUMNS, FIRST_COLUMNS, VERSION, AuditEntry, link
-from urc.runtime.audit_search import AuditQuery, condition, opened
+from urc.runtime.audit_search import AuditQuery, condition
 from urc.runtime.audit_table import PRUNED, AuditRow, is_migrated, row_of, select
+from urc.runtime.sqlite_file import opened_for_reading
 
 __all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "exported", "line_of"]
 
@@ -52,7 +53,7 @@ def check(file: Path) -> str:
     Raises:
         OSError: the file cannot be read.
     """
-    with opened(file) as base:
+    with opened_for_reading(file) as base:
         if base is None:
             return ""
         last, chain = _last_pruning(base)
@@ -84,7 +85,7 @@ def exported(file: Path, robots: frozenset[str] | None = None) -> Iterator[str]:
     before = "SELECT chain FROM entries WHERE id = ?"
     while True:
         lines = []
-        with opened(file) as base:
+        with opened_for_reading(file) as base:
             if base is None:
                 return
             found = base.execute(select(base) + where + order, (*values, after, _AT_ONCE))
@@ -137,7 +138,7 @@ def compare(file: Path, export: ExportCheck) -> str:
     Raises:
         OSError: the audit log cannot be read.
     """
-    with opened(file) as base:
+    with opened_for_reading(file) as base:
         if base is None:
             return f"{file} does not exist"
         row = base.execute("SELECT chain FROM entries WHERE id = ?", (export.last,)).fetchone()

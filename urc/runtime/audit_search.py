@@ -6,17 +6,16 @@ which may be writing at the same time.
 
 import sqlite3
 import time
-from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from urc.problems import UrcError
 from urc.runtime.audit_entry import COLUMNS, AuditEntry
 from urc.runtime.audit_table import AuditRow, row_of, select
-from urc.runtime.sqlite_file import open_for_reading
+from urc.runtime.sqlite_file import opened_for_reading
 
-__all__ = ["MOST", "AuditQuery", "SearchTimeout", "condition", "opened", "search"]
+__all__ = ["MOST", "AuditQuery", "SearchTimeout", "condition", "search"]
 
 MOST: Final = 1000
 """Maximum number of entries in one result for a page or a program."""
@@ -64,7 +63,7 @@ def search(file: Path, query: AuditQuery, longest_s: float = _LONGEST_S) -> list
     """
     where, values = condition(query)
     order = " ORDER BY id DESC LIMIT ?"
-    with opened(file) as base:
+    with opened_for_reading(file) as base:
         if base is None:
             return []
         ends_at = time.monotonic() + longest_s
@@ -112,16 +111,3 @@ def _marks(values: Collection[str]) -> str:
 def _pattern(text: str) -> str:
     escaped = text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
     return f"%{escaped}%"
-
-
-@contextmanager
-def opened(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file for reading; give None without a file, and turn errors into `OSError`."""
-    if not file.is_file():
-        yield None
-        return
-    try:
-        with closing(open_for_reading(file)) as base:
-            yield base
-    except sqlite3.Error as error:
-        raise OSError(f"{file} cannot be read: {error}") from error

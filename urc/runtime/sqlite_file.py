@@ -3,11 +3,12 @@
 import os
 import sqlite3
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-__all__ = ["LOCKED_S", "open_for_reading", "open_for_writing", "set_aside"]
+__all__ = ["LOCKED_S", "open_for_writing", "opened_for_reading", "set_aside"]
 
 LOCKED_S: Final = 1.0
 """Time to wait for another server's transaction, in seconds."""
@@ -39,9 +40,24 @@ def open_for_writing(file: Path) -> sqlite3.Connection:
     return base
 
 
-def open_for_reading(file: Path) -> sqlite3.Connection:
-    """Return a connection for reading a file that a server may be writing."""
-    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=LOCKED_S)
+@contextmanager
+def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
+    """Open a file for reading that a server may be writing; give None without a file or tables.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    if not file.is_file():
+        yield None
+        return
+    uri = f"{file.absolute().as_uri()}?mode=ro"
+    try:
+        with closing(sqlite3.connect(uri, uri=True, timeout=LOCKED_S)) as base:
+            # A server creates the file some time before the tables.
+            (tables,) = base.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            yield base if tables else None
+    except sqlite3.Error as error:
+        raise OSError(f"{file} cannot be read: {error}") from error
 
 
 def set_aside(file: Path) -> Path:

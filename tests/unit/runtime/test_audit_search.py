@@ -8,6 +8,7 @@ import pytest
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_search import AuditQuery, SearchTimeout, search
+from urc.runtime.sqlite_file import open_for_writing
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,12 @@ def test_query_finds(file: Path, query: AuditQuery, wanted: list[int]) -> None:
 
 def test_search_without_a_file_finds_nothing(tmp_path: Path) -> None:
     assert search(tmp_path / "audit.sqlite", AuditQuery()) == []
+
+
+def test_search_in_a_file_that_a_server_is_creating_finds_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "audit.sqlite"
+    open_for_writing(path).close()
+    assert search(path, AuditQuery()) == []
 
 
 def test_search_ends_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from urc.access.grants import AccessError
 from urc.access.store import FILE, AccessStore
 from urc.access.wrong_clock import KnownTime, clock_fault
 from urc.runtime.audit import FILE as AUDIT_FILE
-from urc.runtime.audit_search import opened
+from urc.runtime.sqlite_file import opened_for_reading
 
 __all__ = ["clock_warning"]
 
@@ -42,7 +42,7 @@ def _known(data: Path) -> Iterator[KnownTime]:
         except AccessError:
             pass
     try:
-        with opened(data / AUDIT_FILE) as base:
+        with opened_for_reading(data / AUDIT_FILE) as base:
             (newest,) = base.execute(_NEWEST).fetchone() if base else (None,)
     except (OSError, sqlite3.Error):
         newest = None
