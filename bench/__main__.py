@@ -29,6 +29,7 @@ NAMES = (
     "browser_frames",
     "browser_firefox",
     "browser_webkit",
+    "tests_thorough",
     "motion_path",
     "motion_cost",
     "motion_stop",

@@ -20,7 +20,7 @@ import pytest
 from hypothesis import settings
 
 from scripts.needs import NEEDS
-from tests.effort import examples
+from tests.effort import examples, seed
 
 # Properties that name no number of their own; a busy machine is no failure.
 settings.register_profile("urc", max_examples=examples(100), deadline=None)
@@ -37,6 +37,11 @@ TEST_TIMEOUT_S = int(os.environ.get("URC_TEST_TIMEOUT_S", "120"))
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let tests that compare pictures take them anew."""
     parser.addoption("--update", action="store_true", help="take the kept pictures anew")
+
+
+def pytest_report_header() -> str:
+    """Name the seed of `tests.effort.sample`."""
+    return f"samples: URC_TEST_SEED={seed()}"
 
 
 @pytest.fixture(scope="session")
