@@ -40,7 +40,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_report_header() -> str:
-    """Name the seed of `tests.effort.sample`."""
+    """Name the seed of `tests.effort.sampled`."""
     return f"samples: URC_TEST_SEED={seed()}"
 
 

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
-__all__ = ["IS_THOROUGH", "examples", "sample", "seed"]
+__all__ = ["IS_THOROUGH", "examples", "sampled", "seed"]
 
 IS_THOROUGH = bool(os.environ.get("URC_THOROUGH"))
 
@@ -25,7 +25,7 @@ def examples(thorough: int) -> int:
     return thorough if IS_THOROUGH else max(10, thorough // 12)
 
 
-def sample(cases: Sequence[_Case], most: int) -> list[_Case]:
+def sampled(cases: Sequence[_Case], most: int) -> list[_Case]:
     """Return at most `most` cases in their order, chosen by the commit; all in a thorough run.
 
     Each commit tries other cases. The same commit tries the same ones on each machine and in each

@@ -13,7 +13,7 @@ import pytest
 from tests.e2e.api_fuzzer import FuzzVisitor, fuzzed, operations
 from tests.e2e.api_server import ApiServer, started
 from tests.e2e.processes import UrcProcess
-from tests.effort import IS_THOROUGH, examples, sample
+from tests.effort import IS_THOROUGH, examples, sampled
 
 OPERATIONS: Final[dict[str, Any]] = dict(operations())
 EACH: Final = 60 if IS_THOROUGH else 2
@@ -37,7 +37,7 @@ def pairs() -> list[tuple[str, str]]:
     """Return pairs of visitor and call: each call once, or with each visitor in a thorough run."""
     if IS_THOROUGH:
         return list(product(VISITORS, OPERATIONS))
-    (first,) = sample(range(len(VISITORS)), 1)
+    (first,) = sampled(range(len(VISITORS)), 1)
     following = islice(cycle(VISITORS), first, None)
     return list(zip(following, OPERATIONS, strict=False))
 
@@ -72,7 +72,7 @@ def is_sound(server: ApiServer) -> bool:
     )
 
 
-@pytest.mark.parametrize("name", sample([*OPERATIONS], 20))
+@pytest.mark.parametrize("name", sampled([*OPERATIONS], 20))
 def test_no_request_of_an_administrator_breaks_the_server(
     name: str, server: ApiServer, administrator: FuzzVisitor
 ) -> None:

@@ -48,7 +48,7 @@ async def test_a_mistake_is_told_on_the_page_and_mending_it_brings_the_page_back
     assert before in sound
     file.write_text(sound.replace(before, after, 1), "utf-8")
     await page.wait_for_function(
-        "(told) => new RegExp(told).test(document.querySelector('main').textContent)", arg=told
+        "(told) => new RegExp(told).test(document.querySelector('main')?.textContent)", arg=told
     )
     await expect(cells).to_have_count(0)
     await process.wait_for_async(told)

@@ -1,4 +1,4 @@
-"""Every robot that ships, in a real browser: connected, seen, commanded, driven, let go, left.
+"""Robots that ship, in a real browser: connected, seen, commanded, driven, let go, left.
 
 The robot is emulated behind real sockets, with the guard between, as in `urc demo`. The bytes that
 reach it are held against the samples of its sheet; see `sheets.py`.
@@ -27,6 +27,7 @@ from tests.e2e.robots.sheets import (
     samples,
     stopped,
 )
+from tests.effort import sampled
 from urc.model.values import Reading
 
 pytestmark = pytest.mark.anyio
@@ -99,7 +100,7 @@ READY: dict[str, dict[str, Mapping[str, Reading]]] = {
 """What must be given last, so that it can be driven."""
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sampled(NAMES, 9))
 async def test_a_robot_is_connected_seen_commanded_driven_and_left(
     name: str, new_page: PageMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
