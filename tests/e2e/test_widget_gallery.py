@@ -1,7 +1,7 @@
 """Every widget in every state of its demo, in four themes and three sizes, in a real browser.
 
-``python -m pytest tests/e2e/test_widget_gallery.py --update`` takes the pictures anew; look at them
-with ``scripts/widget_pictures.py`` before they are committed.
+``URC_THOROUGH=1 python -m pytest tests/e2e/test_widget_gallery.py --update`` takes all pictures
+again; look at them with ``scripts/widget_pictures.py`` before they are committed.
 """
 
 import re
@@ -28,6 +28,7 @@ from tests.e2e.gallery import (
     show,
     states_of,
 )
+from tests.effort import sampled
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -99,7 +100,7 @@ async def faults_of(page: Page) -> list[str]:
     return [f"{key} ({first})" for key, first in faults.items()]
 
 
-@pytest.mark.parametrize("group", groups())
+@pytest.mark.parametrize("group", sampled(groups(), 4))
 async def test_widgets_are_whole_and_look_as_they_did(
     new_page: PageMaker, group: str, request: pytest.FixtureRequest
 ) -> None:
@@ -123,7 +124,9 @@ async def test_widgets_are_whole_and_look_as_they_did(
             keep(name, pictures)
     for name, pictures in seen.items():
         before = kept(name)
-        assert before.keys() == pictures.keys(), f"{name} has no picture yet: run with --update"
+        assert before.keys() == pictures.keys(), (
+            f"{name} has no picture yet: run with --update"
+        )
         faults += [
             f"{name} looks otherwise in {theme}"
             for theme, grid in pictures.items()
@@ -132,7 +135,7 @@ async def test_widgets_are_whole_and_look_as_they_did(
     assert not faults, "\n".join(faults)
 
 
-@pytest.mark.parametrize("widget", LOW)
+@pytest.mark.parametrize("widget", sampled(LOW, 6))
 async def test_widgets_are_whole_in_low_cells(new_page: PageMaker, widget: str) -> None:
     """Whatever the shape of a cell, no drawing, control or text of it is cut."""
     async with running_dashboard(FakeRobot(dashboard_profile())) as address:
