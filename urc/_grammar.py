@@ -70,7 +70,7 @@ def translate(
     Raises:
         ExpressionSyntaxError: the text is not a valid expression.
     """
-    parser = _Parser(tokens_of(text), resolve, names, settings)
+    parser = _ExpressionParser(tokens_of(text), resolve, names, settings)
     parser.allows_bytes = allows_bytes
     python = parser.expression()
     parser.expect_end()
@@ -80,7 +80,7 @@ def translate(
     return python
 
 
-class _Parser:
+class _ExpressionParser:
     """A recursive descent parser with one method per precedence level, lowest precedence first."""
 
     def __init__(

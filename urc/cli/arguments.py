@@ -42,7 +42,7 @@ class _Exit(Exception):
     """An exception that ends parsing after help text or an error message was printed."""
 
 
-class _Parser(argparse.ArgumentParser):
+class _ArgumentParser(argparse.ArgumentParser):
     """An argument parser with one-line error messages."""
 
     def error(self, message: str) -> NoReturn:
@@ -58,7 +58,7 @@ class _Parser(argparse.ArgumentParser):
 
 def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Namespace | int:
     """Return the parsed arguments, or the exit code after help text or an error message."""
-    parser = _Parser(
+    parser = _ArgumentParser(
         prog=f"urc {verb}",
         description=summary[0].upper() + summary[1:] + ".",
         epilog=f"example:\n  {module.EXAMPLE}",

@@ -29,7 +29,7 @@ class InterfaceFit(NamedTuple):
     """Reason why the interface does not fit, in one line; "" if it fits."""
 
 
-class _Known(WidgetFolder):
+class _CombinedWidgets(WidgetFolder):
     """The widgets of a profile and of a folder; the profile takes precedence."""
 
     def __init__(self, widgets: Mapping[str, Widget], behind: WidgetFolder) -> None:
@@ -66,7 +66,7 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
         return InterfaceFit(None, fault=next(iter(faults), "the document is not an interface"))
     problems = Problems()
     interface = parse_interface(sources.root, sources.root.text("name"), problems)
-    known = _Known(profile.widgets, registry)
+    known = _CombinedWidgets(profile.widgets, registry)
     if not has_errors(problems):
         interface = link_interface(
             sources.root, interface, profile.slots, profile.driver, known, problems

@@ -54,7 +54,7 @@ class KnownBlocks(msgspec.Struct, frozen=True):
         return f"{self.by} ({fingerprint(self.key)})"
 
 
-class _Kept(msgspec.Struct, frozen=True):
+class _BlocksFile(msgspec.Struct, frozen=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     known: tuple[KnownBlocks, ...] = ()
 
@@ -154,7 +154,7 @@ class BlockStore:
         except FileNotFoundError:
             return ()
         try:
-            return msgspec.json.decode(data, type=_Kept).known
+            return msgspec.json.decode(data, type=_BlocksFile).known
         except (ValueError, PackageError) as error:
             raise PackageError(f"{self._file}: this file is damaged: {error}") from None
 
@@ -162,5 +162,7 @@ class BlockStore:
         return atomic_files.exclusive(self._folder / "blocking")
 
     def _write(self, known: Iterable[KnownBlocks]) -> None:
-        data = msgspec.json.format(msgspec.json.encode(_Kept(1, tuple(known))), indent=1) + b"\n"
+        data = (
+            msgspec.json.format(msgspec.json.encode(_BlocksFile(1, tuple(known))), indent=1) + b"\n"
+        )
         atomic_files.put_file(self._file, data, self._folder / "blocking-work")

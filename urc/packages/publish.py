@@ -27,7 +27,7 @@ class Published(msgspec.Struct, frozen=True):
     """Whether the version is new; False if the repository already listed the version."""
 
 
-class _Fault(msgspec.Struct, frozen=True):
+class _ErrorBody(msgspec.Struct, frozen=True):
     error: str
 
 
@@ -94,6 +94,6 @@ def _reason(status: int, body: bytes) -> str:
             " start one with 'urc repo serve DIR --tokens FILE'"
         )
     try:
-        return printable(msgspec.json.decode(body, type=_Fault).error)[:2000]
+        return printable(msgspec.json.decode(body, type=_ErrorBody).error)[:2000]
     except (msgspec.DecodeError, UnicodeDecodeError):
         return f"the server replied with status {status}"

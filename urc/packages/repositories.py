@@ -26,7 +26,7 @@ _TRIES: Final = 2
 """Number of attempts. A repository may change between the requests for head and index."""
 
 
-class _Known(msgspec.Struct, frozen=True):
+class _RepositoriesFile(msgspec.Struct, frozen=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     urls: tuple[str, ...]
 
@@ -259,12 +259,12 @@ class Repositories:
         if data is None:
             return ()
         try:
-            return msgspec.json.decode(data, type=_Known).urls
+            return msgspec.json.decode(data, type=_RepositoriesFile).urls
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise PackageError(f"{self._file}: this file is damaged: {error}") from None
 
     def _write(self, urls: tuple[str, ...]) -> None:
-        data = msgspec.json.encode(_Known(1, urls))
+        data = msgspec.json.encode(_RepositoriesFile(1, urls))
         atomic_files.put_file(self._file, data + b"\n", self._folder / "work")
 
 

@@ -40,7 +40,7 @@ class UploadToken(msgspec.Struct, frozen=True):
         )
 
 
-class _File(msgspec.Struct, frozen=True):
+class _TokenFile(msgspec.Struct, frozen=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     tokens: tuple[UploadToken, ...]
 
@@ -55,7 +55,7 @@ class UploadTokens:
         """Return the stored tokens; raise `PackageError` for an unreadable file."""
         try:
             with open(self.file, "rb") as opened:
-                return msgspec.json.decode(opened.read(_BYTES), type=_File).tokens
+                return msgspec.json.decode(opened.read(_BYTES), type=_TokenFile).tokens
         except FileNotFoundError:
             return ()
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -109,7 +109,7 @@ class UploadTokens:
             yield self.all()
 
     def _write(self, tokens: tuple[UploadToken, ...]) -> None:
-        data = msgspec.json.format(msgspec.json.encode(_File(1, tokens)), indent=1)
+        data = msgspec.json.format(msgspec.json.encode(_TokenFile(1, tokens)), indent=1)
         atomic_files.put_file(self.file, data + b"\n", self.file.resolve().parent)
 
 

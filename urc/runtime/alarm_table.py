@@ -22,7 +22,7 @@ __all__ = [
     "FILE",
     "MOST_EVENTS",
     "AlarmQuery",
-    "AlarmRow",
+    "AlarmHistoryRow",
     "AlarmSearchTimeout",
     "alarm_file",
     "append_events",
@@ -66,7 +66,7 @@ class AlarmSearchTimeout(UrcError):
     """A search that takes too long."""
 
 
-class AlarmRow(NamedTuple):
+class AlarmHistoryRow(NamedTuple):
     """One event of the history, with its number."""
 
     id: int
@@ -166,7 +166,9 @@ def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
     return [(robot, one) for robot, one in found if one is not None]
 
 
-def search_alarms(file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S) -> list[AlarmRow]:
+def search_alarms(
+    file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S
+) -> list[AlarmHistoryRow]:
     """Return the newest events of a query, newest first; [] without a file.
 
     Raises:
@@ -188,7 +190,7 @@ def search_alarms(file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S) 
                     f"the search takes more than {longest_s:g} s: choose a shorter period"
                 ) from None
             raise
-    return [AlarmRow(number, AlarmEvent._make(row)) for number, *row in rows]
+    return [AlarmHistoryRow(number, AlarmEvent._make(row)) for number, *row in rows]
 
 
 def _condition(query: AlarmQuery) -> tuple[str, list[object]]:

@@ -27,7 +27,7 @@ Cause = Literal[
 """Name of a cause; "" for an unknown one."""
 
 
-class _Known(NamedTuple):
+class _CauseRow(NamedTuple):
     cause: Cause
     words: tuple[str, ...]
     """Words in lower case; one of them is in the error message."""
@@ -37,24 +37,24 @@ class _Known(NamedTuple):
 
 
 CAUSES: Final = (
-    _Known(
+    _CauseRow(
         "refused",
         ("connection refused",),
         "the machine responds, but nothing listens on that port: check the port, and whether"
         " the robot's program is running",
     ),
-    _Known(
+    _CauseRow(
         "host-key",
         ("host key", "fingerprint"),
         "compare the robot's host key, then trust the key with 'urc trust'",
     ),
-    _Known(
+    _CauseRow(
         "permission",
         ("permission denied", "access is denied"),
         "the user of URC may not open the device: add the user to the device's group",
         "serial",
     ),
-    _Known(
+    _CauseRow(
         "sign-in",
         (
             *("authenticat", "authoriz", "password", "permission denied", "login", "publickey"),
@@ -62,42 +62,42 @@ CAUSES: Final = (
         ),
         "the robot rejects the login: check user, password and key file",
     ),
-    _Known(
+    _CauseRow(
         "tls",
         ("certificate", "no tls", "ssl"),
         "check the certificate, and whether the port speaks TLS",
     ),
-    _Known(
+    _CauseRow(
         "name",
         ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
         "the host name cannot be resolved: check the spelling, or use a numeric address",
     ),
-    _Known(
+    _CauseRow(
         "unreachable",
         ("unreachable", "no route"),
         "the network is unreachable: is this machine on the robot's network?",
     ),
-    _Known(
+    _CauseRow(
         "login",
         ("steps of the connection are not done",),
         "the robot does not answer the login: check user and password, and the kind of robot",
     ),
-    _Known(
+    _CauseRow(
         "silent",
         ("nothing received", "no data", "reply timeout", "no reply"),
         "connected, but the robot sends nothing: check the port and the kind of robot",
     ),
-    _Known(
+    _CauseRow(
         "timeout",
         ("timed out", "no answer", "within", "time-out", "timeout"),
         "no reply from that address: check the address, the network, and whether the robot is on",
     ),
-    _Known(
+    _CauseRow(
         "device",
         ("no such file", "could not open port", "no such device"),
         "the file or device does not exist: check the path, and whether the device is plugged in",
     ),
-    _Known(
+    _CauseRow(
         "closed",
         ("closed", "broke", "reset by peer", "broken pipe", "the connection ("),
         "the robot ended the connection: many robots serve only one program at a time",
@@ -127,7 +127,7 @@ def advice_on(text: str, address: str = "") -> str:
     return found.advice if found is not None else "check the settings of this transport"
 
 
-def _known(text: str, address: str) -> _Known | None:
+def _known(text: str, address: str) -> _CauseRow | None:
     lower = _NAMES.sub(" ", text.lower())
     for known in CAUSES:
         if any(word in lower for word in known.words) and address.startswith(known.address):

@@ -25,7 +25,7 @@ STUCK_S = 5.0
 """Time without accepted bytes after which the connection counts as stalled, in seconds."""
 
 
-class _Waiting(NamedTuple):
+class _BufferedOutput(NamedTuple):
     """One entry of the output buffer."""
 
     data: Payload
@@ -85,7 +85,7 @@ class OutputBuffer:
         self._is_stream = is_stream
         self._prompt: Prompt | None = None
         self._shared = transport if isinstance(transport, _Shared) else None
-        self._waiting: list[_Waiting] = []
+        self._waiting: list[_BufferedOutput] = []
         self._bytes = 0
         self._has_some = asyncio.Event()
         self._is_idle = False
@@ -117,7 +117,7 @@ class OutputBuffer:
         Secret data is hidden from the traffic view.
         """
         shared = counted if self._shared is not None else None
-        item = _Waiting(data, REDACTED if is_secret else data, shared)
+        item = _BufferedOutput(data, REDACTED if is_secret else data, shared)
         prompt = self._prompt
         is_free = self._is_idle and not self._waiting and not self._has_some.is_set()
         if prompt is not None and is_free and self._offer(prompt, item):
@@ -133,7 +133,7 @@ class OutputBuffer:
         self._bytes += size
         self._has_some.set()
 
-    def _offer(self, prompt: Prompt, item: _Waiting) -> bool:
+    def _offer(self, prompt: Prompt, item: _BufferedOutput) -> bool:
         if item.counted is not None and self._shared is not None:
             return self._shared.offer_counted(item.counted, partial(self._left, item))
         if not isinstance(item.data, bytes) or not prompt.offer(item.data):
@@ -141,7 +141,7 @@ class OutputBuffer:
         self._report.saw("sent", item.shown)
         return True
 
-    def _left(self, item: _Waiting, data: Payload) -> None:
+    def _left(self, item: _BufferedOutput, data: Payload) -> None:
         """Report a frame as sent, because its counters may differ from the rendered frame."""
         self._report.saw("sent", data if item.shown is item.data else item.shown)
 
@@ -174,10 +174,10 @@ class OutputBuffer:
 
     def _wait_for_rest(self) -> None:
         """Wake the writer to check that the kernel accepts the remaining data in time."""
-        self._waiting.append(_Waiting(b"", b""))
+        self._waiting.append(_BufferedOutput(b"", b""))
         self._has_some.set()
 
-    def _next(self) -> _Waiting:
+    def _next(self) -> _BufferedOutput:
         """Return the next data to write: stream data up to a frame with counters, or one entry."""
         waiting = self._waiting
         if not self._is_stream or len(waiting) == 1 or waiting[0].counted is not None:
@@ -185,7 +185,9 @@ class OutputBuffer:
         counted = (place for place, item in enumerate(waiting) if item.counted is not None)
         end = next(counted, len(waiting))
         items, waiting[:end] = waiting[:end], []
-        return _Waiting(_joined(item.data for item in items), _joined(i.shown for i in items))
+        return _BufferedOutput(
+            _joined(item.data for item in items), _joined(i.shown for i in items)
+        )
 
     @contextmanager
     def _watched(self) -> Iterator[None]:

@@ -47,7 +47,7 @@ _MOST_TICKS: Final = 20_000
 """Maximum number of deadlines to handle during one wait of a test."""
 
 
-class _Watched(Engine):
+class _RecordingEngine(Engine):
     """An engine that records its commands, and the messages of decoded frames."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: TimeAndNonce) -> None:
@@ -93,7 +93,7 @@ class TestEngine:
         self.driver = driver
         self.settings = settings
         self.polls = polls
-        self.engine = _Watched(
+        self.engine = _RecordingEngine(
             driver, settings, TimeAndNonce(lambda: FIXED_UNIX_S + self.now, fixed_bytes)
         )
         self.now = 0.0

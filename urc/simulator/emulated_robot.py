@@ -33,7 +33,7 @@ from urc.simulator.values import Values
 __all__ = ["EmulatedRobot", "EmulatedConnection"]
 
 
-class _Line(Protocol):
+class _ConnectionState(Protocol):
     is_over: bool
 
 
@@ -45,9 +45,9 @@ class TimedSetters:
 
     def __init__(self) -> None:
         """Begin without connections."""
-        self._lines: dict[int, weakref.ref[_Line]] = {}
+        self._lines: dict[int, weakref.ref[_ConnectionState]] = {}
 
-    def sets(self, rule: SimulatorRule, line: _Line) -> bool:
+    def sets(self, rule: SimulatorRule, line: _ConnectionState) -> bool:
         """Return whether `line` may change the robot's state for `rule`.
 
         An unassigned rule is assigned to `line`.

@@ -52,7 +52,7 @@ class HttpTransport:
         self._probe = options.text("probe")
         self._streams = streams_of(setup.subscriptions)
         self._dialer = Dialer(self._place, tls=options.tls(self._place), tunnel=setup.tunnel)
-        self._talk: _Talk | None = None
+        self._talk: _OpenConnection | None = None
 
     @property
     def address(self) -> str:
@@ -70,7 +70,7 @@ class HttpTransport:
             headers=self._headers,
             connections=self._most + len(self._streams) + 1,
         )
-        talk = _Talk(client, self._most, self._answer_s, self._max_body)
+        talk = _OpenConnection(client, self._most, self._answer_s, self._max_body)
         try:
             async with asyncio.timeout(timeout_s):
                 await client.reach(timeout_s)
@@ -138,7 +138,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     return HttpTransport(setup)
 
 
-class _Talk:
+class _OpenConnection:
     """The state of the transport between `open` and `close`."""
 
     def __init__(self, client: HttpClient, most: int, answer_s: float, max_body_bytes: int) -> None:

@@ -73,7 +73,7 @@ class HttpClient:
         )
         self._origin = f"http{'s' * place.is_secure}://{place.authority}"
         self._client = httpx2.AsyncClient(
-            transport=_Wire(pool),
+            transport=_PoolTransport(pool),
             auth=_auth(credentials),
             headers={"Accept-Encoding": "identity", "User-Agent": "urc", **headers},
             timeout=httpx2.Timeout(None, connect=CONNECT_S, pool=CONNECT_S),
@@ -270,7 +270,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
     def __init__(self, dialer: Dialer) -> None:
         self._dialer = dialer
         self._spare: ByteStream | None = None
-        self._connections: set[_Connection] = set()
+        self._connections: set[_PooledStream] = set()
         """Open connections in use by the library."""
 
     def unsent(self) -> int:
@@ -281,8 +281,8 @@ class _Backend(httpcore2.AsyncNetworkBackend):
             if one.unsent():
                 one.drop()
 
-    def _lent(self, stream: ByteStream) -> "_Connection":
-        made = _Connection(stream, self._connections.discard)
+    def _lent(self, stream: ByteStream) -> "_PooledStream":
+        made = _PooledStream(stream, self._connections.discard)
         self._connections.add(made)
         return made
 
@@ -318,10 +318,10 @@ class _Backend(httpcore2.AsyncNetworkBackend):
         await asyncio.sleep(seconds)
 
 
-class _Connection(httpcore2.AsyncNetworkStream):
+class _PooledStream(httpcore2.AsyncNetworkStream):
     """A stream with the interface that the library's pool requires."""
 
-    def __init__(self, stream: ByteStream, ended: Callable[["_Connection"], None]) -> None:
+    def __init__(self, stream: ByteStream, ended: Callable[["_PooledStream"], None]) -> None:
         self._stream = stream
         self._ended = ended
         self._early = b""
@@ -406,7 +406,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
         return False
 
 
-class _Wire(httpx2.AsyncBaseTransport):
+class _PoolTransport(httpx2.AsyncBaseTransport):
     """A transport for the library that uses URC's connection pool and raises errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:

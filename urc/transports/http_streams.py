@@ -147,7 +147,7 @@ class HttpStream:
 
     async def _mjpeg(self) -> None:
         # An occasional byte keeps the response alive, but is no picture.
-        patience = _Bound(SILENCE_S, "no picture")
+        patience = _ExtendableTimeout(SILENCE_S, "no picture")
         async with self._open({}, SILENCE_S) as response, patience:
             boundary = boundary_of(response.headers.get("content-type", ""))
             cutter = MultipartParser(boundary, self._max_bytes)
@@ -215,7 +215,7 @@ class HttpStream:
     ) -> AsyncIterator[httpx2.Response]:
         request = self._client.request("GET", self._spec.path, headers, None)
         # The response header has a timeout even if the stream may be silent for hours.
-        head = _Bound(SILENCE_S if silence_s is None else 2 * silence_s, "no answer")
+        head = _ExtendableTimeout(SILENCE_S if silence_s is None else 2 * silence_s, "no answer")
         async with head, self._client.answer(request, silence_s) as response:
             head.lift()
             self._pulse.heartbeat()
@@ -256,7 +256,7 @@ class HttpStream:
             self._queue.end(str(fault))
 
 
-class _Bound:
+class _ExtendableTimeout:
     """An extendable timeout that raises `HttpFault`."""
 
     def __init__(self, limit_s: float, lack: str) -> None:

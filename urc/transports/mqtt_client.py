@@ -57,7 +57,7 @@ class MqttTransport:
         """Store the options and the dialer of a broker, without connecting."""
         self._options = options
         self._dialer = dialer
-        self._session: _Session | None = None
+        self._session: _MqttSession | None = None
 
     @property
     def address(self) -> str:
@@ -122,10 +122,10 @@ class MqttTransport:
             session.end(has_farewell=False)
         await self.close()
 
-    async def _begin(self, timeout_s: float) -> "_Session":
+    async def _begin(self, timeout_s: float) -> "_MqttSession":
         line = await self._dialer.plug(timeout_s)
         try:
-            session = _Session(self._options, line)
+            session = _MqttSession(self._options, line)
         except BaseException:
             line.close()
             raise
@@ -137,7 +137,7 @@ class MqttTransport:
         return session
 
 
-class _Session:
+class _MqttSession:
     """One open connection with its paho client."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
@@ -154,9 +154,9 @@ class _Session:
         self._check: asyncio.TimerHandle | None = None
         self._client = self._make()
 
-    def _make(self) -> "_Client":
+    def _make(self) -> "_PahoClient":
         options = self._options
-        client = _Client(options, self.line)
+        client = _PahoClient(options, self.line)
         client.max_inflight_messages_set(MAX_UNACKNOWLEDGED)
         client.max_queued_messages_set(MAX_UNACKNOWLEDGED)
         if options.username:
@@ -328,7 +328,7 @@ class _Session:
         self._granted.clear()
 
 
-class _Client(Client):
+class _PahoClient(Client):
     """A paho client that uses an existing socket."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:

@@ -49,7 +49,7 @@ class SshTarget(NamedTuple):
     """Name of the transport, for the hint about the command ``urc trust``."""
 
 
-class _Client(asyncssh.SSHClient):
+class _SshClient(asyncssh.SSHClient):
     """An asyncssh client that checks the host key and records why the connection ended."""
 
     def __init__(self, target: SshTarget, known: HostKeyStatus, *, only_looks: bool) -> None:
@@ -84,7 +84,7 @@ async def dial(
     Raises:
         ConnectFailed: connecting or the login failed; the message may include a hint.
     """
-    client = _Client(target, _known(target), only_looks=False)
+    client = _SshClient(target, _known(target), only_looks=False)
     async with credentials(target.login) as secrets:
         return await _connect(target, client, outer, timeout_s, secrets)
 
@@ -93,7 +93,7 @@ async def look_at_key(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> OfferedHostKey:
     """Return the host key of the server without logging in; `dial` describes the parameters."""
-    client = _Client(target, _known(target), only_looks=True)
+    client = _SshClient(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})
         await connection.close()  # trusted by the signature of an authority
@@ -109,7 +109,7 @@ async def look_at_key(
 
 async def _connect(
     target: SshTarget,
-    client: _Client,
+    client: _SshClient,
     outer: asyncssh.SSHClientConnection | None,
     timeout_s: float,
     secrets: dict[str, Any],
@@ -153,7 +153,7 @@ def _known(target: SshTarget) -> HostKeyStatus:
         raise ConnectFailed(str(fault)) from fault
 
 
-def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
+def _explain(target: SshTarget, client: _SshClient, fault: Exception) -> str:
     """Return a one-line message with the reason for a failed connection."""
     place, login = target.address.text, target.login
     if client.offer is not None and client.offer.expected:

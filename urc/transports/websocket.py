@@ -132,7 +132,7 @@ class WebSocketTransport:
     async def probe(self) -> None:
         """Send a ping, and return as soon as any data has arrived."""
         connection = self._socket
-        if not isinstance(connection, _Connection):
+        if not isinstance(connection, _LimitedConnection):
             raise PeerClosed(CLOSED)
         sign = connection.next_sign()
         try:
@@ -170,7 +170,7 @@ class WebSocketTransport:
             return await _Connect(
                 f"ws://{place.authority}{place.path}",  # any TLS is below
                 sock=line,
-                create_connection=_Connection,
+                create_connection=_LimitedConnection,
                 subprotocols=self._subprotocols or None,
                 additional_headers=self._headers,
                 proxy=None,
@@ -188,7 +188,7 @@ class WebSocketTransport:
             raise
 
 
-class _Connection(ClientConnection):
+class _LimitedConnection(ClientConnection):
     """A WebSocket connection with a limit on unsent ping replies.
 
     The library writes ping replies without a check of buffer space.

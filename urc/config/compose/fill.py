@@ -64,7 +64,7 @@ class ExpansionBudget:
             raise ExpansionTooLarge
 
 
-class _Filler:
+class _TemplateFiller:
     def __init__(
         self, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter | None
     ) -> None:
@@ -178,12 +178,12 @@ def fill(
     tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
 ) -> Tree:
     """Return `tree` after the replacement of every name; parts without names are not copied."""
-    return _Filler(names, budget, listener).tree(tree, path)
+    return _TemplateFiller(names, budget, listener).tree(tree, path)
 
 
 def fill_key(key: str, names: Names, budget: ExpansionBudget) -> str:
     """Return a key after the replacement of every name."""
-    return str(_Filler(names, budget, None).text(key, ())[0])
+    return str(_TemplateFiller(names, budget, None).text(key, ())[0])
 
 
 def report_unquoted(part: Node, text: str, problems: Problems) -> None:

@@ -45,7 +45,7 @@ def fill_params(
         return document  # the shape pass reports it
     part = Node(document, (), data).must("params")
     values = _values(part, given, use, problems)
-    filler = _Filler(document, values, problems)
+    filler = _ParameterFiller(document, values, problems)
     result = filler.document()
     for name, inner in part.entries().items():
         if name not in filler.used:
@@ -140,7 +140,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
     return value
 
 
-class _Filler:
+class _ParameterFiller:
     """A replacer of the parameters in one document that records the used parameters."""
 
     def __init__(self, document: Document, values: Mapping[str, Value], problems: Problems) -> None:
@@ -159,7 +159,7 @@ class _Filler:
             tree = Tree(item, document.mark.children[key], document)
             if key != "params":
                 try:
-                    names = {"params": _Watched(self._values, self.used)}
+                    names = {"params": _RecordedValues(self._values, self.used)}
                     tree = fill(tree, (key,), names, budget, self)
                 except ExpansionTooLarge:
                     self._problems.error(
@@ -190,7 +190,7 @@ class _Filler:
         )
 
 
-class _Watched(Mapping[str, Value]):
+class _RecordedValues(Mapping[str, Value]):
     """A mapping of values that records each used name."""
 
     def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:

@@ -130,7 +130,7 @@ def _use(
     return use
 
 
-class _Bound(NamedTuple):
+class _CollectedBindings(NamedTuple):
     """The collected bindings of a widget, with the same fields as in `WidgetUse`."""
 
     inputs: dict[str, str]
@@ -141,11 +141,11 @@ class _Bound(NamedTuple):
 
 def _bindings(
     part: Node, widget: Widget, base: WidgetUse | None, driver: Driver | None, problems: Problems
-) -> _Bound:
+) -> _CollectedBindings:
     old = base or WidgetUse("", "")
     outputs = _kept(old.outputs, widget.outputs)
     given = {key: one for key, one in old.given.items() if key in outputs}
-    bound = _Bound(
+    bound = _CollectedBindings(
         _kept(
             old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_multiple}
         ),
@@ -180,7 +180,7 @@ def _bindings(
 
 
 def _bind_input(
-    part: Node, widget: Widget, bound: _Bound, driver: Driver | None, problems: Problems
+    part: Node, widget: Widget, bound: _CollectedBindings, driver: Driver | None, problems: Problems
 ) -> None:
     """Bind one input to its signal or signals."""
     port = widget.inputs[part.name]

@@ -25,7 +25,7 @@ _SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
 """Framing types that may encode bytes as digits."""
 
 
-class _Frame(NamedTuple):
+class _BareLayout(NamedTuple):
     """A frame layout without its checksum."""
 
     start: bytes
@@ -46,7 +46,7 @@ def parse_layout(part: Node, encoding: str, problems: Problems, longest: int) ->
             _check_marks(part, problems)
     size = part.integer("size") if kind == "fixed" else None
     length = _parse_length(part.must("length"), encoding, problems) if kind == "length" else None
-    frame = _Frame(start, end, size, length)
+    frame = _BareLayout(start, end, size, length)
     if length is not None:
         _check_length(part.must("length"), start, length, problems)
         if length.is_loose:
@@ -126,7 +126,7 @@ def _check_marks(part: Node, problems: Problems) -> None:
 
 
 def _placed(
-    part: Node, frame: _Frame, written: list[DeclaredChecksum], problems: Problems
+    part: Node, frame: _BareLayout, written: list[DeclaredChecksum], problems: Problems
 ) -> FrameLayout:
     """Return the layout after the positions of all parts are resolved."""
     start, end, size, length = frame
@@ -182,7 +182,7 @@ def _spec_of(written: DeclaredChecksum, over: ByteRange, at: int) -> ChecksumSpe
 
 
 def _payload(
-    part: Node, frame: _Frame, head: int, tail: int, problems: Problems
+    part: Node, frame: _BareLayout, head: int, tail: int, problems: Problems
 ) -> tuple[int, int]:
     start, stop = part.integer("from"), part.integer("to")
     head = head if start is None else start

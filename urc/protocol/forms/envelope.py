@@ -24,7 +24,7 @@ _WILD: Final = ("+", "#", "\0")
 _UP: Final = (".", "..")
 
 
-class _Piece(NamedTuple):
+class _AddressPiece(NamedTuple):
     template: Template
     is_value: bool
     """Whether the piece contains an argument of the command, and not only text or settings."""
@@ -38,7 +38,9 @@ class PathTemplate:
     settings are trusted like the text of the document.
     """
 
-    def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:
+    def __init__(
+        self, pieces: tuple[_AddressPiece, ...], written: Callable[[str, bool], str]
+    ) -> None:
         """Initialise with `pieces`; `written(value, is_whole)` checks and converts a value."""
         self._pieces = pieces
         self._written = written
@@ -68,7 +70,7 @@ def place_writer(name: str, tree: object) -> PathTemplate | None:
     pieces = []
     for _, literal, expression in split_template(tree.source):
         one = compile_template(literal if expression is None else f"{{{{{expression}}}}}")
-        pieces.append(_Piece(one, not one.names <= _SETTINGS))
+        pieces.append(_AddressPiece(one, not one.names <= _SETTINGS))
     return PathTemplate(tuple(pieces), written)
 
 

@@ -65,18 +65,18 @@ class TextWriter:
         return found
 
     @cached_property
-    def _pieces(self) -> tuple["_Piece", ...]:
-        pieces = [_Piece("", "")]
+    def _pieces(self) -> tuple["_TextPiece", ...]:
+        pieces = [_TextPiece("", "")]
         for _, literal, expression in split_template(self._template.source):
             if expression is None:
                 last = pieces.pop()
-                pieces.append(_Piece(last.name, last.literal + literal))
+                pieces.append(_TextPiece(last.name, last.literal + literal))
             else:
-                pieces.append(_Piece(_name_in(expression), ""))
+                pieces.append(_TextPiece(_name_in(expression), ""))
         return tuple(pieces)
 
 
-class _Piece(NamedTuple):
+class _TextPiece(NamedTuple):
     """A field and the following literal text; the first piece has no field."""
 
     name: str

@@ -158,7 +158,7 @@ def _written(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-class _Waiting(NamedTuple):
+class _PendingVerification(NamedTuple):
     run: "VerifiedRun"
     since: float
     due: float
@@ -170,7 +170,7 @@ class Verifications:
 
     def __init__(self, known: SignalState) -> None:
         self._known = known
-        self._waiting: list[_Waiting] = []
+        self._waiting: list[_PendingVerification] = []
         self.has_news = False
         """Whether new samples require another check."""
 
@@ -193,7 +193,7 @@ class Verifications:
         """Add a run to verify with samples received after `since`, the time of sending."""
         if run.verify is not None:
             due = now + run.verify.within_s
-            self._waiting.append(_Waiting(run, since, due, outcome))
+            self._waiting.append(_PendingVerification(run, since, due, outcome))
             self.has_news = True
 
     def check(self, now: float) -> list[LineEvent]:

@@ -122,10 +122,10 @@ class HttpServer(UrlServer, StreamServer):
         writer: asyncio.StreamWriter,
     ) -> None:
         base = self._path.rstrip("/")
-        await _Talk(self._context, self._auth, base, reader, writer).run(client)
+        await _HttpConversation(self._context, self._auth, base, reader, writer).run(client)
 
 
-class _Talk:
+class _HttpConversation:
     """Serve one connection, request by request. The last request may start a stream."""
 
     def __init__(

@@ -107,7 +107,7 @@ class _PtyServer:
                 await asyncio.sleep(_LOOK_S)
                 continue
             gone = asyncio.Event()
-            wire = _Wire(self._wire, first)
+            wire = _TerminalEnd(self._wire, first)
             self._clients.admit(lambda client, wire=wire: self._talk(client, wire), gone.set)  # type: ignore[misc] # of this turn
             await gone.wait()
 
@@ -120,11 +120,11 @@ class _PtyServer:
         except OSError:
             return None
 
-    async def _talk(self, client: ClientConnection, wire: "_Wire") -> None:
+    async def _talk(self, client: ClientConnection, wire: "_TerminalEnd") -> None:
         await converse(self._context, client, wire.read, wire.write)
 
 
-class _Wire:
+class _TerminalEnd:
     """The robot's end of a pseudo-terminal while a client is connected."""
 
     def __init__(self, number: int, first: bytes) -> None:

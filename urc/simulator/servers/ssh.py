@@ -54,7 +54,7 @@ class SshServer(ListeningServer):
         acceptor = await asyncssh.listen(
             host,
             port,
-            server_factory=lambda: _Server(self._context, self._lock, self._connections),
+            server_factory=lambda: _SshServer(self._context, self._lock, self._connections),
             server_host_keys=[key],
             process_factory=self._accept,
             encoding=None,
@@ -90,7 +90,8 @@ class SshServer(ListeningServer):
             return
         process.stdout.channel.set_write_buffer_limits(high=READ_BYTES)
         self._clients.admit(
-            lambda client: _Talk(self._context, process).run(client), process.channel.abort
+            lambda client: _ShellConversation(self._context, process).run(client),
+            process.channel.abort,
         )
 
 
@@ -130,7 +131,7 @@ class _Lock:
         return mine or self._takes_any_key
 
 
-class _Server(asyncssh.SSHServer):
+class _SshServer(asyncssh.SSHServer):
     """One client's connection."""
 
     def __init__(
@@ -179,7 +180,7 @@ class _Server(asyncssh.SSHServer):
         return self._connection.forward_connection(inside.host, inside.port)  # type: ignore[return-value]
 
 
-class _Talk:
+class _ShellConversation:
     """The conversation with one client's shell or command."""
 
     def __init__(self, context: ServerContext, process: "asyncssh.SSHServerProcess[bytes]") -> None:

@@ -24,10 +24,10 @@ class TelnetServer(StreamServer):
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
-        await _Talk(self._context, reader, writer).run(client)
+        await _TelnetConversation(self._context, reader, writer).run(client)
 
 
-class _Talk:
+class _TelnetConversation:
     """The conversation with one client."""
 
     def __init__(

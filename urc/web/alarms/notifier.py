@@ -58,7 +58,7 @@ class NotifyCount(NamedTuple):
     """Number of alarms that were not notified, because too many waited."""
 
 
-class _Waiting(NamedTuple):
+class _QueuedAlarm(NamedTuple):
     robot: str
     title: str
     is_flooded: bool
@@ -72,7 +72,7 @@ class AlarmNotifier:
         """Prepare; the thread starts with the first alarm."""
         self._options = options
         self._now = now
-        self._waiting: list[_Waiting] = []
+        self._waiting: list[_QueuedAlarm] = []
         self._next_at: dict[str, float] = {}
         """Earliest time of the next notification of each robot with a flood."""
         self._counts: Counter[str] = Counter()
@@ -94,7 +94,7 @@ class AlarmNotifier:
         Shelved and suppressed alarms are not notified.
         """
         found = [
-            _Waiting(robot, title, alarms.list.is_flooded, _alarm(one, alarms))
+            _QueuedAlarm(robot, title, alarms.list.is_flooded, _alarm(one, alarms))
             for one in events
             if self._is_notified(one)
         ]
@@ -139,7 +139,7 @@ class AlarmNotifier:
             for robot in dict.fromkeys(one.robot for one in batch):
                 self._notify(robot, [one for one in batch if one.robot == robot])
 
-    def _next_batch(self) -> list[_Waiting]:
+    def _next_batch(self) -> list[_QueuedAlarm]:
         """Wait for alarms that are due, and return them; return [] after `close`."""
         with self._wakes:
             self._is_busy = False
@@ -160,7 +160,7 @@ class AlarmNotifier:
         """Wait, but not for the end of the server."""
         self._wakes.wait_for(lambda: self._is_closing, seconds)
 
-    def _notify(self, robot: str, batch: Sequence[_Waiting]) -> None:
+    def _notify(self, robot: str, batch: Sequence[_QueuedAlarm]) -> None:
         is_flooded = batch[-1].is_flooded
         if is_flooded:
             self._next_at[robot] = self._now() + FLOOD_GAP_S

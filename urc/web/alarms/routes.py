@@ -16,7 +16,7 @@ from urc.alarms.alarm_list import AlarmActor
 from urc.alarms.record import AlarmEventKind, AlarmRecord
 from urc.model.values import Signal
 from urc.runtime.alarm_store import AlarmStore
-from urc.runtime.alarm_table import AlarmQuery, AlarmRow, AlarmSearchTimeout, search_alarms
+from urc.runtime.alarm_table import AlarmHistoryRow, AlarmQuery, AlarmSearchTimeout, search_alarms
 from urc.runtime.server_recorder import ServerRecorder
 from urc.web.alarms.counts import by_urgency, count_of
 from urc.web.alarms.notifier import AlarmNotifier
@@ -224,7 +224,7 @@ def _query(request: Request, service: RobotService, signals: Mapping[str, Signal
     )
 
 
-def _found(store: AlarmStore, query: AlarmQuery) -> list[AlarmRow]:
+def _found(store: AlarmStore, query: AlarmQuery) -> list[AlarmHistoryRow]:
     store.settle(_SETTLE_S)  # the newest events matter most
     return search_alarms(store.file, query)
 
@@ -261,7 +261,7 @@ def _info(record: AlarmRecord, signals: Mapping[str, Signal]) -> AlarmInfo:
     )
 
 
-def _event(row: AlarmRow, signals: Mapping[str, Signal]) -> AlarmHistoryEvent:
+def _event(row: AlarmHistoryRow, signals: Mapping[str, Signal]) -> AlarmHistoryEvent:
     event = row.event
     return AlarmHistoryEvent(
         id=row.id,

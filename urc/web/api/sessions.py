@@ -145,7 +145,7 @@ class ProgramSessions:
                 after each change of rights.
         """
         self._followed = followed
-        self._open: dict[str, _Kept] = {}
+        self._open: dict[str, _OpenSession] = {}
         """Secret → session."""
 
     @contextmanager
@@ -173,7 +173,7 @@ class ProgramSessions:
             session = _entered(service, live, peer)
             stack.callback(service.controls.remove_page, session.operator)
             stack.enter_context(self._followed(lambda: self._recheck(session)))
-            self._open[session.secret] = _Kept(session, stack.pop_all())
+            self._open[session.secret] = _OpenSession(session, stack.pop_all())
         self._touch(session)
         return session
 
@@ -229,7 +229,7 @@ class ProgramSessions:
             self.end(session)
 
 
-class _Kept:
+class _OpenSession:
     def __init__(self, session: ProgramSession, stack: ExitStack) -> None:
         self.session = session
         self.stack = stack

@@ -87,7 +87,7 @@ class Backlog:
         return row
 
 
-class _Known(NamedTuple):
+class _RunningProfile(NamedTuple):
     """The running version of the robot, which answers the requests of the page."""
 
     profile: Profile
@@ -274,11 +274,11 @@ class DevClient:
             asked = await self._questions.get()
             robot = self._watch.robot
             settings = sample_settings(robot.profile.settings) | dict(robot.settings)
-            known = _Known(robot.profile, stand_ins(robot.profile, settings))
+            known = _RunningProfile(robot.profile, stand_ins(robot.profile, settings))
             self._log(await asyncio.to_thread(_answered, asked, known))
 
 
-def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _Known) -> str:
+def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _RunningProfile) -> str:
     try:
         return (
             _tried(asked, known) if isinstance(asked, wire.ParseRequest) else _shown(asked, known)
@@ -294,7 +294,7 @@ def _refused(asked: wire.ParseRequest | wire.PreviewRequest, text: str) -> str:
     return wire.encode_shown(asked.id, Preview(text))
 
 
-def _tried(asked: wire.ParseRequest, known: _Known) -> str:
+def _tried(asked: wire.ParseRequest, known: _RunningProfile) -> str:
     spec = known.profile.driver.transports.get(asked.transport)
     encoding = spec.encoding if spec else "utf-8"
     try:
@@ -305,6 +305,6 @@ def _tried(asked: wire.ParseRequest, known: _Known) -> str:
     return wire.encode_tried(asked.id, found)
 
 
-def _shown(asked: wire.PreviewRequest, known: _Known) -> str:
+def _shown(asked: wire.PreviewRequest, known: _RunningProfile) -> str:
     found = preview(known.profile.driver, known.settings, asked.command, asked.arguments)
     return wire.encode_shown(asked.id, found)

@@ -121,7 +121,7 @@ class _Command(msgspec.Struct, frozen=True):
     arguments: list[_Argument]
 
 
-class _Line(msgspec.Struct, frozen=True):
+class _TransportRow(msgspec.Struct, frozen=True):
     name: str
     type: str
     framing: str
@@ -136,7 +136,7 @@ class _Profile(Outbound, tag="profile", omit_defaults=False, frozen=True):
     file: str
     told: str
     problems: list[_Found]
-    lines: list[_Line]
+    lines: list[_TransportRow]
     commands: list[_Command]
 
 
@@ -148,7 +148,7 @@ class _Taker(msgspec.Struct, frozen=True):
     refused: tuple[str, ...]
 
 
-class _Piece(msgspec.Struct, frozen=True):
+class _FramePiece(msgspec.Struct, frozen=True):
     start: int
     end: int
     data: bytes
@@ -163,10 +163,10 @@ class _Tried(Outbound, tag="tried", omit_defaults=False, frozen=True):
     size: int = 0
     left: int = 0
     more: int = 0
-    pieces: tuple[_Piece, ...] = ()
+    pieces: tuple[_FramePiece, ...] = ()
 
 
-class _Frame(msgspec.Struct, frozen=True):
+class _FrameRow(msgspec.Struct, frozen=True):
     transport: str
     note: str = ""
     data: bytes = b""
@@ -180,7 +180,7 @@ class _Frame(msgspec.Struct, frozen=True):
 class _Shown(Outbound, tag="shown", omit_defaults=False, frozen=True):
     id: int
     refusal: str
-    frames: list[_Frame]
+    frames: list[_FrameRow]
     questions: tuple[str, ...]
     requires: tuple[str, ...]
 
@@ -223,7 +223,7 @@ def encode_profile(
     """
     kinds = frozenset(messaging)
     lines = [
-        _Line(one.name, one.type, one.framing.type, one.encoding, one.type in kinds)
+        _TransportRow(one.name, one.type, one.framing.type, one.encoding, one.type in kinds)
         for one in driver.transports.values()
     ]
     found = [_Found(one.severity, to_text(one)) for one in problems]
@@ -271,10 +271,10 @@ def _argument(one: Argument) -> _Argument:
     )
 
 
-def _piece(piece: ParsedPiece) -> _Piece:
+def _piece(piece: ParsedPiece) -> _FramePiece:
     takers = [_taker(one) for one in piece.takers]
     data = piece.data[:SHOWN_BYTES]
-    return _Piece(piece.start, piece.end, data, cut(piece.fault), takers, piece.reasons)
+    return _FramePiece(piece.start, piece.end, data, cut(piece.fault), takers, piece.reasons)
 
 
 def _taker(taker: FrameConsumer) -> _Taker:
@@ -291,14 +291,14 @@ def _word(value: object) -> str:
     return cut(repr(value))
 
 
-def _frame(written: PreviewLine) -> _Frame:
+def _frame(written: PreviewLine) -> _FrameRow:
     payload = written.payload
     if written.text:
-        return _Frame(written.transport, written.text)
+        return _FrameRow(written.transport, written.text)
     if not isinstance(payload, Envelope):
-        return _Frame(written.transport, data=payload[:SHOWN_BYTES], size=len(payload))
+        return _FrameRow(written.transport, data=payload[:SHOWN_BYTES], size=len(payload))
     row = TrafficRow(0, 0.0, "sent", written.transport)
     fill(row, payload)
-    return _Frame(
+    return _FrameRow(
         written.transport, "", row.data, row.size, row.verb, row.address, row.more, row.text
     )

@@ -57,7 +57,7 @@ MEDIA_TYPES = {
 
 
 @dataclass(slots=True)
-class _File:
+class _CachedFile:
     path: Path
     stamp: tuple[int, int] = (0, 0)
     body: bytes = b""
@@ -77,7 +77,7 @@ class _File:
 class Assets:
     """A table of files by their relative URL."""
 
-    files: dict[str, _File] = field(default_factory=dict)
+    files: dict[str, _CachedFile] = field(default_factory=dict)
 
     def respond(self, name: str, request: Request) -> Response:
         """Return the file, or status 304 if the browser's copy is current; raise status 404."""
@@ -115,7 +115,7 @@ def folder_assets(folder: Path) -> Assets:
     for path in sorted(root.rglob("*")):
         is_ours = path.is_file() and path.resolve().is_relative_to(root)
         if is_ours and path.suffix in MEDIA_TYPES:
-            found.files[path.relative_to(root).as_posix()] = _File(path)
+            found.files[path.relative_to(root).as_posix()] = _CachedFile(path)
     return found
 
 
@@ -140,13 +140,13 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
             )
         # List missing files too: an author may write the widget while the page is open.
         for name in WIDGET_FILES:
-            found.files[f"{widget.name}/{name}"] = _File(widget.folder / name)
+            found.files[f"{widget.name}/{name}"] = _CachedFile(widget.folder / name)
         for name, file in _more_files(widget):
             found.files[f"{widget.name}/{name}"] = file
     return found
 
 
-def _more_files(widget: Widget) -> Iterable[tuple[str, _File]]:
+def _more_files(widget: Widget) -> Iterable[tuple[str, _CachedFile]]:
     more = folder_assets(widget.folder).files
     mine = {name: file for name, file in more.items() if not any(map(_is_hidden, name.split("/")))}
     if len(mine) > MOST_FILES:

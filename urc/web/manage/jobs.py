@@ -105,7 +105,7 @@ class Job:
         )
 
 
-class _Watched:
+class _ReportingSource:
     """A package source that reports progress to a job, and fails after the job's cancellation."""
 
     def __init__(self, source: Source, job: Job) -> None:
@@ -271,7 +271,7 @@ class Jobs:
 
     def _plan(self, job: Job, what: Wanted) -> _Planned:
         """Download all packages and read their permissions, in a thread."""
-        known = [_Watched(one, job) for one in self._sources(job.notes.append)]
+        known = [_ReportingSource(one, job) for one in self._sources(job.notes.append)]
         plan = self._fetched(job, what, known)
         if job.is_given_up:
             raise PackageError("given up")

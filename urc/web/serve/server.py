@@ -79,7 +79,7 @@ async def serve(
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)
         app = TlsPort(app, allowed_hosts)
-    server = _Server(_config(app, connection))
+    server = _UvicornServer(_config(app, connection))
     try:
         with _ending(server), OWN_DOORS.kept(listener), _renewed(certificates, handshakes):
             running = asyncio.ensure_future(server.serve(sockets=[listener]))
@@ -136,7 +136,7 @@ def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -
         handshakes.close()
 
 
-class _Server(uvicorn.Server):
+class _UvicornServer(uvicorn.Server):
     """A uvicorn server that signals its end with an event, instead of polling."""
 
     def __init__(self, config: uvicorn.Config) -> None:
@@ -290,7 +290,7 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
         await asyncio.wait((running,), timeout=0.01)
 
 
-async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
+async def _follow(server: _UvicornServer, running: "asyncio.Future[None]") -> None:
     """Wait until the server ends; if cancelled, close the server gracefully."""
     try:
         await asyncio.shield(running)
@@ -302,7 +302,7 @@ async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
 
 
 @contextlib.contextmanager
-def _ending(server: _Server) -> Iterator[None]:
+def _ending(server: _UvicornServer) -> Iterator[None]:
     """Let SIGINT and SIGTERM end the server while the context is open, if the platform permits."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []

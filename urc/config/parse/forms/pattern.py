@@ -18,7 +18,7 @@ _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123
 """Characters that the text after a field must not start with, by kind of field."""
 
 
-class _Fault(Exception):
+class _PatternFault(Exception):
     """A mistake in a pattern, with its position."""
 
     def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
@@ -30,7 +30,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     """Return the pattern at `part` with its fields."""
     try:
         holes, tail = _parse(str(part.data))
-    except _Fault as fault:
+    except _PatternFault as fault:
         problems.error(part, "bad-pattern", str(fault), **fault.place)
         return None
     names = tuple(hole.name for hole in holes if hole.name)
@@ -54,7 +54,7 @@ def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
             literal += piece[0][0]
         elif piece[1] is None:
             hint = "write {{ or }} for a brace of the frame"
-            raise _Fault(f"{piece[0]!r} has no matching brace", piece.start(), hint=hint)
+            raise _PatternFault(f"{piece[0]!r} has no matching brace", piece.start(), hint=hint)
         else:
             # Before a field of fixed width, blanks are counted.
             is_fixed = piece[1].rpartition(":")[2].isdecimal()
@@ -77,31 +77,31 @@ def _hole(inside: str, before: str, offset: int, holes: list[PatternField]) -> P
     if found is None:
         text = f"'{{{inside}}}' is not a field"
         hint = f"write {{name:kind}}; kinds are {', '.join(_KINDS)}"
-        raise _Fault(text, offset - 1, len(inside) + 2, hint)
+        raise _PatternFault(text, offset - 1, len(inside) + 2, hint)
     name, kind = found[1] or "", found[2]
     if kind not in _KINDS:
         hint = did_you_mean(kind, _KINDS, "kinds")
         text = f"there is no kind of field {kind!r}"
-        raise _Fault(text, offset + found.start(2), len(kind), hint)
+        raise _PatternFault(text, offset + found.start(2), len(kind), hint)
     if name and any(hole.name == name for hole in holes):
-        raise _Fault(f"the field {name!r} occurs twice", offset, len(name))
+        raise _PatternFault(f"the field {name!r} occurs twice", offset, len(name))
     if found[3] and kind == "rest":
         text = "a field of kind 'rest' has no width, because it extends to the end of the frame"
-        raise _Fault(text, offset + found.start(3), len(found[3]))
+        raise _PatternFault(text, offset + found.start(3), len(found[3]))
     return PatternField(before, name, cast("FieldKind", kind), int(found[3] or 0))
 
 
 def _check_after(holes: list[PatternField], literal: str, last: tuple[int, int]) -> None:
-    """Raise `_Fault` when the end of the last field is ambiguous."""
+    """Raise `_PatternFault` when the end of the last field is ambiguous."""
     if not holes or holes[-1].width:
         return
     kind, (start, end) = holes[-1].kind, last
     if kind == "rest":
-        raise _Fault("nothing can follow a field of kind 'rest'", start, end - start)
+        raise _PatternFault("nothing can follow a field of kind 'rest'", start, end - start)
     if not literal:
         hint = "write the text between both fields, or give a width: {name:number:6}"
         text = "there is no text between this field and the next"
-        raise _Fault(text, start, end - start, hint)
+        raise _PatternFault(text, start, end - start, hint)
     if literal[0] in _EATS.get(kind, ""):
         text = f"{literal[0]!r} after the field could be part of the {kind}"
-        raise _Fault(text, start, end - start, "use a regex")
+        raise _PatternFault(text, start, end - start, "use a regex")
