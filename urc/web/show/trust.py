@@ -4,17 +4,19 @@ Layer 5. The page and the certificate contain no data about robots. Everyone may
 over plain HTTP, because a device needs them before it trusts the certificate.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
+from urc._translatable import phrase
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import parse_host
 from urc.web.serve.rights import ANYONE, ProtectedRoute
 from urc.web.show.pages import PageHead, render
-from urc.web.words import t
+from urc.web.words import spoken, t
 
 __all__ = ["AUTHORITY_PATH", "TRUST_PATH", "DeviceGuide", "TrustPage", "TrustPages"]
 
@@ -33,10 +35,76 @@ class DeviceGuide:
     """Name for scripts, such as ``ios``."""
     title: str
     steps: tuple[str, ...]
+    """Steps after the download, in order."""
     removal: str
+    """Step that removes the certificate again."""
     command: str = ""
     """Command of the last step; "" without a command."""
     removal_command: str = ""
+
+
+_GUIDES: Final = (
+    DeviceGuide(
+        "android",
+        "Android",
+        (
+            phrase("Open the settings of the device, and search for “CA certificate”."),
+            phrase("Confirm the warning, and choose the downloaded file authority.crt."),
+        ),
+        phrase("Search for “trusted credentials”, open “User”, choose it, and remove it."),
+    ),
+    DeviceGuide(
+        "ios",
+        "iPhone, iPad",
+        (
+            phrase("Download it in Safari, and allow the profile."),
+            phrase("Open Settings, General, VPN & Device Management: install the profile."),
+            phrase("Open Settings, General, About, Certificate Trust Settings: turn it on."),
+        ),
+        phrase("Open Settings, General, VPN & Device Management: remove the profile."),
+    ),
+    DeviceGuide(
+        "windows",
+        "Windows (Chrome, Edge)",
+        (
+            phrase("Open the file, and choose “Install Certificate”, then “Current User”."),
+            phrase("Place it in the store “Trusted Root Certification Authorities”, and confirm."),
+            phrase("Close all windows of the browser, and open it again."),
+        ),
+        phrase("Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete it."),
+    ),
+    DeviceGuide(
+        "macos",
+        "macOS (Safari, Chrome)",
+        (
+            phrase("Open the file: Keychain Access adds it to the login keychain."),
+            phrase("Open it there, open “Trust”, and choose “Always Trust” for SSL."),
+        ),
+        phrase("Delete it in Keychain Access."),
+    ),
+    DeviceGuide(
+        "linux",
+        "Linux (Chrome, Chromium)",
+        (
+            phrase("Install the program certutil (package libnss3-tools or nss-tools)."),
+            phrase("Run this command in the folder of the download, then restart the browser:"),
+        ),
+        phrase("Run this command:"),
+        "mkdir -p $HOME/.pki/nssdb && certutil -d sql:$HOME/.pki/nssdb -A -t C,, -n urc"
+        " -i authority.crt",
+        "certutil -d sql:$HOME/.pki/nssdb -D -n urc",
+    ),
+    DeviceGuide(
+        "firefox",
+        "Firefox",
+        (
+            phrase("Open the settings, search for “certificates”: View Certificates, Authorities."),
+            phrase("Import the file, and select “Trust this CA to identify websites”."),
+        ),
+        phrase("Choose it in the same list, then “Delete or Distrust”."),
+    ),
+)
+"""Guides in English, for translation. Names of menus are those of the systems."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +145,7 @@ class TrustPages:
             has_authority=has_authority,
             certificate_url=AUTHORITY_PATH,
             secure_url=_secure_url(request) if found is not None else "",
-            guides=_guides() if has_authority else (),
+            guides=tuple(map(_translated, _GUIDES)) if has_authority else (),
         )
         return HTMLResponse(render("trust.html.j2", page), headers=_HEADERS)
 
@@ -95,66 +163,7 @@ def _secure_url(request: Request) -> str:
     return f"https://{host.host}/" if host.port is None else f"https://{host.host}:{host.port}/"
 
 
-def _guides() -> tuple[DeviceGuide, ...]:
-    """Return the guides in the language of the request. Names of menus are those of the systems."""
-    return (
-        DeviceGuide(
-            "android",
-            "Android",
-            (
-                t("Open the settings of the device, and search for “CA certificate”."),
-                t("Confirm the warning, and choose the downloaded file authority.crt."),
-            ),
-            t("Search for “trusted credentials”, open “User”, choose it, and remove it."),
-        ),
-        DeviceGuide(
-            "ios",
-            "iPhone, iPad",
-            (
-                t("Download it in Safari, and allow the profile."),
-                t("Open Settings, General, VPN & Device Management: install the profile."),
-                t("Open Settings, General, About, Certificate Trust Settings: turn it on."),
-            ),
-            t("Open Settings, General, VPN & Device Management: remove the profile."),
-        ),
-        DeviceGuide(
-            "windows",
-            "Windows (Chrome, Edge)",
-            (
-                t("Open the file, and choose “Install Certificate”, then “Current User”."),
-                t("Place it in the store “Trusted Root Certification Authorities”, and confirm."),
-                t("Close all windows of the browser, and open it again."),
-            ),
-            t("Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete it."),
-        ),
-        DeviceGuide(
-            "macos",
-            "macOS (Safari, Chrome)",
-            (
-                t("Open the file: Keychain Access adds it to the login keychain."),
-                t("Open it there, open “Trust”, and choose “Always Trust” for SSL."),
-            ),
-            t("Delete it in Keychain Access."),
-        ),
-        DeviceGuide(
-            "linux",
-            "Linux (Chrome, Chromium)",
-            (
-                t("Install the program certutil (package libnss3-tools or nss-tools)."),
-                t("Run this command in the folder of the download, then restart the browser:"),
-            ),
-            t("Run this command:"),
-            "mkdir -p $HOME/.pki/nssdb && certutil -d sql:$HOME/.pki/nssdb -A -t C,, -n urc"
-            " -i authority.crt",
-            "certutil -d sql:$HOME/.pki/nssdb -D -n urc",
-        ),
-        DeviceGuide(
-            "firefox",
-            "Firefox",
-            (
-                t("Open the settings, search for “certificates”: View Certificates, Authorities."),
-                t("Import the file, and select “Trust this CA to identify websites”."),
-            ),
-            t("Choose it in the same list, then “Delete or Distrust”."),
-        ),
-    )
+def _translated(guide: DeviceGuide) -> DeviceGuide:
+    """Return a guide in the language of the request."""
+    steps = tuple(map(spoken, guide.steps))
+    return replace(guide, steps=steps, removal=spoken(guide.removal))
