@@ -17,7 +17,7 @@ from urc._event_loop import run as run_loop
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS
-from urc.web.app import Robot, build_app
+from urc.web.app import DashboardOptions, Robot, build_app
 
 __all__ = ["run"]
 
@@ -51,7 +51,9 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
     """Return URC's processor time, and the number of bytes for each page and tick."""
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=ACCESS)
+    )
 
     def tell(tick: int) -> None:
         now_s = robot.clock.now()

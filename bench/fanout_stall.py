@@ -25,7 +25,7 @@ from bench.watching import serving
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS
-from urc.web.app import Robot, build_app
+from urc.web.app import DashboardOptions, Robot, build_app
 
 __all__ = ["run"]
 
@@ -124,7 +124,9 @@ def _result(name: str, ratio: float, goal: float, base: float, subject: float) -
 async def _urc(seconds: float) -> Look:
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=ACCESS)
+    )
 
     def tick(number: int) -> None:
         now_s = robot.clock.now()

@@ -14,7 +14,7 @@ from tests.unit.web.test_manage_routes import ADDRESS, robot_options, stock
 from urc.testing.entry import ACCESS, HERE
 from urc.web.api.calls import CALLS, api_routes
 from urc.web.api_document import DOCUMENT, api_document
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.serve.rights import ANYONE, ProtectedRoute, ProtectedSocket
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -35,7 +35,10 @@ OPEN_PATHS = {
 def app(tmp_path: Path) -> Starlette:
     stock(tmp_path)
     return build_app(
-        {}, access=ACCESS, data=tmp_path, robot_options=robot_options(tmp_path), remake={}
+        {},
+        DashboardOptions(
+            access=ACCESS, data=tmp_path, robot_options=robot_options(tmp_path), remake={}
+        ),
     )
 
 

@@ -14,7 +14,7 @@ from urc.model.interface import WidgetUse
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import Robot, build_app
+from urc.web.app import DashboardOptions, Robot, build_app
 from urc.web.load.widget_trust import OURS, WidgetTrust
 
 CODE = " ".join(
@@ -50,7 +50,7 @@ def use_of(widget: str) -> WidgetUse:
 def client(robot: FakeRobot, host: str = "localhost:8080", *trusted: str) -> TestClient:
     """Return a browser's place."""
     served = Robot(robot.profile, {}, robot.open)
-    app = build_app({"puppet": served}, access=ACCESS, trusted=trusted)
+    app = build_app({"puppet": served}, DashboardOptions(access=ACCESS, trusted=trusted))
     return TestClient(app, base_url=f"http://{host}", cookies=HERE)
 
 
@@ -113,7 +113,9 @@ def test_a_frame_may_load_code_of_ours_and_its_own_and_reach_nothing(
 )
 def test_code_is_open_to_frames_and_to_no_other_site(tmp_path: Path, file: str) -> None:
     """By a path of this start, which only our own pages are told; a frame has no cookies."""
-    app = build_app({"puppet": Robot(lamp(tmp_path).profile, {}, lamp_session)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(lamp(tmp_path).profile, {}, lamp_session)}, DashboardOptions(access=ACCESS)
+    )
     frame = TestClient(app, base_url="http://localhost:8080", headers={"origin": "null"})
     answer = frame.get(f"{ACCESS.frame_code}{file}")
     assert answer.status_code == 200

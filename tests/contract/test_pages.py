@@ -14,7 +14,7 @@ from urc.model.profile import Setting
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,7 +51,7 @@ def dashboard() -> Starlette:
         name: Robot(robot.profile, {}, robot.open)
         for name, robot in {"puppet": ready, "needy": needy, "hostile": hostile}.items()
     }
-    return build_app(robots, access=ACCESS, allowed_hosts=["robot-pi"])
+    return build_app(robots, DashboardOptions(access=ACCESS, allowed_hosts=["robot-pi"]))
 
 
 @pytest.fixture(scope="module")
@@ -284,7 +284,7 @@ def test_two_different_widgets_of_one_name_are_refused(tmp_path: Path) -> None:
 def test_a_dashboard_without_robots_says_what_to_do() -> None:
     """It is not an empty page."""
     with TestClient(
-        build_app({}, access=ACCESS), base_url="http://localhost", cookies=HERE
+        build_app({}, DashboardOptions(access=ACCESS)), base_url="http://localhost", cookies=HERE
     ) as client:
         assert "urc serve" in client.get("/").text
 

@@ -10,7 +10,7 @@ from tests.unit.web.test_manage_routes import robot_options
 from urc.model.role import ROLES
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 from urc.web.serve.rights import ANYONE, ProtectedRoute, ProtectedSocket
 from urc.wire.client_messages import RIGHTS, ClientMessage
@@ -51,10 +51,12 @@ def routes(tmp_path: Path) -> list[BaseRoute]:
     served = Robot(robot.profile, {}, robot.open)
     app = build_app(
         {"puppet": served},
-        access=ACCESS,
-        data=tmp_path,
-        remake={"puppet": lambda _: served},
-        robot_options=robot_options(tmp_path),
+        DashboardOptions(
+            access=ACCESS,
+            data=tmp_path,
+            remake={"puppet": lambda _: served},
+            robot_options=robot_options(tmp_path),
+        ),
     )
     return list(app.routes)
 

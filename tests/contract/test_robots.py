@@ -16,7 +16,7 @@ from urc.runtime.document_tests import exercise, sample_settings
 from urc.runtime.registries import built_in_catalog
 from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 
 FOLDER = Path(__file__).parents[2] / "robots"
@@ -96,7 +96,7 @@ def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
     """The default interface and all others, the one for finding faults among them."""
     profile = profile_of(file)
     robot = Robot(profile, sample_settings(profile.settings), FakeRobot(profile).open)
-    app = build_app({profile.name: robot}, access=ACCESS)
+    app = build_app({profile.name: robot}, DashboardOptions(access=ACCESS))
     with TestClient(app, base_url="http://localhost:8080", cookies=HERE) as client:
         for name, interface in profile.interfaces.items():
             page = client.get(f"/robots/{profile.name}/?interface={name}")

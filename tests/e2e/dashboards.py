@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from tests.e2e.browser import PLAIN_HOST
 from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.serve.access import Access
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S
@@ -42,12 +42,14 @@ async def running_dashboard(
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
-        access=access,
-        allowed_hosts=[PLAIN_HOST],
-        linger_s=0.2,
-        trusted=trusted,
-        certificates=certificates,
-        data=data,
+        DashboardOptions(
+            access=access,
+            allowed_hosts=[PLAIN_HOST],
+            linger_s=0.2,
+            trusted=trusted,
+            certificates=certificates,
+            data=data,
+        ),
     )
     task = asyncio.create_task(
         serve(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from tests.e2e.processes import UrcProcess
 from tests.unit.packages.made import accepted, keep_settings, write_package
-from urc.cli.dashboard import DashboardAddress, workshop_of
+from urc.cli.dashboard import DashboardAddress, robot_options_of
 from urc.model.profile import Profile
 from urc.packages.install import plan_requirement
 from urc.packages.names import parse_requirement
@@ -19,7 +19,7 @@ from urc.packages.repositories import Repositories
 from urc.packages.signature import new_signer
 from urc.packages.store import Store
 from urc.testing.entry import ACCESS
-from urc.web.app import build_app, serve
+from urc.web.app import DashboardOptions, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory
 
 __all__ = [
@@ -156,12 +156,15 @@ async def running_managed(
 ) -> AsyncIterator[str]:
     """Serve what `urc serve --data-dir DATA` would; give the address, and end cleanly."""
     place = DashboardAddress("127.0.0.1", 0, data=data, shows_installed=not profiles)
-    robot_options = workshop_of(place)
+    robot_options = robot_options_of(place)
     factory = RobotFactory(robot_options)
     robots = {one.name: factory.robot(one.name, one) for one in profiles}
     remake = {name: partial(factory.robot, name) for name in robots} if is_dev else None
     app = build_app(
-        robots, access=ACCESS, data=data, remake=remake, robot_options=robot_options, linger_s=0.2
+        robots,
+        DashboardOptions(
+            access=ACCESS, data=data, remake=remake, robot_options=robot_options, linger_s=0.2
+        ),
     )
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))

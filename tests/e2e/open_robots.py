@@ -15,7 +15,7 @@ from urc.config.load import load_profile
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.testing.entry import ACCESS, KEY
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.serve.access import Access
 from urc.web.serve.certificates import Certificates
 
@@ -160,7 +160,10 @@ async def served_robot(
     known = load_profile(file, catalog)
     robot = Robot(known, {}, lambda: Session(known, {}, catalog.transports, motion="guarded"))
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({known.name: robot}, access=access, linger_s=0.2, certificates=certificates)
+    app = build_app(
+        {known.name: robot},
+        DashboardOptions(access=access, linger_s=0.2, certificates=certificates),
+    )
     serving = serve(app, port=port, on_ready=ready.set_result, certificates=certificates)
     task = asyncio.create_task(serving)
     try:

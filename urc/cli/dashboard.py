@@ -30,13 +30,13 @@ from urc.simulator.emulated_profile import stand_in
 from urc.simulator.emulated_robot import EmulatedRobot
 from urc.web.alarms.notifier import AlarmNotifier
 from urc.web.alarms.notify_options import NotifyOptions
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.clock_check import clock_warning
 
-__all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
+__all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
 """Return the command-line settings of a profile; raise `UrcError` for invalid settings."""
@@ -129,20 +129,16 @@ async def _serve(
         audit = AuditLog(own_folder(place.data) / FILE)
         stack.callback(audit.close)
         place = replace(place, recorder=ServerRecorder(audit.add))
-        robot_options = workshop_of(place, given, faulty)
-        if warning := await asyncio.to_thread(clock_warning, robot_options.data):
-            complain(f"urc: {warning}")
-        if is_interrupted(robot_options.data):
-            complain("urc: 'urc restore' was interrupted; run it again with --replace")
-        access = access_for(robot_options.data, is_open=place.is_open)
-        access.clock_check = partial(clock_warning, robot_options.data)
-        certificates = await certificates_of(
-            place.tls, place.host, place.allowed_hosts, robot_options.data
-        )
+        robot_options = robot_options_of(place, given, faulty)
+        data = robot_options.data
+        await _warn_of(data)
+        access = access_for(data, is_open=place.is_open)
+        access.clock_check = partial(clock_warning, data)
+        certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
         def ready(url: str) -> None:
             addresses = ready_addresses(url, place.host, access, certificates, place.tls)
-            announce(stack, robot_options.data, addresses)
+            announce(stack, data, addresses)
             on_ready(addresses)
 
         factory = RobotFactory(robot_options)
@@ -153,22 +149,17 @@ async def _serve(
         if faulty is not None:
             faulty.begin(faults)
             await stack.enter_async_context(_listening(faulty))
-        remade = {name: partial(factory.robot, name) for name in robots} if is_dev else None
-        app = build_app(
-            robots,
+        remake = {name: partial(factory.robot, name) for name in robots} if is_dev else None
+        options = replace(
+            _options(place),
             access=access,
-            allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
-            data=robot_options.data,
+            data=data,
             audit=audit,
-            tiles=place.tiles,
-            remake=remade,
+            remake=remake,
             robot_options=robot_options,
-            trusted=place.trusted,
-            recordings=place.recordings,
             certificates=certificates,
-            sign_in=place.sign_in,
-            notifier=AlarmNotifier(place.notify) if place.notify is not None else None,
         )
+        app = build_app(robots, options)
         gc.collect()
         gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us
         await serve(
@@ -180,6 +171,26 @@ async def _serve(
             allowed_hosts=place.allowed_hosts,
         )
     return 0
+
+
+def _options(place: DashboardAddress) -> DashboardOptions:
+    """Return the options of the application that the command line determines."""
+    return DashboardOptions(
+        allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
+        tiles=place.tiles,
+        trusted=place.trusted,
+        recordings=place.recordings,
+        sign_in=place.sign_in,
+        notifier=AlarmNotifier(place.notify) if place.notify is not None else None,
+    )
+
+
+async def _warn_of(data: Path) -> None:
+    """Report a wrong clock, and a data folder that is only partly restored."""
+    if warning := await asyncio.to_thread(clock_warning, data):
+        complain(f"urc: {warning}")
+    if is_interrupted(data):
+        complain("urc: 'urc restore' was interrupted; run it again with --replace")
 
 
 async def _robot_at_start(
@@ -218,10 +229,10 @@ async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
         await asyncio.gather(task, return_exceptions=True)
 
 
-def workshop_of(
+def robot_options_of(
     place: DashboardAddress, given: SettingsOf = _nothing, faulty: FaultInjector | None = None
 ) -> RobotOptions:
-    """Return the robot factory of a dashboard. If `faulty` is given, all robots are emulated."""
+    """Return the options of a robot factory; with `faulty`, all robots are emulated."""
     return RobotOptions(
         own_folder(place.data),
         make=partial(_robot, place, faulty),

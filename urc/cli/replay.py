@@ -81,14 +81,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int:
-    from urc.web.app import Robot, build_app, serve
+    from urc.web.app import DashboardOptions, Robot, build_app, serve
 
     profile = player.profile
     robot = Robot(profile, player.settings, player.session, playback=player)
     access = access_for()
     certificates = await certificates_of(tls, host, (), own_folder())
     app = build_app(
-        {profile.name: robot}, access=access, allowed_hosts=tls.hosts(), certificates=certificates
+        {profile.name: robot},
+        DashboardOptions(access=access, allowed_hosts=tls.hosts(), certificates=certificates),
     )
 
     def ready(url: str) -> None:

@@ -44,25 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also serve all installed robots and drivers",
     )
-    parser.add_argument(
-        "--oidc",
-        metavar="FILE",
-        help="file with the OpenID Connect provider whose accounts sign in: see docs/sign-in.md",
-    )
-    parser.add_argument(
-        "--trust-proxy",
-        dest="proxies",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="file with a proxy that signs people in, and names them in a header",
-    )
-    parser.add_argument(
-        "--without-sign-in",
-        dest="is_open",
-        action="store_true",
-        help="let everyone on the network watch and drive; each page shows a red warning",
-    )
+    _add_sign_in(parser)
     parser.add_argument(
         "--no-guard",
         dest="has_guard",
@@ -70,18 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="for debugging: send motion commands without a guard process;"
         " if this process hangs, robots are not stopped",
     )
-    parser.add_argument(
-        "--monitor-alarms",
-        dest="monitors",
-        action="store_true",
-        help="keep all robots with alarms connected, so that alarms are judged with no page open",
-    )
-    parser.add_argument(
-        "--notify-alarms",
-        dest="notify",
-        metavar="FILE",
-        help="file with a command or URL that gets new alarms: see docs/alarms.md",
-    )
+    _add_alarms(parser)
     for flag, text in (
         ("--data-dir", "data folder for latched stops, audit log and settings"),
         (
@@ -165,6 +136,29 @@ def run(arguments: argparse.Namespace) -> int:
     )
 
 
+def _add_sign_in(parser: argparse.ArgumentParser) -> None:
+    """Declare the ways to sign in that need options; `_sign_in` reads them."""
+    parser.add_argument(
+        "--oidc",
+        metavar="FILE",
+        help="file with the OpenID Connect provider whose accounts sign in: see docs/sign-in.md",
+    )
+    parser.add_argument(
+        "--trust-proxy",
+        dest="proxies",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="file with a proxy that signs people in, and names them in a header",
+    )
+    parser.add_argument(
+        "--without-sign-in",
+        dest="is_open",
+        action="store_true",
+        help="let everyone on the network watch and drive; each page shows a red warning",
+    )
+
+
 def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
     """Return the ways to sign in that need options.
 
@@ -177,6 +171,22 @@ def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
 
     oidc = read_oidc_options(arguments.oidc) if arguments.oidc else None
     return SignInOptions(oidc, tuple(read_proxy_options(file) for file in arguments.proxies))
+
+
+def _add_alarms(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of alarms; `_notify` reads the file of the hook."""
+    parser.add_argument(
+        "--monitor-alarms",
+        dest="monitors",
+        action="store_true",
+        help="keep all robots with alarms connected, so that alarms are judged with no page open",
+    )
+    parser.add_argument(
+        "--notify-alarms",
+        dest="notify",
+        metavar="FILE",
+        help="file with a command or URL that gets new alarms: see docs/alarms.md",
+    )
 
 
 def _notify(arguments: argparse.Namespace) -> "NotifyOptions | None":

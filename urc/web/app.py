@@ -5,12 +5,13 @@ Layer 5. `build_app` takes the robots and all options; `serve` runs the applicat
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Collection, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
+from typing import Final
 from urllib.parse import quote
 
 import msgspec
@@ -28,7 +29,6 @@ from urc.runtime.alarm_table import FILE as ALARM_FILE
 from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
-from urc.runtime.latch import LatchStore
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
 from urc.runtime.server_recorder import ServerRecorder
@@ -85,11 +85,11 @@ from urc.web.show.frame_document import FrameDocuments
 from urc.web.show.gallery import Gallery
 from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
-from urc.web.show.pages import PageHead, error_page, robot_page
+from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, error_page, robot_page
 from urc.web.show.trust import TrustPages
 from urc.web.wire import messages as wire
 
-__all__ = ["Robot", "build_app", "serve"]
+__all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
 
 _PAGE = {"cache-control": "no-store"}
 _LATE_S = 2.0
@@ -97,65 +97,67 @@ _LATE_S = 2.0
 _NO_ROBOT = "no robot of that name is served here"
 
 
-def build_app(
-    robots: Mapping[str, Robot],
-    *,
-    access: Access | None = None,
-    allowed_hosts: Iterable[str] = (),
-    linger_s: float = LINGER_S,
-    data: Path | None = None,
-    audit: AuditLog | None = None,
-    tiles: Path | None = None,
-    remake: Mapping[str, Remake] | None = None,
-    robot_options: RobotOptions | None = None,
-    trusted: Iterable[str] = (),
-    recordings: Path | None = None,
-    certificates: Certificates | None = None,
-    sign_in: SignInOptions = SignInOptions(),  # noqa: B008 - immutable
-    notifier: AlarmNotifier | None = None,
-) -> Starlette:
-    """Return the application that serves `robots`.
+@dataclass(frozen=True, slots=True)
+class DashboardOptions:
+    """Options of the application; by default nothing is stored, and nobody has the start key."""
 
-    Args:
-        robots: the robots, by the name in their URL.
-        access: the identities and rights of the server; None to create a key that is never shown.
-        allowed_hosts: further accepted host names, besides addresses, ``localhost`` and the
-            server's own names.
-        linger_s: time for which a robot stays connected after its last client has left, in seconds.
-        data: folder of the latches and the audit log; None to store neither.
-        audit: the audit log of the folder, which is closed at the end; None opens it.
-        tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
-        remake: functions that create a robot from its saved document; None for a server without
-            developer pages.
-        robot_options: options of the robot factory; None for a server without managers and
-            settings.
-        trusted: names of third-party widgets that run in the page instead of a frame.
-        recordings: folder of the recordings; None for a server that records nothing.
-        certificates: certificates of HTTPS, whose authority devices may trust; None for plain HTTP.
-        sign_in: options of the ways to sign in.
-        notifier: receives new alarms of all robots; None sends no notification.
+    access: Access | None = None
+    """Identities and rights of the server; None to create a key that is never shown."""
+    allowed_hosts: Collection[str] = ()
+    """Further accepted host names, besides addresses, ``localhost`` and the server's own names."""
+    linger_s: float = LINGER_S
+    """Time for which a robot stays connected after its last client has left, in seconds."""
+    data: Path | None = None
+    """Folder of the latches and the audit log; None to store neither."""
+    audit: AuditLog | None = None
+    """Audit log of the folder, which the application closes at its end; None opens it."""
+    tiles: Path | None = None
+    """Folder of map tiles, ``z/x/y.png``; None for no tiles."""
+    remake: Mapping[str, Remake] | None = None
+    """Functions that create a robot from its saved document; None for a server without developer
+    pages."""
+    robot_options: RobotOptions | None = None
+    """Options of the robot factory; None for a server without managers and settings."""
+    trusted: Collection[str] = ()
+    """Names of third-party widgets that run in the page instead of a frame."""
+    recordings: Path | None = None
+    """Folder of the recordings; None for a server that records nothing."""
+    certificates: Certificates | None = None
+    """Certificates of HTTPS, whose authority devices may trust; None for plain HTTP."""
+    sign_in: SignInOptions = field(default_factory=SignInOptions)
+    """Options of the ways to sign in."""
+    notifier: AlarmNotifier | None = None
+    """Receiver of new alarms of all robots; None sends no notification."""
+
+
+_DEFAULT: Final = DashboardOptions()
+
+
+def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT) -> Starlette:
+    """Return the application that serves `robots`, by the name in their URL.
 
     Raises:
         UrcError: two robots use different widgets of the same name, or a way to sign in needs an
             extra package.
     """
-    access = access or Access()
+    access, data, notifier = options.access or Access(), options.data, options.notifier
+    audit = options.audit
     if audit is None and data is not None:
         audit = AuditLog(data / AUDIT_FILE)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     alarms = AlarmStore(data / ALARM_FILE) if data is not None else None
-    fleet = fleet_of(robots, Stores(data, audit, alarms, notifier), linger_s)
+    fleet = fleet_of(robots, Stores(data, audit, alarms, notifier), options.linger_s)
     contacts = ContactWatch(lambda: fleet.stations, data)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
         ways=NavigationLinks(
-            has_managers=robot_options is not None,
-            has_dev=remake is not None,
+            has_managers=options.robot_options is not None,
+            has_dev=options.remake is not None,
             has_audit=audit is not None,
         ),
         access=access,
-        recording_calls=RecordingCalls(lambda: fleet.stations, recordings, recorder),
+        recording_calls=RecordingCalls(lambda: fleet.stations, options.recordings, recorder),
         robot_calls=RobotCalls(lambda: fleet.stations, access.followed, contacts.times),
         contacts=contacts,
         alarm_calls=AlarmCalls(lambda: fleet.stations, alarms, recorder, notifier),
@@ -163,26 +165,15 @@ def build_app(
         notifier=notifier,
         audit=audit,
         recorder=recorder,
-        ways_in=WaysIn(access, recorder, sign_in),
+        ways_in=WaysIn(access, recorder, options.sign_in),
         data=data,
-        trust=WidgetTrust.of(trusted),
+        trust=WidgetTrust.of(options.trusted),
     )
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)
     access.on_bad_token = partial(record_bad_token, recorder)
-
-    def renew(name: str, robot: Robot) -> None:
-        routes.renew(name, robot, latch_of(data, robot))
-
-    if robot_options is not None:
-        routes.manager = Manager(RobotFactory(robot_options), fleet, time.monotonic, renew)
-    dev = None
-    if remake is not None:
-        dev = Dev(fleet.stations, remake, renew)
-        routes.dev_start = DevStart(fleet, remake, renew, routes.ways)
-    files = FileRoutes(vendored(), tiles, routes.widget_files)
-    trust = TrustPages(certificates)
-    return _Dashboard(routes, files, frozenset(allowed_hosts), dev, trust)
+    routes.add_managers(options)
+    return _Dashboard(routes, options)
 
 
 def _unread(entry: AuditEntry) -> None:
@@ -192,19 +183,13 @@ def _unread(entry: AuditEntry) -> None:
 class _Dashboard(Starlette):
     """A Starlette application that applies the page policy even to error responses."""
 
-    def __init__(
-        self,
-        routes: "_Routes",
-        files: FileRoutes,
-        allowed_hosts: frozenset[str],
-        dev: Dev | None,
-        trust: TrustPages,
-    ) -> None:
+    def __init__(self, routes: "_Routes", options: DashboardOptions) -> None:
         self._access = access = routes.access
         self._ways_in = routes.ways_in
         self._people = people = routes.people_routes()
-        self._allowed_hosts = allowed_hosts
-        routes.dev = dev
+        self._allowed_hosts = frozenset(options.allowed_hosts)
+        dev = routes.dev
+        files = FileRoutes(vendored(), options.tiles, routes.widget_files)
         gallery = routes.gallery = Gallery(
             routes.modules,
             routes.profiles,
@@ -229,7 +214,7 @@ class _Dashboard(Starlette):
                 *people.routes(),
                 *gallery.routes(),
                 *files.routes(),
-                *trust.routes(),
+                *TrustPages(options.certificates).routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
@@ -282,6 +267,15 @@ class _Routes:
     def stations(self) -> Mapping[str, RobotService]:
         """The stations of the robots, by the name in their URL."""
         return self.fleet.stations
+
+    def add_managers(self, options: DashboardOptions) -> None:
+        """Add the managers and the developer pages that the options ask for."""
+        if options.robot_options is not None:
+            factory = RobotFactory(options.robot_options)
+            self.manager = Manager(factory, self.fleet, time.monotonic, self.renew)
+        if options.remake is not None:
+            self.dev = Dev(self.fleet.stations, options.remake, self.renew)
+            self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
     def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
         """Return the providers of pages with calls of the API."""
@@ -344,8 +338,9 @@ class _Routes:
         """Return the widget files of the robots, followed by the widget files of the gallery."""
         return self.fleet.widgets, self.gallery.assets
 
-    def renew(self, name: str, robot: Robot, latch: LatchStore | None) -> None:
+    def renew(self, name: str, robot: Robot) -> None:
         """Switch to another version of a robot; raise `UrcError` when widgets conflict."""
+        latch = latch_of(self.data, robot)
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
         self.stations[name].controls.recorder.hide(secrets)
@@ -427,25 +422,18 @@ class _Routes:
         interface = chosen(robot.profile, query.get("interface"), kept)
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface of that name."))
-        is_dev = self.dev is not None and visitor_of(request).may(LOCAL)
-        # Another process renders third-party widgets; the call blocks until it is done.
-        html = await asyncio.to_thread(
-            robot_page,
+        visitor = visitor_of(request)
+        is_dev = self.dev is not None and visitor.may(LOCAL)
+        asked = RobotPageRequest(
             request.state.nonce,
-            name,
-            robot.profile,
-            interface,
-            self.modules,
-            is_watching="watch" in query or robot.playback is not None,
-            playback=_playback_url(name) if robot.playback is not None else "",
             tab=query.get("tab", ""),
-            wire=dev_url(name) if is_dev else "",
+            is_watching="watch" in query,
             is_part="part" in query,
-            is_emulated=robot.is_emulated,
-            has_settings=self.ways.has_managers and robot.playback is None,
-            may_act=visitor_of(request).may(DRIVE, name),
-            trust=self.trust,
+            may_act=visitor.may(DRIVE, name),
+            dev_url=dev_url(name) if is_dev else "",
         )
+        shared = ServerParts(self.modules, self.trust, self.ways.has_managers)
+        html = await asyncio.to_thread(robot_page, name, robot, interface, shared, asked)
         return HTMLResponse(html, headers=_PAGE)
 
     async def health(self, _: Request) -> Response:
@@ -516,10 +504,6 @@ class _Routes:
         if service is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
         return name, service
-
-
-def _playback_url(name: str) -> str:
-    return f"/api/v1/robots/{quote(name, safe='')}/recording"
 
 
 async def _told(request: Request, error: Exception) -> Response:

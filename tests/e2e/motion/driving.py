@@ -17,7 +17,7 @@ from urc.model.payload import WriteSpec
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS
 from urc.testing.movers import FakeMotionBackend
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 
 SEND = WriteSpec("text", {})
 LEASE_S = 0.25
@@ -117,10 +117,7 @@ async def driven(
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
         {"puppet": Robot(wire.profile, {}, wire.open)},
-        access=ACCESS,
-        allowed_hosts=[PLAIN_HOST],
-        linger_s=0.2,
-        data=data,
+        DashboardOptions(access=ACCESS, allowed_hosts=[PLAIN_HOST], linger_s=0.2, data=data),
     )
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:

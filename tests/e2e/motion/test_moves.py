@@ -15,7 +15,7 @@ from urc.config.load import load_profile
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.testing.entry import ACCESS
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 
 pytestmark = pytest.mark.anyio
 
@@ -72,7 +72,7 @@ async def served(folder: Path, profile: str = PROFILE) -> AsyncIterator[tuple[li
     known = load_profile(file, catalog)
     robot = Robot(known, {}, lambda: Session(known, {}, catalog.transports, motion="here"))
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({"arm": robot}, access=ACCESS, linger_s=0.2)
+    app = build_app({"arm": robot}, DashboardOptions(access=ACCESS, linger_s=0.2))
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
         async with asyncio.timeout(WAIT_S):

@@ -22,7 +22,7 @@ from urc.runtime.session import Motion, Session
 from urc.simulator.emulated_profile import stand_in
 from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 from urc.testing.entry import ACCESS
-from urc.web.app import Robot, build_app, serve
+from urc.web.app import DashboardOptions, Robot, build_app, serve
 
 __all__ = ["FOLDER", "Overheard", "alive"]
 
@@ -131,7 +131,7 @@ async def alive(
 async def served(robot: Robot) -> AsyncIterator[str]:
     """Serve one robot in this loop; give the address of the menu."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({robot.profile.name: robot}, access=ACCESS, linger_s=0.2)
+    app = build_app({robot.profile.name: robot}, DashboardOptions(access=ACCESS, linger_s=0.2))
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
         async with asyncio.timeout(WAIT_S):

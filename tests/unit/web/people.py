@@ -13,7 +13,7 @@ from urc.access.grants import parse_grant
 from urc.access.passphrases import hash_of
 from urc.access.store import AccessStore
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.serve.access import Access
@@ -34,7 +34,8 @@ class Door:
         self.access = Access(AccessControl(self.store))
         robot = FakeRobot(dashboard_profile())
         self.app = build_app(
-            {"puppet": Robot(robot.profile, {}, robot.open)}, access=self.access, data=folder
+            {"puppet": Robot(robot.profile, {}, robot.open)},
+            DashboardOptions(access=self.access, data=folder),
         )
 
     def add(self, name: str, *grants: str, passphrase: str = "") -> str:

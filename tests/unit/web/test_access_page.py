@@ -14,7 +14,7 @@ from urc.model.payload import WriteSpec
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, BEARER, HERE, KEY, OPEN
 from urc.web.access_page import SAID
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.serve.access import Access
@@ -39,7 +39,7 @@ def at(
     access: Access, cookies: Mapping[str, str] | None = None, host: str = "127.0.0.1"
 ) -> Iterator[TestClient]:
     """Give a browser in front of a dashboard."""
-    app = build_app(robots(), access=access)
+    app = build_app(robots(), DashboardOptions(access=access))
     with TestClient(
         app, base_url=ADDRESS, cookies=dict(cookies or {}), client=(host, 50_000)
     ) as browser:
@@ -227,7 +227,7 @@ def test_each_page_warns_of_missing_protection(
 def test_each_page_shows_a_wrong_clock() -> None:
     access = Access(key=KEY)
     access.clock_check = lambda: "the clock is behind"
-    app = build_app(robots(), access=access)
+    app = build_app(robots(), DashboardOptions(access=access))
     with TestClient(app, base_url=ADDRESS) as browser:
         while "the clock is behind" not in browser.get("/").text:
             pass

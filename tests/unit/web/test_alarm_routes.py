@@ -11,7 +11,7 @@ from urc.runtime.alarm_store import AlarmStore
 from urc.runtime.audit_search import AuditQuery, search
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, BEARER, person
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 
 ADDRESS = "http://127.0.0.1:8080"
@@ -25,7 +25,7 @@ class Served:
         self.folder = folder
         self.robot = FakeRobot(dashboard_profile())
         robot = Robot(self.robot.profile, {}, self.robot.open, is_monitored=True)
-        self.app = build_app({"puppet": robot}, access=ACCESS, data=folder)
+        self.app = build_app({"puppet": robot}, DashboardOptions(access=ACCESS, data=folder))
 
     def client(self) -> TestClient:
         return TestClient(self.app, base_url=ADDRESS, headers=BEARER)
@@ -231,7 +231,7 @@ def test_the_audit_log_names_an_action(api: TestClient, served: Served) -> None:
 def test_a_server_without_a_folder_keeps_alarms_until_its_end() -> None:
     robot = FakeRobot(dashboard_profile())
     monitored = Robot(robot.profile, {}, robot.open, is_monitored=True)
-    app = build_app({"puppet": monitored}, access=ACCESS)
+    app = build_app({"puppet": monitored}, DashboardOptions(access=ACCESS))
     with TestClient(app, base_url=ADDRESS, headers=BEARER) as client:
         assert client.get(f"{BASE}/history").json()["events"] == []
         assert act(client, "unshelve", signals=["battery"]) == {"signals": [], "stored": False}
@@ -246,7 +246,7 @@ def test_emulated_robots_share_no_alarms_with_real_ones(tmp_path: Path) -> None:
         client.get(f"{BASE}/history")
     robot = FakeRobot(dashboard_profile())
     emulated = Robot(robot.profile, {}, robot.open, is_emulated=True)
-    app = build_app({"puppet": emulated}, access=ACCESS, data=tmp_path)
+    app = build_app({"puppet": emulated}, DashboardOptions(access=ACCESS, data=tmp_path))
     with TestClient(app, base_url=ADDRESS, headers=BEARER) as client:
         assert listed(client)["alarms"] == []
         assert client.get(f"{BASE}/history").json()["events"] == []

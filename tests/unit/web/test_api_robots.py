@@ -14,7 +14,7 @@ from urc.testing.entry import ACCESS, BEARER, person
 from urc.testing.profile import text
 from urc.web.api.limits import AT_ONCE, MOST_VISITORS, REQUESTS_PER_S, RequestLimits
 from urc.web.api.readings import plain, value_of
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 from urc.web.serve.replies import ApiError
 
@@ -59,7 +59,8 @@ def robot() -> FakeRobot:
 @pytest.fixture
 def api(robot: FakeRobot, tmp_path: Path) -> Iterator[TestClient]:
     app = build_app(
-        {"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS, recordings=tmp_path
+        {"puppet": Robot(robot.profile, {}, robot.open)},
+        DashboardOptions(access=ACCESS, recordings=tmp_path),
     )
     with TestClient(app, base_url=ADDRESS, headers=BEARER) as client:
         yield client
@@ -135,7 +136,8 @@ def test_recordings_of_other_robots_need_the_right_for_all(
     seen = []
     for number, grant in enumerate(("maintain@puppet", "maintain", "maintain@gone")):
         app = build_app(
-            {"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS, recordings=tmp_path
+            {"puppet": Robot(robot.profile, {}, robot.open)},
+            DashboardOptions(access=ACCESS, recordings=tmp_path),
         )
         cookies = person(f"recordings {number}", grant)
         with TestClient(app, base_url=ADDRESS, cookies=cookies) as client:
@@ -147,7 +149,9 @@ def test_recordings_of_other_robots_need_the_right_for_all(
 
 
 def test_a_server_without_a_folder_records_nothing(robot: FakeRobot) -> None:
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=ACCESS)
+    )
     with TestClient(app, base_url=ADDRESS, headers=BEARER) as client:
         answer = client.post("/api/v1/robots/puppet/recordings/start")
         assert (answer.status_code, answer.json()["code"]) == (409, "no-folder")

@@ -15,7 +15,7 @@ from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_search import AuditQuery, search
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, BEARER, HERE, KEY, person
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 
 ADDRESS = "http://localhost:8080"
@@ -28,7 +28,9 @@ def robot() -> Robot:
 
 def dashboard(data: Path | None) -> TestClient:
     robots = {"puppet": robot(), "rover": robot()}
-    return TestClient(build_app(robots, access=ACCESS, data=data), base_url=ADDRESS)
+    return TestClient(
+        build_app(robots, DashboardOptions(access=ACCESS, data=data)), base_url=ADDRESS
+    )
 
 
 @pytest.fixture(scope="module")
@@ -246,7 +248,9 @@ def test_foreign_host_learns_nothing(client: TestClient) -> None:
 def moving_dashboard(data: Path) -> TestClient:
     """Return a dashboard with a robot that STOP can stop."""
     made = FakeRobot(dashboard_profile()._replace(driver=DRIVER))
-    app = build_app({"rover": Robot(made.profile, {}, made.open)}, access=ACCESS, data=data)
+    app = build_app(
+        {"rover": Robot(made.profile, {}, made.open)}, DashboardOptions(access=ACCESS, data=data)
+    )
     return TestClient(app, base_url=ADDRESS, headers={"origin": ADDRESS})
 
 

@@ -10,7 +10,7 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Glimpse, Robot
 from urc.web.show.card import VALUES, small_values
@@ -30,7 +30,8 @@ def client_of(robot: FakeRobot, glimpse: Glimpse | str = "real") -> TestClient:
     """Return a client of a dashboard; "real": the robot is not emulated."""
     look = None if isinstance(glimpse, str) else lambda: glimpse
     app = build_app(
-        {"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)}, access=ACCESS, linger_s=0.01
+        {"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)},
+        DashboardOptions(access=ACCESS, linger_s=0.01),
     )
     client = TestClient(app, base_url="http://localhost:8080", cookies=HERE)
     client.app_state["flow"] = SocketFlow()

@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 from urc.model.profile import Profile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import HERE, OPEN
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.dev.routes import HOW_TO_TURN_ON
 from urc.web.fleet.robots import Robot
 
@@ -23,7 +23,10 @@ def client(*, is_dev: bool, has_key: bool = True) -> TestClient:
     def remake(profile: Profile) -> Robot:
         return Robot(profile, {}, robot.open)
 
-    app = build_app({"puppet": served}, access=OPEN, remake={"puppet": remake} if is_dev else None)
+    app = build_app(
+        {"puppet": served},
+        DashboardOptions(access=OPEN, remake={"puppet": remake} if is_dev else None),
+    )
     cookies = HERE if has_key else None
     return TestClient(app, base_url="http://localhost:8080", cookies=cookies)
 

@@ -15,7 +15,7 @@ from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 from urc.web.load.files import linked_options
 
@@ -39,7 +39,10 @@ def robot_in(folder: Path, options: str, *, name: str = "robot") -> WidgetUse | 
 
 def client_of(use: WidgetUse, tiles: Path | None = None) -> TestClient:
     robot = FakeRobot(dashboard_profile(uses=[use]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS, tiles=tiles)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)},
+        DashboardOptions(access=ACCESS, tiles=tiles),
+    )
     return TestClient(app, base_url="http://localhost:8080", cookies=HERE)
 
 

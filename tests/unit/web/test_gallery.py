@@ -14,7 +14,7 @@ from urc.problems import UrcError
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import Robot, build_app
+from urc.web.app import DashboardOptions, Robot, build_app
 from urc.web.load.assets import MOST_FILES, widget_assets
 from urc.web.show.demos import WidgetState, colour_bars, demo_states
 
@@ -132,7 +132,9 @@ def test_a_widget_with_too_many_files_is_refused(tmp_path: Path) -> None:
 def client() -> TestClient:
     """Return a client of a dashboard; its robot has no part in the gallery."""
     robot = FakeRobot(dashboard_profile())
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=ACCESS)
+    )
     return TestClient(app, base_url="http://localhost", cookies=HERE)
 
 
@@ -196,7 +198,9 @@ def test_a_page_for_developers_sees_every_file_that_is_saved(tmp_path: Path) -> 
     widget = made(folder)._replace(name="battery")
     robot = FakeRobot(dashboard_profile(widgets=[widget]))
     served = Robot(robot.profile, {}, robot.open)
-    app = build_app({"puppet": served}, access=ACCESS, remake={"puppet": lambda _: served})
+    app = build_app(
+        {"puppet": served}, DashboardOptions(access=ACCESS, remake={"puppet": lambda _: served})
+    )
     browser = TestClient(app, base_url="http://localhost", cookies=HERE)
     seen = [browser.get("/widgets/battery/stamp").text for _ in range(2)]
     (folder / "widget.js").write_text("// new", "utf-8")
@@ -215,7 +219,9 @@ def test_a_widget_of_a_robot_stands_before_the_shipped_one(tmp_path: Path) -> No
     (folder / "demo.yaml").write_text("states: { normal: { values: {} } }", "utf-8")
     own = Widget("battery", "Mine", folder, {"level": WidgetPort("level")})
     robot = FakeRobot(dashboard_profile(widgets=[own]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=ACCESS)
+    )
     page = TestClient(app, base_url="http://localhost", cookies=HERE).get("/widgets/battery/").text
     assert "&lt;p&gt;mine&lt;/p&gt;" in page  # for its frame
 
@@ -247,7 +253,7 @@ def lamp_beside_a_robot(folder: Path, *, is_dev: bool = True) -> TestClient:
     robot = FakeRobot(profile)
     served = Robot(robot.profile, {}, robot.open)
     remake = {"puppet": lambda _: served} if is_dev else None
-    app = build_app({"puppet": served}, access=ACCESS, remake=remake)
+    app = build_app({"puppet": served}, DashboardOptions(access=ACCESS, remake=remake))
     return TestClient(app, base_url="http://localhost", cookies=HERE)
 
 

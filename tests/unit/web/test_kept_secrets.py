@@ -18,7 +18,7 @@ from urc.packages.store import Store
 from urc.runtime.settings_store import SettingsStore, StoredSettings
 from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
 
@@ -62,7 +62,7 @@ def served(
         shows_installed=True,
     )
     with TestClient(
-        build_app({}, access=ACCESS, data=data, robot_options=robot_options),
+        build_app({}, DashboardOptions(access=ACCESS, data=data, robot_options=robot_options)),
         base_url=ADDRESS,
         headers={"origin": ADDRESS},
         cookies=HERE,

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 from tests.unit.web.test_manage_routes import robot_options
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robots import Robot
 
 
@@ -22,7 +22,8 @@ def page_of(tmp_path: Path | None = None, hint: str = "") -> str:
     robot = FakeRobot(profile)
     options = robot_options(tmp_path) if tmp_path is not None else None
     app = build_app(
-        {"puppet": Robot(profile, {}, robot.open)}, access=ACCESS, robot_options=options
+        {"puppet": Robot(profile, {}, robot.open)},
+        DashboardOptions(access=ACCESS, robot_options=options),
     )
     with TestClient(app, base_url="http://localhost:8080", cookies=HERE) as client:
         return client.get("/robots/puppet/").text

@@ -16,7 +16,7 @@ from urc.packages.store import Store
 from urc.runtime.settings_store import SettingsStore, StoredSettings
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import HERE, OPEN, person
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
 from urc.web.manage.catalogue import PackageCatalog
@@ -48,7 +48,9 @@ def served(
 ) -> Iterator[TestClient]:
     """Give a browser, with a key or without, at a dashboard with its managers."""
     robots = {one.name: Robot(one, {}, FakeRobot(one).open) for one in profiles}
-    app = build_app(robots, access=OPEN, data=data, robot_options=robot_options(data, **more))
+    app = build_app(
+        robots, DashboardOptions(access=OPEN, data=data, robot_options=robot_options(data, **more))
+    )
     with TestClient(
         app,
         base_url=ADDRESS,

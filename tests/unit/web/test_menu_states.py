@@ -18,7 +18,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE, person
 from urc.web.api.overview import battery_signal, in_order
 from urc.web.api.wire import ActiveAlarms, RobotSummary
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.contact_watch import ContactWatch
 from urc.web.fleet.robots import Robot, RobotService
@@ -38,7 +38,7 @@ def client(robots: dict[str, FakeRobot], tmp_path: Path) -> Iterator[TestClient]
         name: Robot(one.profile, {}, one.open, is_emulated=name == "rover")
         for name, one in robots.items()
     }
-    app = build_app(served, access=ACCESS, data=tmp_path, linger_s=0.01)
+    app = build_app(served, DashboardOptions(access=ACCESS, data=tmp_path, linger_s=0.01))
     with TestClient(app, base_url="http://localhost:8080", cookies=HERE) as started:
         started.app_state["flow"] = SocketFlow()
         yield started
@@ -136,7 +136,7 @@ def test_the_file_is_written_when_the_server_ends(
 ) -> None:
     served = {"arm": Robot(robots["arm"].profile, {}, robots["arm"].open)}
     with TestClient(
-        build_app(served, access=ACCESS, data=tmp_path, linger_s=5.0),
+        build_app(served, DashboardOptions(access=ACCESS, data=tmp_path, linger_s=5.0)),
         base_url="http://localhost:8080",
         cookies=HERE,
     ) as started:
@@ -155,7 +155,7 @@ def test_each_state_is_only_for_those_who_may_watch_the_robot(
     robots: dict[str, FakeRobot], tmp_path: Path
 ) -> None:
     served = {name: Robot(one.profile, {}, one.open) for name, one in robots.items()}
-    app = build_app(served, access=ACCESS, data=tmp_path)
+    app = build_app(served, DashboardOptions(access=ACCESS, data=tmp_path))
     ann = person("Ann who watches the arm", "watch@arm")
     client = TestClient(app, base_url="http://localhost:8080", cookies=ann)
     assert [*states(client)] == ["arm"]

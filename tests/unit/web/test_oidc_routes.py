@@ -12,7 +12,7 @@ from urc.access.control import AccessControl
 from urc.access.oidc_options import OidcOptions
 from urc.access.store import AccessStore
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.people.oidc_routes import CALLBACK
@@ -39,8 +39,9 @@ class House:
         robot = FakeRobot(dashboard_profile())
         app = build_app(
             {"puppet": Robot(robot.profile, {}, robot.open)},
-            access=self.access,
-            sign_in=SignInOptions(oidc=options or self.options),
+            DashboardOptions(
+                access=self.access, sign_in=SignInOptions(oidc=options or self.options)
+            ),
         )
         browser = TestClient(app, base_url=ADDRESS, follow_redirects=False)
         browser.app_state["flow"] = SocketFlow()
@@ -160,7 +161,9 @@ def test_an_unreachable_provider_is_told(house: House) -> None:
 
 def test_without_a_provider_both_routes_refuse(house: House) -> None:
     robot = FakeRobot(dashboard_profile())
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=house.access)
+    app = build_app(
+        {"puppet": Robot(robot.profile, {}, robot.open)}, DashboardOptions(access=house.access)
+    )
     with TestClient(app, base_url=ADDRESS) as browser:
         assert browser.post(BEGIN, headers={"origin": ADDRESS}).status_code == 404
         back = browser.get(CALLBACK, params={"state": "x"})

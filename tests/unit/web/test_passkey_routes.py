@@ -15,7 +15,7 @@ from urc.access.grants import Grant, parse_grant
 from urc.access.store import AccessStore
 from urc.runtime.audit_search import AuditQuery, search
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.serve.access import Access
@@ -55,7 +55,8 @@ class House:
     ) -> Iterator[TestClient]:
         robot = FakeRobot(dashboard_profile())
         app = build_app(
-            {"puppet": Robot(robot.profile, {}, robot.open)}, access=self.access, data=self.folder
+            {"puppet": Robot(robot.profile, {}, robot.open)},
+            DashboardOptions(access=self.access, data=self.folder),
         )
         with TestClient(
             app, base_url=url, cookies=dict(cookies), client=(host, 50_000),

@@ -11,7 +11,7 @@ from urc.access.grants import Grant
 from urc.access.proxies import TrustedProxy
 from urc.access.store import AccessStore
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.app import build_app
+from urc.web.app import DashboardOptions, build_app
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.people.ways_in import SignInOptions
@@ -44,8 +44,7 @@ class House:
         )
         app = build_app(
             {"puppet": Robot(robot.profile, {}, robot.open)},
-            access=self.access,
-            sign_in=SignInOptions(proxies=(proxy,)),
+            DashboardOptions(access=self.access, sign_in=SignInOptions(proxies=(proxy,))),
         )
         browser = TestClient(app, base_url=ADDRESS)
         browser.app_state["flow"] = SocketFlow()

@@ -21,6 +21,7 @@ from urc.model.widget import Footprint
 from urc.runtime.one_shot_commands import can_move
 from urc.shipped import shipped
 from urc.web import words
+from urc.web.fleet.robots import Robot
 from urc.web.load.widget_trust import WidgetTrust
 from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.interfaces import (
@@ -44,6 +45,8 @@ __all__ = [
     "ErrorPage",
     "PageHead",
     "RobotPage",
+    "RobotPageRequest",
+    "ServerParts",
     "error_page",
     "render",
     "robot_page",
@@ -120,54 +123,69 @@ class ErrorPage:
     message: str
 
 
+@dataclass(frozen=True, slots=True)
+class ServerParts:
+    """The parts that the pages of all robots of a server share."""
+
+    modules: Mapping[str, object]
+    """The import map."""
+    trust: WidgetTrust = field(default_factory=WidgetTrust)
+    """Rule that distinguishes third-party widgets from trusted widgets."""
+    has_settings: bool = False
+    """Whether the server has pages for the settings of robots."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPageRequest:
+    """The request of one visitor for the page of a robot."""
+
+    nonce: str
+    """Nonce of the response."""
+    tab: str = ""
+    """Name of the open page; "" or an unknown name selects the first page."""
+    is_watching: bool = False
+    """Whether the page may only watch."""
+    is_part: bool = False
+    """Whether an open page requests this page to replace its interface."""
+    may_act: bool = True
+    """Whether the visitor has the role ``drive`` at the robot."""
+    dev_url: str = ""
+    """Path of the developer page; "" if the visitor may not use it."""
+
+
 def robot_page(
-    nonce: str,
     name: str,
-    profile: Profile,
+    robot: Robot,
     interface: Interface,
-    modules: Mapping[str, object],
-    *,
-    is_watching: bool = False,
-    tab: str = "",
-    wire: str = "",
-    playback: str = "",
-    is_part: bool = False,
-    is_emulated: bool = False,
-    has_settings: bool = False,
-    may_act: bool = True,
-    trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
+    server: ServerParts,
+    request: RobotPageRequest,
 ) -> str:
     """Return the page of one interface of a robot.
 
+    Another process renders third-party widgets; the call blocks until it has ended.
+
     Args:
-        nonce: nonce of this response.
         name: name of the robot in URLs.
-        profile: profile of the robot.
+        robot: the robot, or a recording that plays in its place.
         interface: the interface to show.
-        modules: the import map.
-        is_watching: whether the page may only watch.
-        tab: name of the open page; "" or an unknown name selects the first page.
-        wire: path of the developer page; "" if the visitor may not use it.
-        playback: path of the playback's state; "" without a playback.
-        is_part: whether an open page requests this page to replace its interface.
-        is_emulated: whether the robot is emulated, which the page shows next to the title.
-        has_settings: whether the server has a page for the settings of the robot.
-        may_act: whether the visitor has the role ``drive`` at the robot.
-        trust: rule that distinguishes third-party widgets from trusted widgets.
+        server: the parts that all pages share.
+        request: the request of the visitor.
     """
+    profile, is_recorded = robot.profile, robot.playback is not None
+    is_watching = request.is_watching or is_recorded
     uses = _uses(profile, interface)
     slots = tuple(uses)
-    styles = _styles(profile, interface, uses, trust)
     place = quote(name, safe="")
-    url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
-    tabs = page_tabs(interface, tab)
+    url, api = f"/robots/{place}/", f"/api/v1/robots/{place}"
+    watch = "&watch" if is_watching else ""
+    tabs = page_tabs(interface, request.tab)
     transports = profile.driver.transports
     page = RobotPage(
         head=PageHead(
-            nonce=nonce,
+            nonce=request.nonce,
             title=profile.title,
-            import_map=with_words(modules),
-            widget_styles=styles,
+            import_map=with_words(server.modules),
+            widget_styles=_styles(profile, interface, uses, server.trust),
             grid_css=grid_css(interface, slots, _footprints(profile, uses)),
         ),
         title=profile.title,
@@ -177,17 +195,17 @@ def robot_page(
         tabs=tabs,
         number=next((each.number for each in tabs if each.is_current), 0),
         is_turned=is_turned(interface, slots),
-        is_part=is_part,
-        debug=debug_part(profile, wire) if interface is DEBUGGING else None,
-        cells=_cells(profile, interface, uses, trust),
-        stop_url=f"/api/v1/robots/{place}/stop",
-        alarms_url=f"/api/v1/robots/{place}/alarms",
-        may_act=may_act and not is_watching,
+        is_part=request.is_part,
+        debug=debug_part(profile, request.dev_url) if interface is DEBUGGING else None,
+        cells=_cells(profile, interface, uses, server.trust),
+        stop_url=f"{api}/stop",
+        alarms_url=f"{api}/alarms",
+        may_act=request.may_act and not is_watching,
         lines=json.dumps(motion_lines(profile.driver)),
-        can_move=can_move(profile.driver) and not playback,
-        playback=playback,
-        is_emulated=is_emulated,
-        settings_url=f"{url}settings" if has_settings else "",
+        can_move=can_move(profile.driver) and not is_recorded,
+        playback=f"{api}/recording" if is_recorded else "",
+        is_emulated=robot.is_emulated,
+        settings_url=f"{url}settings" if server.has_settings and not is_recorded else "",
         hints=json.dumps({name: one.hint for name, one in transports.items() if one.hint}),
         on_demand=json.dumps([one for one in transports if opens_on_demand(one, profile.driver)]),
     )
