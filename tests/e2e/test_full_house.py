@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from tests.e2e.dashboards import WAIT_S
 from tests.e2e.keys import headers_for
 from tests.e2e.processes import UrcProcess
-from urc.web.fleet.robots import SEATS
+from urc.web.fleet.robots import CLIENTS_OF_UNKNOWN
 
 pytestmark = pytest.mark.anyio
 
@@ -105,10 +105,10 @@ async def test_screens_of_one_stranger_leave_seats_to_others(address: str) -> No
     """The next is told so; STOP, and the holder of the key who comes from there too, get in."""
     url = address.replace("http", "ws") + "ws?robot=tello"
     origin = address.rstrip("/")
-    lines = [await connect(url, origin=origin) for _ in range(SEATS + 3)]  # type: ignore[arg-type]
+    lines = [await connect(url, origin=origin) for _ in range(CLIENTS_OF_UNKNOWN + 3)]  # type: ignore[arg-type]
     try:
         said = [str(await line.recv()) for line in lines]
-        assert ['"hello"' in text for text in said] == [True] * SEATS + [False] * 3
+        assert ['"hello"' in text for text in said] == [True] * CLIENTS_OF_UNKNOWN + [False] * 3
         assert "too many screens of yours watch this robot" in said[-1]
         assert (await asked(address, STOP, "POST"))[0] == 200
         key = headers_for(address)

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import httpx2
 
 from urc.access.grants import AccessError, Grant, parse_grant
-from urc.access.options_file import OptionsFile, is_loopback_url
+from urc.access.options_file import OptionsFile, is_loopback_host
 
 __all__ = [
     "ANY",
@@ -151,7 +151,7 @@ def _check_url(options: OptionsFile, key: str, text: str, *, is_origin: bool = F
         url = httpx2.URL(text)
     except httpx2.InvalidURL:
         url = httpx2.URL("")
-    is_private = url.scheme == "https" or (url.scheme == "http" and is_loopback_url(url.host))
+    is_private = url.scheme == "https" or (url.scheme == "http" and is_loopback_host(url.host))
     if not is_private or not url.host or url.userinfo or url.query or url.fragment:
         raise options.fault((key,), f"expected an address with https://, found {text!r}")
     if is_origin and url.path not in ("", "/"):

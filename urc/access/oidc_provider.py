@@ -17,7 +17,7 @@ import httpx2
 
 from urc.access.grants import AccessError
 from urc.access.oidc_options import OidcOptions
-from urc.access.options_file import is_loopback_url
+from urc.access.options_file import is_loopback_host
 
 __all__ = ["KEPT_S", "MOST_BYTES", "OidcProvider", "ProviderMetadata", "TOTAL_S"]
 
@@ -247,7 +247,7 @@ def _address(found: Mapping[str, Any], key: str, *, is_private: bool) -> str:
         url = httpx2.URL(text if isinstance(text, str) else "")
     except httpx2.InvalidURL:
         url = httpx2.URL("")
-    is_plain = url.scheme == "http" and is_private and is_loopback_url(url.host)
+    is_plain = url.scheme == "http" and is_private and is_loopback_host(url.host)
     if (url.scheme != "https" and not is_plain) or not url.host or url.fragment:
         raise AccessError(f"the provider's description has no valid {key}")
     return str(url)

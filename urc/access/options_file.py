@@ -14,7 +14,7 @@ from urc.problems import ProblemsError
 from urc.source import Document, DocumentLimits, read_document
 from urc.source import Path as DocumentPath
 
-__all__ = ["OptionsFile", "is_loopback_url"]
+__all__ = ["OptionsFile", "is_loopback_host"]
 
 _LIMITS: Final = DocumentLimits(size_bytes=65536)
 _LONGEST: Final = 2000
@@ -121,6 +121,6 @@ class OptionsFile:
         return secret
 
 
-def is_loopback_url(host: str) -> bool:
+def is_loopback_host(host: str) -> bool:
     """Return whether a host of a URL is this machine, where plain HTTP is private."""
     return host in ("127.0.0.1", "localhost", "::1", "[::1]")

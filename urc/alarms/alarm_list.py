@@ -125,7 +125,7 @@ class AlarmList:
                 text = text_of_value(value)
                 changed = record._replace(condition=condition, priority=priority, value=text)
                 if is_easing(record.condition, condition):
-                    self._tell(self._put(self._judged(changed)), "changed", now)
+                    self._record(self._put(self._judged(changed)), "changed", now)
                 else:
                     self._raise(changed, now)
             return
@@ -153,7 +153,7 @@ class AlarmList:
                 raised=self._raised, is_acknowledged=False, acknowledged_at=0.0, acknowledged_by=""
             )
         )
-        self._tell(self._put(record), "raised", now)
+        self._record(self._put(record), "raised", now)
 
     def _deactivate(self, record: AlarmRecord, value: Reading, now: float) -> None:
         times = self._activations.get(record.signal, deque[float]())
@@ -170,7 +170,7 @@ class AlarmList:
             returned_at=now,
             is_acknowledged=record.is_acknowledged or is_unseen,
         )
-        self._tell(self._put(returned), "returned", now)
+        self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
         """Mark values as unknown, because their link is lost or they are stale; alarms stay."""
@@ -178,7 +178,7 @@ class AlarmList:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
                 self._settling.pop(signal, None)
-                self._tell(self._put(record._replace(is_known=False)), "unknown", now)
+                self._record(self._put(record._replace(is_known=False)), "unknown", now)
 
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
         """Take the pairs of signal and condition that are suppressed by design now.
@@ -195,9 +195,9 @@ class AlarmList:
     def _suppress(self, record: AlarmRecord, now: float) -> None:
         judged = self._judged(record)
         if judged.is_suppressed and not record.is_suppressed:
-            self._tell(self._put(judged), "suppressed", now)
+            self._record(self._put(judged), "suppressed", now)
         elif record.is_suppressed and record.is_active and not judged.is_suppressed:
-            self._tell(self._put(judged), "unsuppressed", now)
+            self._record(self._put(judged), "unsuppressed", now)
             self._raise(judged, now)
 
     def adopt(self, limits: Mapping[str, AlarmLimits], now: float) -> None:
@@ -207,7 +207,7 @@ class AlarmList:
         for record in [*self.records.values()]:
             if not self._is_declared(record):
                 gone = record._replace(is_active=False, is_acknowledged=True, shelved_until=0.0)
-                self._tell(self._put(gone), "removed", now)
+                self._record(self._put(gone), "removed", now)
 
     def _is_declared(self, record: AlarmRecord) -> bool:
         limits = self._limits.get(record.signal)
@@ -241,7 +241,7 @@ class AlarmList:
                     is_acknowledged=True, acknowledged_at=now, acknowledged_by=actor.name
                 )
             )
-            self._tell(record, "acknowledged", now, actor)
+            self._record(record, "acknowledged", now, actor)
             done.append(record)
         return done
 
@@ -266,7 +266,7 @@ class AlarmList:
                     is_acknowledged=record.is_acknowledged or not record.is_active,
                 )
             )
-            self._tell(record, "shelved", now, actor)
+            self._record(record, "shelved", now, actor)
             done.append(record)
         return done
 
@@ -280,7 +280,7 @@ class AlarmList:
 
     def _unshelve(self, record: AlarmRecord, actor: AlarmActor | None, now: float) -> None:
         record = self._judged(record._replace(shelved_until=0.0, shelved_by=""))
-        self._tell(self._put(record), "unshelved", now, actor)
+        self._record(self._put(record), "unshelved", now, actor)
         if record.is_active:
             self._raise(record, now)
 
@@ -328,7 +328,7 @@ class AlarmList:
         self.revision += 1
         self.changed[signal] = self.revision
 
-    def _tell(
+    def _record(
         self,
         record: AlarmRecord,
         kind: AlarmEventKind,

@@ -156,8 +156,8 @@ class RemoteRobot(HubReadings):
         self._next_line: int | None = None
         """Number of the next line of the log; None before the first line."""
         self._images: Counter[str] = Counter()
-        socket.take = self._take
-        socket.lost = self._lost
+        socket.on_message = self._handle
+        socket.on_lost = self._lost
 
     # -- the interface
 
@@ -286,7 +286,7 @@ class RemoteRobot(HubReadings):
 
     # -- messages
 
-    def _take(self, data: str | bytes) -> None:
+    def _handle(self, data: str | bytes) -> None:
         if isinstance(data, bytes):
             self._show_picture(data)
             return
@@ -306,7 +306,7 @@ class RemoteRobot(HubReadings):
             case LogMessage():
                 self._add_lines(message, now)
             case AlarmsMessage():
-                self.alarms.take(message)
+                self.alarms.update(message)
             case ProgressMessage():
                 for progress in progress_of(message):
                     self.hub.set_progress(progress)

@@ -70,8 +70,8 @@ class RemoteAlarms:
         """
         return await self._act("unshelve", {"signals": signals})
 
-    def take(self, message: AlarmsMessage) -> None:
-        """Take the changes of a message."""
+    def update(self, message: AlarmsMessage) -> None:
+        """Apply the changes of a message."""
         if message.full:
             self.rows.clear()
         for signal in message.gone:

@@ -66,9 +66,9 @@ class RobotSocket:
             timeout_s: longest duration of one attempt to connect, in seconds.
         """
         self.address = address
-        self.take: Callable[[str | bytes], None] = _unheard
+        self.on_message: Callable[[str | bytes], None] = _ignore
         """Callback for each message, in order."""
-        self.lost: Callable[[str], None] = _unheard
+        self.on_lost: Callable[[str], None] = _ignore
         """Callback for the loss of the connection, with the reason."""
         self.is_up = False
         """Whether the server has sent its first message on this connection; set by the owner."""
@@ -131,7 +131,7 @@ class RobotSocket:
             self.is_up = False
             self._outbox.clear()
             self._ticks.clear()
-            self.lost(str(fault))
+            self.on_lost(str(fault))
             if isinstance(fault, AccessDenied) or fault.is_final or not was_up:
                 raise fault
             await asyncio.sleep(wait_s * random.uniform(*_JITTER))  # noqa: S311 - no secret
@@ -146,7 +146,7 @@ class RobotSocket:
                 try:
                     with suppress(ConnectionClosed):
                         async for message in line:
-                            self.take(message)
+                            self.on_message(message)
                 finally:
                     writing.cancel()
                     self._line = None
@@ -219,5 +219,5 @@ class RobotSocket:
             self._line.transport.abort()
 
 
-def _unheard(_: object) -> None:
+def _ignore(_: object) -> None:
     """Ignore an event before the owner has set its callback."""

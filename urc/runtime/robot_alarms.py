@@ -167,7 +167,7 @@ class RobotAlarms:
     def start(self) -> None:
         """Begin with changes by the passage of time; call it on the event loop."""
         if self._timer is None and (self._limits or self.list.records):
-            self._timer = PeriodicTimer(self._clock, LOOK_S, self._look)
+            self._timer = PeriodicTimer(self._clock, LOOK_S, self._check)
 
     def stop(self) -> None:
         """End the changes by the passage of time."""
@@ -191,7 +191,7 @@ class RobotAlarms:
         self._lost_s = {}
         self._suppress()
         try:
-            with hub.passed_to(self._take):
+            with hub.passed_to(self._judge_all):
                 yield
         finally:
             self._hub = None
@@ -199,10 +199,10 @@ class RobotAlarms:
             self._forget(self._limits)
             self._finish()
 
-    def _take(self, samples: Sequence[Sample]) -> None:
+    def _judge_all(self, samples: Sequence[Sample]) -> None:
         """Judge the samples whose alarm has changed; first, evaluate the suppression."""
         if self._inputs:
-            self._take_inputs(samples)
+            self._update_inputs(samples)
         seen = self._seen
         for sample in samples:
             before = seen.get(sample[0])
@@ -212,7 +212,7 @@ class RobotAlarms:
                 continue
             self._judge(sample)
 
-    def _take_inputs(self, samples: Sequence[Sample]) -> None:
+    def _update_inputs(self, samples: Sequence[Sample]) -> None:
         has_changed = False
         for name, value, _, _ in samples:
             if name in self._inputs and self._inputs[name] != value:
@@ -276,7 +276,7 @@ class RobotAlarms:
         states = [links[one].state for one in self._sources.get(name, ()) if one in links]
         return bool(states) and not any(state in _CONNECTED for state in states)
 
-    def _look(self) -> float:
+    def _check(self) -> float:
         """Handle old values, and all that is due by now."""
         if self._hub is not None:
             old = [

@@ -147,7 +147,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     recorder = ServerRecorder(audit.add if audit else _unread, secrets=[access.key])
     alarms = AlarmStore(data / ALARM_FILE) if data is not None else None
     fleet = fleet_of(robots, Stores(data, audit, alarms, notifier), options.linger_s)
-    contacts = ContactWatch(lambda: fleet.stations, data)
+    contacts = ContactWatch(lambda: fleet.services, data)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
@@ -157,10 +157,10 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
             has_audit=audit is not None,
         ),
         access=access,
-        recording_calls=RecordingCalls(lambda: fleet.stations, options.recordings, recorder),
-        robot_calls=RobotCalls(lambda: fleet.stations, access.followed, contacts.times),
+        recording_calls=RecordingCalls(lambda: fleet.services, options.recordings, recorder),
+        robot_calls=RobotCalls(lambda: fleet.services, access.followed, contacts.times),
         contacts=contacts,
-        alarm_calls=AlarmCalls(lambda: fleet.stations, alarms, recorder, notifier),
+        alarm_calls=AlarmCalls(lambda: fleet.services, alarms, recorder, notifier),
         alarms=alarms,
         notifier=notifier,
         audit=audit,
@@ -206,7 +206,7 @@ class _Dashboard(Starlette):
             routes=[
                 ProtectedRoute("/", routes.menu, SIGNED_IN),
                 ProtectedRoute("/robots/{name}/", routes.robot, WATCH),
-                *Cards(lambda: routes.stations).routes(),
+                *Cards(lambda: routes.services).routes(),
                 ProtectedRoute(DOCUMENT, document, SIGNED_IN),
                 *api_routes(endpoints),
                 *(route for one in parts for route in one.routes()),
@@ -264,9 +264,9 @@ class _Routes:
         return self.fleet.robots
 
     @property
-    def stations(self) -> Mapping[str, RobotService]:
-        """The stations of the robots, by the name in their URL."""
-        return self.fleet.stations
+    def services(self) -> Mapping[str, RobotService]:
+        """The services of the robots, by the name in their URL."""
+        return self.fleet.services
 
     def add_managers(self, options: DashboardOptions) -> None:
         """Add the managers and the developer pages that the options ask for."""
@@ -274,13 +274,13 @@ class _Routes:
             factory = RobotFactory(options.robot_options)
             self.manager = Manager(factory, self.fleet, time.monotonic, self.renew)
         if options.remake is not None:
-            self.dev = Dev(self.fleet.stations, options.remake, self.renew)
+            self.dev = Dev(self.fleet.services, options.remake, self.renew)
             self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
     def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
         """Return the providers of pages with calls of the API."""
         found: list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart] = [
-            AuditRoutes(self.audit, self.recorder, lambda: self.stations, self.ways)
+            AuditRoutes(self.audit, self.recorder, lambda: self.services, self.ways)
         ]
         if self.manager is not None:
             found.append(ManageRoutes(self.manager, self.ways, self.recorder))
@@ -343,8 +343,8 @@ class _Routes:
         latch = latch_of(self.data, robot)
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
-        self.stations[name].controls.recorder.hide(secrets)
-        self.stations[name].replace(robot, latch)
+        self.services[name].controls.recorder.hide(secrets)
+        self.services[name].replace(robot, latch)
         self.access.recheck()  # grants may be for a tag that the new document lacks
 
     @asynccontextmanager
@@ -441,7 +441,7 @@ class _Routes:
 
     async def stop(self, request: Request) -> Response:
         """Stop a robot and latch the stop; pages without a working socket use this request."""
-        service = self.stations.get(request.path_params["name"])
+        service = self.services.get(request.path_params["name"])
         if service is None:
             return told(404, _NO_ROBOT, "unknown-robot")
         if not service.controls.controller.can_move or service.robot.playback is not None:
@@ -458,10 +458,10 @@ class _Routes:
 
     async def controls(self, request: Request) -> Response:
         """Return the lease of a robot and the state of its STOP."""
-        service = self.stations.get(request.path_params["name"])
+        service = self.services.get(request.path_params["name"])
         if service is None:
             return told(404, _NO_ROBOT, "unknown-robot")
-        return JSONResponse(service.who(), headers=_PAGE)
+        return JSONResponse(service.control_state(), headers=_PAGE)
 
     async def recording(self, request: Request) -> Response:
         """Return the state of a playback."""
@@ -495,9 +495,9 @@ class _Routes:
     async def _accepted(self, websocket: WebSocket) -> tuple[str, RobotService | None]:
         """Accept a socket; return name and service of its robot, or close the socket."""
         await websocket.accept()
-        names = list(self.stations)
+        names = list(self.services)
         name = websocket.query_params.get("robot", names[0] if len(names) == 1 else "")
-        service = self.stations.get(name)
+        service = self.services.get(name)
         if not visitor_of(websocket).may(WATCH, name):
             await websocket.close(wire.CLOSE_NOT_LET_IN, WATCH.refusal)
             return name, None

@@ -82,7 +82,7 @@ class BrowserClient:
             await self._refuse(wire.CLOSE_NOT_READY, f"missing settings: {names}")
         elif self._service.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
-        elif not self._service.has_place_for(self._peer):
+        elif not self._service.has_room_for(self._peer):
             await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
         else:
             with self._service.visit(self._peer.who):

@@ -36,7 +36,7 @@ class Stores(NamedTuple):
 
 def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fleet:
     """Return the fleet of `robots`; each is connected until `linger_s` after its last page."""
-    turn = asyncio.Lock()
+    start_lock = asyncio.Lock()
     return Fleet(
         robots,
         lambda name, robot: RobotService(
@@ -44,7 +44,7 @@ def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fl
             linger_s=linger_s,
             latch=latch_of(stores.data, robot),
             recorder=_recorder(stores.audit, name, robot),
-            turn=turn,
+            start_lock=start_lock,
             alarms=_alarms(stores, name, robot),
         ),
     )
@@ -62,7 +62,7 @@ def _alarms(stores: Stores, name: str, robot: Robot) -> RobotAlarms:
         is_monitored=robot.is_monitored and is_live,
     )
     if stores.notifier is not None and is_live:
-        found.on_events = partial(stores.notifier.take, name, robot.profile.title or name, found)
+        found.on_events = partial(stores.notifier.queue, name, robot.profile.title or name, found)
     return found
 
 

@@ -39,16 +39,16 @@ def server() -> Server:
 def alarms(server: Server) -> RemoteAlarms:
     made = RemoteAlarms(server.post)
     rows = [row("heat", 2), row("battery", 1), row("fan", 3, "shelved")]
-    made.take(AlarmsMessage(0, [*rows, row("fix", 4, "returned", active=False)], full=True))
+    made.update(AlarmsMessage(0, [*rows, row("fix", 4, "returned", active=False)], full=True))
     return made
 
 
 def test_the_list_follows_the_changes(alarms: RemoteAlarms) -> None:
     assert [one.signal for one in alarms.active] == ["battery", "heat"]
-    alarms.take(AlarmsMessage(0, [row("mode", 5)], gone=("battery",), flood=True))
+    alarms.update(AlarmsMessage(0, [row("mode", 5)], gone=("battery",), flood=True))
     assert [one.signal for one in alarms.active] == ["heat", "mode"]
     assert alarms.is_flooded
-    alarms.take(AlarmsMessage(0, [row("heat", 2)], full=True))
+    alarms.update(AlarmsMessage(0, [row("heat", 2)], full=True))
     assert [*alarms.rows] == ["heat"]
     alarms.clear()
     assert (alarms.rows, alarms.is_flooded) == ({}, False)

@@ -144,10 +144,10 @@ def keep_settings(data: Path, name: str, settings: Mapping[str, str]) -> None:
         raise AssertionError("no robot is made or tried here")
 
     factory = RobotFactory(RobotOptions(data, unused, unused, lambda _: {}))
-    lock = factory.parked()[name][-1]
+    lock = factory.installed_robots()[name][-1]
     kept = StoredSettings(settings=dict(settings), package=lock.root)
-    place = factory.filled(factory.profile(lock), kept).destination
-    factory.kept(name).save(msgspec.structs.replace(kept, destination=place))
+    place = factory.resolved_settings(factory.profile(lock), kept).destination
+    factory.settings_store(name).save(msgspec.structs.replace(kept, destination=place))
 
 
 def assert_whole(store: Store) -> list[str]:

@@ -55,7 +55,7 @@ class Robot:
         self.notifier = AlarmNotifier(options)
         self.hub = Hub(SIGNALS)
         self.alarms = RobotAlarms(Driver(signals=SIGNALS), FakeClock(), time.time)
-        self.alarms.on_events = lambda events: self.notifier.take(
+        self.alarms.on_events = lambda events: self.notifier.queue(
             "rover", "Rover", self.alarms, events
         )
         self.attending = self.alarms.attending(self.hub)

@@ -105,11 +105,11 @@ def test_other_robots_are_not_disturbed(tmp_path: Path, anna: Signer) -> None:
     install(store, package("driver", "other", text=DOCUMENT))
     with served(tmp_path) as client:
         client.get("/")
-        station = fleet_of(client).stations["other"]
+        service = fleet_of(client).services["other"]
         know(tmp_path, anna, 1, Block(WHY, "drivers/rover"))
         until(lambda: "rover" not in fleet_of(client).robots)
-        assert fleet_of(client).stations["other"] is station
-        assert station.controls.controller.lease.state.latched_by == ""
+        assert fleet_of(client).services["other"] is service
+        assert service.controls.controller.lease.state.latched_by == ""
 
 
 def test_a_damaged_file_of_lists_changes_no_running_robot(tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ async def scene(
     commands: dict[str, Command] | None = None,
     role: Role = "drive",
 ) -> AsyncIterator[Scene]:
-    """Serve one client; it and the station are gone after the test."""
+    """Serve one client; it and the service are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(settings=settings, commands=commands), clock)
     audit: list[AuditEntry] = []
@@ -272,7 +272,7 @@ async def test_a_robot_that_is_not_ready_refuses_with_the_settings_names() -> No
 
 
 async def test_a_page_that_leaves_ends_its_client() -> None:
-    """Its tasks end, and the station counts it no more."""
+    """Its tasks end, and the service counts it no more."""
     async with scene() as it:
         it.line.leave()
         await settle()

@@ -55,7 +55,7 @@ class Scene:
 
 @asynccontextmanager
 async def scene(profile: Profile | None = None, secret: str = "") -> AsyncIterator[Scene]:
-    """Serve one dev page; it and the station are gone after the test."""
+    """Serve one dev page; it and the service are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(profile or dashboard_profile(), clock)
     service = RobotService(Robot(robot.profile, {"password": secret}, robot.open), clock=clock)

@@ -18,7 +18,7 @@ def served(robot: FakeRobot) -> Robot:
 
 
 def fleet(*robots: FakeRobot) -> Fleet:
-    """Return a fleet, each robot with a station of its own."""
+    """Return a fleet, each robot with a service of its own."""
     return Fleet(
         {one.profile.name: served(one) for one in robots},
         lambda _, robot: RobotService(robot, linger_s=0.0),
@@ -31,15 +31,15 @@ async def test_a_robot_that_is_added_can_be_looked_at_and_one_that_is_removed_is
     ships = fleet(first)
     async with asyncio.timeout(10), ships.running():
         ships.add("rover", served(second))
-        service = ships.stations["rover"]
-        with service.visit(), ships.stations["puppet"].visit():
+        service = ships.services["rover"]
+        with service.visit(), ships.services["puppet"].visit():
             live = await service.live()
-            await ships.stations["puppet"].live()
+            await ships.services["puppet"].live()
             assert (first.is_open, second.is_open) == (True, True)
             await ships.remove("rover")
             assert (first.is_open, second.is_open) == (True, False)
             assert live.ended.is_set()
-    assert list(ships.robots) == list(ships.stations) == ["puppet"]
+    assert list(ships.robots) == list(ships.services) == ["puppet"]
     assert not first.is_open
 
 
@@ -62,8 +62,8 @@ async def test_a_session_that_cannot_be_opened_is_told_also_after_an_addition() 
     ships = fleet()
     async with asyncio.timeout(10), ships.running():
         ships.add("puppet", served(Refusing(dashboard_profile())))
-        with ships.stations["puppet"].visit(), pytest.raises(SessionFailed, match="no such port"):
-            await ships.stations["puppet"].live()
+        with ships.services["puppet"].visit(), pytest.raises(SessionFailed, match="no such port"):
+            await ships.services["puppet"].live()
         await ships.remove("puppet")
 
 

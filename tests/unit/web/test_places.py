@@ -7,7 +7,7 @@ import pytest
 from urc.testing.clock import FakeClock
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.feed.client_socket import SocketPeer
-from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, RobotService
+from urc.web.fleet.robots import CLIENTS_OF_KNOWN, CLIENTS_OF_UNKNOWN, Robot, RobotService
 from urc.web.serve.access import Access
 from urc.web.serve.connection_quota import KNOWN_PLACES, PLACES, ConnectionQuota, is_stop
 from urc.web.serve.visitor import Visitor
@@ -54,8 +54,8 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
 @pytest.mark.parametrize(
     ("peer", "operators"),
     [
-        (SocketPeer("192.0.2.7", "at 192.0.2.7"), SEATS),
-        (SocketPeer("", "ann", is_known=True), KNOWN_SEATS),
+        (SocketPeer("192.0.2.7", "at 192.0.2.7"), CLIENTS_OF_UNKNOWN),
+        (SocketPeer("", "ann", is_known=True), CLIENTS_OF_KNOWN),
     ],
 )
 def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
@@ -65,11 +65,11 @@ def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
     service = RobotService(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
     with ExitStack() as open_ones:
         for _ in range(operators):
-            assert service.has_place_for(peer)
+            assert service.has_room_for(peer)
             open_ones.enter_context(service.visit(peer.who))
-        assert not service.has_place_for(peer)
-        assert service.has_place_for(peer._replace(who="at 192.0.2.8", is_known=False))
-    assert service.has_place_for(peer)
+        assert not service.has_room_for(peer)
+        assert service.has_room_for(peer._replace(who="at 192.0.2.8", is_known=False))
+    assert service.has_room_for(peer)
 
 
 @pytest.mark.parametrize(

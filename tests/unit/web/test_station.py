@@ -24,12 +24,12 @@ pytestmark = pytest.mark.anyio
 async def stationed(
     robot: FakeRobot, clock: FakeClock, opener: object = None, turn: asyncio.Lock | None = None
 ) -> AsyncIterator[RobotService]:
-    """Run a station for the fake robot."""
+    """Run a service for the fake robot."""
     open_session = opener or robot.open
     service = RobotService(
         Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
         clock=clock,
-        turn=turn,
+        start_lock=turn,
     )
     task = asyncio.create_task(service.run())
     try:

@@ -1,6 +1,6 @@
 """Notifications of alarms by the maintainer's hook: a command, or a URL.
 
-Layer 5. `AlarmNotifier.take` only queues; a thread of its own collects the alarms of one second,
+Layer 5. `AlarmNotifier.queue` only queues; a thread of its own collects the alarms of one second,
 and calls the hook once for each robot. During a flood, a robot is notified at most once a minute.
 The queue is bounded, each attempt has a timeout, and failures are counted and logged. The hook
 never gets secrets of robots, because the hub has removed them from all values.
@@ -86,7 +86,7 @@ class AlarmNotifier:
         """The numbers of notifications so far."""
         return NotifyCount(*(self._counts[one] for one in NotifyCount._fields))
 
-    def take(
+    def queue(
         self, robot: str, title: str, alarms: RobotAlarms, events: Sequence[AlarmEvent]
     ) -> None:
         """Queue the alarms among some events, and return immediately.

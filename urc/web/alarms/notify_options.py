@@ -9,7 +9,7 @@ from typing import Any, Final, cast, get_args
 
 import httpx2
 
-from urc.access.options_file import OptionsFile, is_loopback_url
+from urc.access.options_file import OptionsFile, is_loopback_host
 from urc.model.values import AlarmPriority
 
 __all__ = ["KEYS", "NotifyOptions", "read_notify_options"]
@@ -95,7 +95,7 @@ def _url(given: OptionsFile, key: str) -> str:
         url = httpx2.URL("")
     if url.scheme not in ("http", "https") or not url.host or url.userinfo:
         raise given.fault((key,), "expected a URL such as https://hooks.example/alarms")
-    if url.scheme == "http" and not is_loopback_url(url.host):
+    if url.scheme == "http" and not is_loopback_host(url.host):
         raise given.fault((key,), "expected https:, because http: is readable on the network")
     return text
 

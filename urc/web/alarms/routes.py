@@ -33,6 +33,7 @@ from urc.web.alarms.wire import (
     UnshelveAsked,
 )
 from urc.web.audit.query import BadQuery, query_of
+from urc.web.fleet.fleet import service_of
 from urc.web.fleet.robots import RobotService
 from urc.web.serve.actors import actor_of
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors, body_of
@@ -60,7 +61,7 @@ class AlarmCalls:
 
     def __init__(
         self,
-        stations: Callable[[], Mapping[str, RobotService]],
+        services: Callable[[], Mapping[str, RobotService]],
         store: AlarmStore | None,
         recorder: ServerRecorder,
         notifier: AlarmNotifier | None = None,
@@ -68,12 +69,12 @@ class AlarmCalls:
         """Prepare.
 
         Args:
-            stations: function that returns the robots, by their names in paths.
+            services: function that returns the robots, by their names in paths.
             store: the store of alarms; None for a server without a data folder.
             recorder: receives an audit entry for each action.
             notifier: the caller of the maintainer's hook; None for none.
         """
-        self._stations = stations
+        self._services = services
         self._store = store
         self._recorder = recorder
         self._notifier = notifier
@@ -97,7 +98,7 @@ class AlarmCalls:
         visitor = visitor_of(request)
         counts = (
             count_of(name, one.alarms.list.records.values(), is_monitored=one.is_monitored)
-            for name, one in self._stations().items()
+            for name, one in self._services().items()
             if visitor.may(WATCH, name)
         )
         told = None if self._notifier is None else NotificationCount(*self._notifier.count)
@@ -106,7 +107,7 @@ class AlarmCalls:
     @answers_errors
     async def alarms(self, request: Request) -> Response:
         """Return all alarms of a robot that are not normal."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         alarms = service.alarms
         records = sorted(alarms.list.records.values(), key=by_urgency)
         signals = alarms.signals
@@ -117,7 +118,7 @@ class AlarmCalls:
     @answers_errors
     async def history(self, request: Request) -> Response:
         """Return the newest events of a robot's alarms, newest first."""
-        _, service = self._service(request)
+        _, service = service_of(self._services(), request)
         if self._store is None or service.robot.playback is not None:
             return answer(AlarmHistory((), has_more=False, fault="", lost=0))
         signals = service.alarms.signals
@@ -164,15 +165,8 @@ class AlarmCalls:
 
     # Inside
 
-    def _service(self, request: Request) -> tuple[str, RobotService]:
-        name = request.path_params["name"]
-        service = self._stations().get(name)
-        if service is None:
-            raise ApiError(404, "no robot of that name is served here", "unknown-robot")
-        return name, service
-
     def _acting(self, request: Request) -> tuple[str, RobotService]:
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         if service.robot.playback is not None:
             raise ApiError(409, "this is the playback of a recording", "recorded")
         if not visitor_of(request).may_give(""):

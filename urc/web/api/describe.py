@@ -48,7 +48,7 @@ def summary(
     links = _links(service).values()
     by_state = {one.state: one for one in links}
     state: LinkState = next((one for one in _WORST_FIRST if one in by_state), "idle")
-    controls = service.who()
+    controls = service.control_state()
     return RobotSummary(
         name=name,
         title=profile.title,

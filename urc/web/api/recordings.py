@@ -19,6 +19,7 @@ from starlette.responses import FileResponse, Response
 from urc.runtime.server_recorder import ServerRecorder
 from urc.web.api.sessions import opened
 from urc.web.api.wire import RecordingInfo, RecordingList, RecordingState
+from urc.web.fleet.fleet import service_of
 from urc.web.fleet.robots import LiveSession, RobotService
 from urc.web.serve.actors import actor_of
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors
@@ -68,18 +69,18 @@ class RecordingCalls:
 
     def __init__(
         self,
-        stations: Callable[[], Mapping[str, RobotService]],
+        services: Callable[[], Mapping[str, RobotService]],
         folder: Path | None,
         audit: ServerRecorder,
     ) -> None:
         """Prepare.
 
         Args:
-            stations: function that returns the robots, by their names in paths.
+            services: function that returns the robots, by their names in paths.
             folder: folder of the recordings; None for a server without one.
             audit: receives an entry for each start, end and download.
         """
-        self._stations = stations
+        self._services = services
         self._audit = audit
         self._folder = folder
         self._running: dict[str, _Running] = {}
@@ -146,7 +147,7 @@ class RecordingCalls:
     def _may_read(self, request: Request, robot: str) -> bool:
         """Return whether the visitor maintains a recorded robot; `robot` is its document's name."""
         visitor = visitor_of(request)
-        served = [name for name, one in self._stations().items() if one.robot.profile.name == robot]
+        served = [name for name, one in self._services().items() if one.robot.profile.name == robot]
         return visitor.may(MAINTAIN_SERVER) or any(visitor.may(MAINTAIN, one) for one in served)
 
     # Recordings of programs
@@ -154,7 +155,7 @@ class RecordingCalls:
     @answers_errors
     async def state(self, request: Request) -> Response:
         """Return the state of the recording that a program has started."""
-        name, _ = self._service(request)
+        name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         return answer(running.state if running is not None else _IDLE)
 
@@ -163,7 +164,7 @@ class RecordingCalls:
         """Start a recording of a robot, and connect the robot."""
         from urc.runtime.recording.recorder import check_installed  # an extra
 
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         if self._folder is None:
             text = "this server has no folder for recordings: start it with --record FOLDER"
             raise ApiError(409, text, "no-folder")
@@ -192,7 +193,7 @@ class RecordingCalls:
     @answers_errors
     async def stop(self, request: Request) -> Response:
         """End the recording of a robot, and write the end of the file."""
-        name, _ = self._service(request)
+        name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         if running is None or running.task is None or not running.state.active:
             raise ApiError(409, "no program records this robot", "not-recording")
@@ -230,13 +231,6 @@ class RecordingCalls:
                         one.cancel()
                     if done:
                         return
-
-    def _service(self, request: Request) -> tuple[str, RobotService]:
-        name = request.path_params["name"]
-        service = self._stations().get(name)
-        if service is None:
-            raise ApiError(404, "no robot of that name is served here", "unknown-robot")
-        return name, service
 
 
 async def _until_begun(running: _Running) -> None:

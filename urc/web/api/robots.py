@@ -39,6 +39,7 @@ from urc.web.api.wire import (
 )
 from urc.web.drive.command_runner import CommandOutcome
 from urc.web.feed.client_socket import SocketPeer
+from urc.web.fleet.fleet import service_of
 from urc.web.fleet.robots import LiveSession, RobotService
 from urc.web.serve.replies import ApiError, Endpoint, answer, answers_errors, body_of
 from urc.web.serve.rights import WATCH
@@ -69,19 +70,19 @@ class RobotCalls:
 
     def __init__(
         self,
-        stations: Callable[[], Mapping[str, RobotService]],
+        services: Callable[[], Mapping[str, RobotService]],
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
         times: Callable[[str], ContactTimes],
     ) -> None:
         """Prepare.
 
         Args:
-            stations: function that returns the robots, by their names in paths.
+            services: function that returns the robots, by their names in paths.
             followed: function that returns a context; in this context, its callback is called
                 after each change of rights.
             times: function that returns the times of a robot's last use and last data.
         """
-        self._stations = stations
+        self._services = services
         self._followed = followed
         self._times = times
         self.sessions = ProgramSessions(followed)
@@ -111,7 +112,7 @@ class RobotCalls:
     def listed(self, visitor: Visitor) -> RobotList:
         """Return the robots that a visitor may watch, with their present state."""
         found = []
-        for name, service in self._stations().items():
+        for name, service in self._services().items():
             role = visitor.role(name)
             if role is not None and visitor.may(WATCH, name):
                 found.append(summary(name, service, role, self._times(name)))
@@ -120,7 +121,7 @@ class RobotCalls:
     @answers_errors
     async def robot(self, request: Request) -> Response:
         """Return a robot with its signals and commands."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         visitor = visitor_of(request)
         role = visitor.role(name) or "watch"
         return answer(robot_info(name, service, role, visitor.may_give, self._times(name)))
@@ -128,7 +129,7 @@ class RobotCalls:
     @answers_errors
     async def document(self, request: Request) -> Response:
         """Return the document of a robot."""
-        _, service = self._service(request)
+        _, service = service_of(self._services(), request)
         data = await asyncio.to_thread(document_of, service.robot.profile)
         return Response(data, headers=_NO_STORE, media_type="application/yaml")
 
@@ -137,7 +138,7 @@ class RobotCalls:
     @answers_errors
     async def signals(self, request: Request) -> Response:
         """Return the latest values of all or some signals."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         names = _names(request, service)
         with ExitStack() as stack:
             live = await opened(service, self._peer(request, name), stack)
@@ -149,7 +150,7 @@ class RobotCalls:
     @answers_errors
     async def signal(self, request: Request) -> Response:
         """Return the latest value of one signal; an image as a file."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         wanted = request.path_params["signal"]
         signal = service.robot.profile.driver.signals.get(wanted)
         if signal is None:
@@ -174,7 +175,7 @@ class RobotCalls:
 
     @answers_errors
     async def _stream(self, request: Request) -> Response:
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         names, peer = _names(request, service), self._peer(request, name)
         visitor = visitor_of(request)
         with ExitStack() as stack:
@@ -193,7 +194,7 @@ class RobotCalls:
     @answers_errors
     async def command(self, request: Request) -> Response:
         """Run a command, and return its reply."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         asked = await _optional_body(request, CommandAsked, CommandAsked())
         peer = self._moving_peer(request, name, service)
         wanted = request.path_params["command"]
@@ -236,7 +237,7 @@ class RobotCalls:
     @answers_errors
     async def lease(self, request: Request) -> Response:
         """Handle a request about the controls."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         asked = await body_of(request, LeaseAsked)
         peer = self._moving_peer(request, name, service)
         if not service.controls.controller.can_move:
@@ -261,19 +262,12 @@ class RobotCalls:
     @answers_errors
     async def motion(self, request: Request) -> Response:
         """Pass on an input of a held command."""
-        name, service = self._service(request)
+        name, service = service_of(self._services(), request)
         asked = await body_of(request, MotionAsked)
         self._moving_peer(request, name, service)
         return answer(self._session(request, service, asked.session).move(asked))
 
     # Inside
-
-    def _service(self, request: Request) -> tuple[str, RobotService]:
-        name = request.path_params["name"]
-        service = self._stations().get(name)
-        if service is None:
-            raise ApiError(404, "no robot of that name is served here", "unknown-robot")
-        return name, service
 
     def _peer(self, request: Request, name: str) -> SocketPeer:
         return peer_of(request, name)

@@ -246,7 +246,7 @@ async def opened(service: RobotService, peer: SocketPeer, stack: ExitStack) -> L
     if missing:
         names = ", ".join(setting.name for setting in missing)
         raise ApiError(409, f"settings are missing: {names}", "not-ready")
-    if service.is_full or not service.has_place_for(peer):
+    if service.is_full or not service.has_room_for(peer):
         raise ApiError(429, "too many clients use this robot", "too-many")
     stack.enter_context(service.visit(peer.who))
     try:

@@ -66,21 +66,21 @@ class Dev:
 
     def __init__(
         self,
-        stations: Mapping[str, RobotService],
+        services: Mapping[str, RobotService],
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
     ) -> None:
         """Prepare.
 
         Args:
-            stations: the robots, by the name in their URL.
+            services: the robots, by the name in their URL.
             remake: functions that create a robot from a new version of its profile, by name.
             take: function that switches to a new version of a robot; may raise `UrcError`.
         """
         self._open = 0
         self._watches = {
             name: ProfileWatch(service, remake[name], partial(take, name))
-            for name, service in stations.items()
+            for name, service in services.items()
         }
 
     async def run(self) -> None:

@@ -25,30 +25,30 @@ class ContactWatch:
 
     def __init__(
         self,
-        stations: Callable[[], Mapping[str, RobotService]],
+        services: Callable[[], Mapping[str, RobotService]],
         folder: Path | None,
         utc: Callable[[], float] = time,
     ) -> None:
         """Read the stored times.
 
         Args:
-            stations: function that returns the served robots, by the name in their URL.
+            services: function that returns the served robots, by the name in their URL.
             folder: the data folder; None stores nothing.
             utc: source of the time, in seconds since 1970.
         """
-        self._stations = stations
+        self._services = services
         self._store = ContactStore(folder / FILE if folder is not None else None)
         self._utc = utc
 
     def times(self, name: str) -> ContactTimes:
         """Return the contact times of a served robot; an unknown robot has none."""
-        service = self._stations().get(name)
+        service = self._services().get(name)
         return self._store.of(_key(name, service)) if service is not None else NO_CONTACT
 
     def look(self) -> None:
         """Note the robots that are used or heard now."""
         now = self._utc()
-        for name, service in self._stations().items():
+        for name, service in self._services().items():
             if service.robot.playback is None:
                 self._store.note(
                     _key(name, service), now, is_used=service.is_used, is_seen=service.is_heard

@@ -1,4 +1,4 @@
-"""The served robots and their stations, by the name in their URL.
+"""The served robots and their services, by the name in their URL.
 
 Layer 5. Robots can be added and removed at run time. Removal of a robot first stops its motion.
 """
@@ -9,12 +9,15 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
+from starlette.requests import Request
+
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.widget_versions import apart, unified
+from urc.web.serve.replies import ApiError
 from urc.web.words import t
 
-__all__ = ["BrokenRobot", "Fleet"]
+__all__ = ["BrokenRobot", "Fleet", "service_of"]
 
 _END_S = 15.0
 """Maximum wait for the end of a robot's session, in seconds."""
@@ -38,7 +41,7 @@ class Fleet:
 
         Args:
             robots: the robots, by the name in their URL.
-            service: function that creates the station of a robot.
+            service: function that creates the service of a robot.
 
         Raises:
             UrcError: two robots use different widgets of the same name.
@@ -46,7 +49,7 @@ class Fleet:
         self._service = service
         self.widgets: Assets = _assets(robots)
         self.robots: dict[str, Robot] = dict(robots)
-        self.stations: dict[str, RobotService] = {
+        self.services: dict[str, RobotService] = {
             name: service(name, robot) for name, robot in robots.items()
         }
         self.broken: dict[str, BrokenRobot] = {}
@@ -59,7 +62,7 @@ class Fleet:
         """Run one session supervisor for each robot while the context is open."""
         async with asyncio.TaskGroup() as group:
             self._group = group
-            for name in self.stations:
+            for name in self.services:
                 self._start(name)
             try:
                 yield group
@@ -73,14 +76,14 @@ class Fleet:
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot
-        self.stations[name] = self._service(name, robot)
+        self.services[name] = self._service(name, robot)
         self.broken.pop(name, None)
         self._start(name)
 
     def renew(self, name: str, robot: Robot) -> Robot:
         """Register another version of a robot; return the robot with its served widget names.
 
-        The caller must pass the returned robot to its station with `RobotService.replace`.
+        The caller must pass the returned robot to its service with `RobotService.replace`.
 
         Raises:
             UrcError: the widgets of the robot cannot be served.
@@ -95,7 +98,7 @@ class Fleet:
         """Remove a robot: stop its motion, then end its session."""
         self.robots.pop(name, None)
         self.broken.pop(name, None)
-        self.stations.pop(name, None)
+        self.services.pop(name, None)
         self.widgets = _assets(self.robots)
         task = self._tasks.pop(name, None)
         if task is not None:
@@ -109,7 +112,7 @@ class Fleet:
         pending stop does not count as driving; otherwise, an operator could not correct a wrong
         address of the robot.
         """
-        service = self.stations.get(name)
+        service = self.services.get(name)
         if service is None or service.is_at_rest:
             return ""
         holder = service.controls.controller.lease.state.holder
@@ -123,7 +126,21 @@ class Fleet:
 
     def _start(self, name: str) -> None:
         if self._group is not None:
-            self._tasks[name] = self._group.create_task(self.stations[name].run())
+            self._tasks[name] = self._group.create_task(self.services[name].run())
+
+
+def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[str, RobotService]:
+    """Return name and service of the robot in a request's path; raise `ApiError` 404 without one.
+
+    Args:
+        services: the services of the served robots, by the name in their URL.
+        request: a request whose path has the parameter `name`.
+    """
+    name = request.path_params["name"]
+    service = services.get(name)
+    if service is None:
+        raise ApiError(404, "no robot of that name is served here", "unknown-robot")
+    return name, service
 
 
 def _assets(robots: Mapping[str, Robot]) -> Assets:

@@ -104,7 +104,7 @@ class RobotFactory:
             return None
         return found.st_mtime_ns, found.st_size, found.st_ino
 
-    def kept(self, name: str) -> SettingsStore:
+    def settings_store(self, name: str) -> SettingsStore:
         """Return the store of a robot's settings."""
         return SettingsStore(self.robot_options.data / "robots", name)
 
@@ -116,8 +116,8 @@ class RobotFactory:
             profile: the robot's profile, without added interfaces.
             kept: the stored settings of the robot; None to read the settings from the file.
         """
-        chosen = self.kept(name).load() if kept is None else kept
-        filled = self.filled(profile, chosen)
+        chosen = self.settings_store(name).load() if kept is None else kept
+        filled = self.resolved_settings(profile, chosen)
         for secret in sorted(filled.withheld):
             log.warning(
                 "%s: the setting %s was entered for another destination, package or version of URC:"
@@ -125,12 +125,13 @@ class RobotFactory:
                 name,
                 secret,
             )
-        made = self.robot_options.make(self.furnished(profile, chosen.interface), filled.values)
+        complete = self.with_interfaces(profile, chosen.interface)
+        made = self.robot_options.make(complete, filled.values)
         choice = chosen.monitors_alarms
         is_monitored = self.robot_options.monitors if choice is None else choice
         return replace(made, is_monitored=is_monitored) if is_monitored else made
 
-    def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
+    def resolved_settings(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
         """Return the resolved settings of a robot, or raise `UrcError`.
 
         A value given at the start overrides a stored value, and a stored value overrides the
@@ -187,11 +188,11 @@ class RobotFactory:
             return ""
         return "/".join(parts[1:3])
 
-    def furnished(self, profile: Profile, first: str = "") -> Profile:
+    def with_interfaces(self, profile: Profile, first: str = "") -> Profile:
         """Return the profile with all installed interfaces that fit it, starting with `first`."""
         interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
         for added in self.interfaces():
-            found = self.fitted(added, profile)
+            found = self.fit(added, profile)
             if found.interface is not None and added.lock.key.name not in interfaces:
                 interfaces[added.lock.key.name] = found.interface._replace(name=added.lock.key.name)
                 widgets |= found.widgets
@@ -199,7 +200,7 @@ class RobotFactory:
             interfaces = {first: interfaces[first], **interfaces}
         return profile._replace(interfaces=interfaces, widgets=widgets)
 
-    def fitted(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
+    def fit(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
         """Return an installed interface, bound to the signals and commands of a robot."""
         if added.lock.key.name in profile.interfaces:
             return InterfaceFit(None, fault="this robot already has an interface with this name")
@@ -217,7 +218,7 @@ class RobotFactory:
                     continue  # damaged: the list of installed packages shows it
         return found
 
-    def parked(self) -> dict[str, list[Lock]]:
+    def installed_robots(self) -> dict[str, list[Lock]]:
         """Return the installed packages with a robot, as a map from name to versions, oldest first.
 
         If a robot and a driver have the same name, only the package in use is listed.
@@ -229,7 +230,7 @@ class RobotFactory:
             found[name] = [one for one in _ascending(locks) if used and one.key == used.key]
         return dict(sorted(found.items()))
 
-    def chosen(self, locks: list[Lock], version: str) -> Lock:
+    def chosen_version(self, locks: list[Lock], version: str) -> Lock:
         """Return the chosen version of a robot's package, or the newest if it is not installed."""
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
@@ -239,7 +240,7 @@ class RobotFactory:
         check_hosts(profile)
         return profile
 
-    def reread(self, profile: Profile) -> Profile:
+    def reload(self, profile: Profile) -> Profile:
         """Reread the profile of a robot that was given at the start, or raise `UrcError`."""
         return open_document(profile.file)
 

@@ -47,7 +47,7 @@ __all__ = [
     "SessionLike",
     "RobotService",
     "Playback",
-    "each_counts",
+    "keep_all_signals",
     "missing_settings",
 ]
 
@@ -89,8 +89,8 @@ LINGER_S = 2.0
 OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
-SEATS, KNOWN_SEATS = 8, 64
-"""Maximum number of one robot's clients from one unknown address. `KNOWN_SEATS` is the maximum
+CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
+"""Maximum number of one robot's clients from one unknown address. `CLIENTS_OF_KNOWN` is the maximum
 number from one visitor with a key."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for the end of a session, in seconds."""
@@ -183,7 +183,7 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
     )
 
 
-def each_counts(profile: Profile) -> frozenset[str]:
+def keep_all_signals(profile: Profile) -> frozenset[str]:
     """Return the signals for which a widget of the robot shows every reading."""
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
@@ -208,10 +208,10 @@ class RobotService:
         clock: Clock | None = None,
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
-        turn: asyncio.Lock | None = None,
+        start_lock: asyncio.Lock | None = None,
         alarms: RobotAlarms | None = None,
     ) -> None:
-        """Prepare the station; the session opens for the first client.
+        """Prepare the service; the session opens for the first client.
 
         Args:
             robot: the robot.
@@ -220,7 +220,7 @@ class RobotService:
             clock: the clock.
             latch: store that preserves a latched STOP over a restart; None to store nothing.
             recorder: receives the events of the audit log; None to record nothing.
-            turn: lock that all robots of a server share, so that sessions start one by one.
+            start_lock: lock that all robots of a server share, so that sessions start one by one.
             alarms: the alarms of the robot; None for alarms that are not stored.
         """
         self.robot = robot
@@ -232,10 +232,10 @@ class RobotService:
         self.alarms = alarms or RobotAlarms(robot.profile.driver, self.clock, time.time)
         self.alarm_feed = AlarmFeed(self.alarms, self.clock)
         self._linger_s = linger_s
-        self._turn = turn or asyncio.Lock()
+        self._start_lock = start_lock or asyncio.Lock()
         self._visitors = 0
         self._operators: Counter[str] = Counter()
-        self._stirred = asyncio.Event()
+        self._changed = asyncio.Event()
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
@@ -261,9 +261,9 @@ class RobotService:
         """Whether the maximum number of clients is reached."""
         return self._visitors >= CLIENTS
 
-    def has_place_for(self, peer: SocketPeer) -> bool:
+    def has_room_for(self, peer: SocketPeer) -> bool:
         """Return whether `peer` may open another client within its limit."""
-        most = KNOWN_SEATS if peer.is_known else SEATS
+        most = CLIENTS_OF_KNOWN if peer.is_known else CLIENTS_OF_UNKNOWN
         return not peer.who or self._operators[peer.who] < most
 
     @contextmanager
@@ -271,20 +271,20 @@ class RobotService:
         """Count one more client of `who` while the context is open; for `who`, see `SocketPeer`."""
         self._visitors += 1
         self._operators[who] += 1
-        self._stirred.set()
+        self._changed.set()
         try:
             yield
         finally:
             self._visitors -= 1
             self._operators[who] -= 1
             self._operators += Counter()  # drops zero counts
-            self._stirred.set()
+            self._changed.set()
 
     async def live(self) -> LiveSession:
         """Return the open session; raise `SessionFailed` if the session does not open."""
         try:
             async with asyncio.timeout(OPEN_TIMEOUT_S):
-                return await asyncio.shield(self._coming())
+                return await asyncio.shield(self._next_session())
         except TimeoutError:
             raise SessionFailed("the robot's session did not open in time") from None
 
@@ -321,7 +321,7 @@ class RobotService:
                 await self.clock.sleep(_LOOK_S)
         return controller.is_confirmed and controller.has_own_stop
 
-    def who(self) -> dict[str, str | bool]:
+    def control_state(self) -> dict[str, str | bool]:
         """Return the lease and the state of STOP, as `urc.web.manage.wire.ControlState`."""
         state = self.controls.controller.lease.state
         holder = "" if state.holder is None else state.holder.name or "another screen"
@@ -347,7 +347,7 @@ class RobotService:
         driving the robot. An open session ends first, and clients wait for the next session.
         """
         self._held_off += 1
-        self._stirred.set()
+        self._changed.set()
         try:
             end_s = self.clock.now() + CLOSE_TIMEOUT_S
             while self._is_open and self.clock.now() < end_s:
@@ -355,7 +355,7 @@ class RobotService:
             yield
         finally:
             self._held_off -= 1
-            self._stirred.set()
+            self._changed.set()
 
     def replace(self, robot: Robot, latch: LatchStore | None = None) -> None:
         """Switch to another version of the robot, for its next session; end an open session.
@@ -365,7 +365,7 @@ class RobotService:
         self._successor = (robot, latch)
         if not self._is_open:
             self._succeed()
-        self._stirred.set()
+        self._changed.set()
 
     def _succeed(self) -> None:
         self._is_open = False
@@ -404,16 +404,16 @@ class RobotService:
         async with AsyncExitStack() as stack:
             # The start of a session compiles the driver and launches the guard, which blocks the
             # loop for up to 40 ms. The pause lets in the input of driven robots between two starts.
-            async with self._turn:
+            async with self._start_lock:
                 session = await stack.enter_async_context(self.robot.open_session())
                 await asyncio.sleep(0)
             yield session
 
     async def _serve(self, session: SessionLike) -> None:
-        each = each_counts(self.robot.profile)
+        each = keep_all_signals(self.robot.profile)
         fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event(), self.clock.now())
-        self._coming().set_result(live)
+        self._next_session().set_result(live)
         self.controls.recorder.attend(session.hub, self.clock.now)
         names = {"settings": self.robot.settings}
         try:
@@ -443,12 +443,12 @@ class RobotService:
 
             def ring(rung: asyncio.Event = rung) -> None:
                 rung.set()
-                self._stirred.set()
+                self._changed.set()
 
             alarm = self.clock.call_at(self.clock.now() + self._linger_s, ring)
             while not (self._has_clients or self._is_unwanted or rung.is_set()):
-                self._stirred.clear()
-                await self._stirred.wait()
+                self._changed.clear()
+                await self._changed.wait()
             alarm.cancel()
             if not self._has_clients or self._is_unwanted:
                 return
@@ -461,8 +461,8 @@ class RobotService:
     async def _wait_for(self, *, present: bool) -> None:
         """Wait until a session is needed or, if not `present`, until no session is needed."""
         while not (self._is_wanted if present else not self._has_clients or self._is_unwanted):
-            self._stirred.clear()
-            await self._stirred.wait()
+            self._changed.clear()
+            await self._changed.wait()
 
     @property
     def _is_wanted(self) -> bool:
@@ -483,7 +483,7 @@ class RobotService:
     def _wants_monitoring(self) -> bool:
         return self.robot.is_monitored and self.robot.playback is None
 
-    def _coming(self) -> asyncio.Future[LiveSession]:
+    def _next_session(self) -> asyncio.Future[LiveSession]:
         if self._next is None:
             self._next = asyncio.get_running_loop().create_future()
         return self._next

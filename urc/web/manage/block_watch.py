@@ -115,12 +115,12 @@ class BlockWatch:
 
     async def _disable(self, name: str, robot: Robot, line: str) -> None:
         """Stop a robot, latch STOP with the reason, and end its session."""
-        station = self._fleet.stations[name]
-        if station.controls.controller.can_move:
-            station.controls.stop(f"URC: {line}")
-            if station.is_open:
-                await station.deliver_stop()
-        await station.controls.settle()
+        service = self._fleet.services[name]
+        if service.controls.controller.can_move:
+            service.controls.stop(f"URC: {line}")
+            if service.is_open:
+                await service.deliver_stop()
+        await service.controls.settle()
         await self._fleet.remove(name)
         if not await self._add(name, robot):  # an added interface can be left out
             self._fleet.broken[name] = BrokenRobot(robot.profile.title or name, line)

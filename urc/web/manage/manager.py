@@ -102,8 +102,8 @@ class Manager:
 
     async def _park(self, name: str, locks: list[Lock]) -> None:
         try:
-            kept = await asyncio.to_thread(self.factory.kept(name).load)
-            lock, served = self.factory.chosen(locks, kept.version), self._parked.get(name)
+            kept = await asyncio.to_thread(self.factory.settings_store(name).load)
+            lock, served = self.factory.chosen_version(locks, kept.version), self._parked.get(name)
             if served in locks and not kept.version:
                 lock = served  # another program installed a newer version; the user chooses
             if name in self.fleet.robots and (served == lock or self._waits(name)):
@@ -154,14 +154,14 @@ class Manager:
         if name in self._parked:
             locks = (await asyncio.to_thread(self.factory.parked)).get(name)
             if locks:
-                self._parked[name] = self.factory.chosen(locks, version)
+                self._parked[name] = self.factory.chosen_version(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
         """Return a robot's profile as its document defines it, without added interfaces."""
         lock = self._parked.get(name)
         if lock is not None:
             return self.factory.profile(lock)
-        return self.factory.reread(robot.profile)
+        return self.factory.reload(robot.profile)
 
     def drivers(self) -> dict[str, str]:
         """Return the installed package of each robot, such as ``drivers/puppet 1.0.0``, by name."""
@@ -258,7 +258,7 @@ class Manager:
         names = await asyncio.to_thread(self.forgettable, required) if forgets else []
         gone = await asyncio.to_thread(work)
         for name in names:
-            await asyncio.to_thread(self.factory.kept(name).forget)
+            await asyncio.to_thread(self.factory.settings_store(name).forget)
         await self.changed()
         return gone
 

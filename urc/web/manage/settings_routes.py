@@ -80,10 +80,10 @@ class SettingsRoutes:
     def _page(self, request: Request, name: str) -> str:
         factory = self._manager.factory
         lock = self._manager.lock_of(name)
-        locks = factory.parked().get(name, []) if lock is not None else []
+        locks = factory.installed_robots().get(name, []) if lock is not None else []
         fault = ""
         try:
-            kept = factory.kept(name).load()
+            kept = factory.settings_store(name).load()
         except UrcError as error:
             kept, fault = StoredSettings(), str(error)
         profile = self._profile(name)
@@ -92,7 +92,7 @@ class SettingsRoutes:
             if broken is None:
                 raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
             profile, fault = Profile(name, broken.title, ""), broken.fault
-        filled = None if fault else factory.filled(profile, kept)
+        filled = None if fault else factory.resolved_settings(profile, kept)
         return settings_page(
             request.state.nonce,
             name,
@@ -150,7 +150,7 @@ class SettingsRoutes:
                 text = t("Not saved: the robot cannot be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
         manager.check_idle(name)  # again: the test takes a while
-        await asyncio.to_thread(factory.kept(name).save, kept)
+        await asyncio.to_thread(factory.settings_store(name).save, kept)
         changes = _changes(before, kept, bare, secret_texts(bare, robot.settings))
         if changes:
             self._recorder.settings_changed(actor, name, changes)
@@ -162,7 +162,7 @@ class SettingsRoutes:
 
     def _kept(self, name: str) -> StoredSettings:
         try:
-            return self._manager.factory.kept(name).load()
+            return self._manager.factory.settings_store(name).load()
         except UrcError:
             return StoredSettings()  # damaged: the new values replace it
 
@@ -171,11 +171,11 @@ class SettingsRoutes:
         manager, factory = self._manager, self._manager.factory
         lock = manager.lock_of(name)
         if lock is not None:
-            locks = factory.parked().get(name, [lock])
+            locks = factory.installed_robots().get(name, [lock])
             if version and version not in [one.version for one in locks]:
                 raise UrcError(f"{name} {version} is not installed")
-            return factory.profile(factory.chosen(locks, version))
-        return factory.reread(manager.fleet.robots[name].profile)
+            return factory.profile(factory.chosen_version(locks, version))
+        return factory.reload(manager.fleet.robots[name].profile)
 
     def _filled_in(
         self, profile: Profile, before: StoredSettings, said: SettingsAsked
@@ -198,7 +198,7 @@ class SettingsRoutes:
             package=package,
             monitors_alarms=said.monitors_alarms,
         )
-        found = factory.filled(profile, kept)
+        found = factory.resolved_settings(profile, kept)
         for name in untouched.keys() & found.withheld:
             faults[name] = t(
                 "Enter it again: it was entered for another place, or another package."
@@ -210,7 +210,7 @@ class SettingsRoutes:
     ) -> tuple[ProbedTransport, ...]:
         """Test all transports while the robot is disconnected; a STOP ends the test immediately."""
         robot_options = self._manager.factory.robot_options
-        service = self._manager.fleet.stations.get(name)
+        service = self._manager.fleet.services.get(name)
         held_off = service.held_off() if service is not None else nullcontext()
         epoch = _epoch(service)
         async with held_off:

@@ -14,8 +14,7 @@ from urc.access.grants import AccessError
 from urc.access.passphrases import hash_of, matches
 from urc.access.store import Invitation
 from urc.web.manage.wire import ResultLine
-from urc.web.people.admin_routes import answers_changes
-from urc.web.people.browser_sign_ins import BrowserSignIns
+from urc.web.people.browser_sign_ins import BrowserSignIns, answers_changes
 from urc.web.people.link_maker import LinkMaker
 from urc.web.people.lists import principal_info, sign_in_list
 from urc.web.people.messages import (

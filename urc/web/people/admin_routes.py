@@ -4,9 +4,8 @@ Layer 5. Each change is one transaction of the store, acts at once, and is in th
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable
-from functools import wraps
-from typing import Any, Final
+from collections.abc import Iterable
+from typing import Final
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -24,7 +23,7 @@ from urc.access.grants import AccessError, Grant, parse_grant
 from urc.access.lifetimes import INVITATION_S
 from urc.access.store import Invitation, parse_name
 from urc.web.manage.wire import ResultLine
-from urc.web.people.browser_sign_ins import BrowserSignIns
+from urc.web.people.browser_sign_ins import BrowserSignIns, answers_changes
 from urc.web.people.link_maker import LinkMaker
 from urc.web.people.lists import principal_info, sign_in_list
 from urc.web.people.messages import (
@@ -42,11 +41,11 @@ from urc.web.people.messages import (
 )
 from urc.web.people.pairings import Pairings
 from urc.web.serve.actors import actor_of
-from urc.web.serve.replies import ApiError, Endpoint, answer, body_of, told
+from urc.web.serve.replies import ApiError, Endpoint, answer, body_of
 from urc.web.serve.visitor import visitor_of
 from urc.web.words import t
 
-__all__ = ["AdminRoutes", "answers_changes"]
+__all__ = ["AdminRoutes"]
 
 _DAY_S: Final = 86400.0
 _PLURALS: Final[dict[Kind, str]] = {
@@ -55,22 +54,6 @@ _PLURALS: Final[dict[Kind, str]] = {
     "program": "tokens",
     "guest": "guests",
 }
-_Handler = Callable[[Any, Request], Awaitable[Response]]
-
-
-def answers_changes(handler: _Handler) -> _Handler:
-    """Turn each error of a change into a response of one line."""
-
-    @wraps(handler)
-    async def handle(self: Any, request: Request) -> Response:
-        try:
-            return await handler(self, request)
-        except ApiError as failure:
-            return told(failure.status, failure.line)
-        except AccessError as error:
-            return told(422, str(error))
-
-    return handle
 
 
 class AdminRoutes:

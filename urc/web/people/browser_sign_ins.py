@@ -7,10 +7,9 @@ affected.
 import asyncio
 import math
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from functools import wraps
-from typing import Any, Final
+from typing import Final
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -25,18 +24,28 @@ from urc.access.throttle import Throttle
 from urc.runtime.server_recorder import Actor, ServerRecorder
 from urc.web.serve.access import Access
 from urc.web.serve.browser_name import browser_name
-from urc.web.serve.replies import ApiError, told
+from urc.web.serve.replies import ApiError, answers_errors_with
 from urc.web.serve.visitor import visitor_of
 from urc.web.words import t
 
-__all__ = ["BrowserSignIns", "address_of", "agent_of", "answers_refusals"]
+__all__ = [
+    "BrowserSignIns",
+    "address_of",
+    "agent_of",
+    "answers_changes",
+    "answers_refusals",
+]
+
+answers_changes: Final = answers_errors_with(422)
+"""Decorator of a handler that changes people, devices or sign-ins."""
+answers_refusals: Final = answers_errors_with(403)
+"""Decorator of a handler that lets a visitor in, or refuses."""
 
 HASHES: Final = 2
 """Most passphrases that are hashed at the same time; each one takes 64 MiB."""
 MOST_WAITING: Final = 32
 """Most attempts that wait for a hash."""
 _LONGEST_AGENT: Final = 200
-_Handler = Callable[[Any, Request], Awaitable[Response]]
 
 
 class BrowserSignIns:
@@ -192,21 +201,6 @@ class BrowserSignIns:
                 await self.control.end_sign_in(before.sign_in)
                 return
         await self.control.reload()
-
-
-def answers_refusals(handler: _Handler) -> _Handler:
-    """Turn each error of a handler about people into a response of one line."""
-
-    @wraps(handler)
-    async def handle(self: Any, request: Request) -> Response:
-        try:
-            return await handler(self, request)
-        except ApiError as failure:
-            return told(failure.status, failure.line)
-        except AccessError as error:
-            return told(403, str(error))
-
-    return handle
 
 
 def address_of(request: Request) -> str:

@@ -80,20 +80,36 @@ async def body_of(request: Request, kind: type[_T]) -> _T:
         raise ApiError(400, f"the request body does not match the schema: {error}") from None
 
 
-def answers_errors(
-    handler: Callable[Concatenate[_Self, Request, _P], Awaitable[Response]],
-) -> Callable[Concatenate[_Self, Request, _P], Awaitable[Response]]:
-    """Turn each `ApiError` and `UrcError` of a handler into a response."""
+def answers_errors_with(
+    status: int,
+) -> Callable[
+    [Callable[Concatenate[_Self, Request, _P], Awaitable[Response]]],
+    Callable[Concatenate[_Self, Request, _P], Awaitable[Response]],
+]:
+    """Return a decorator that turns each `ApiError` and `UrcError` of a handler into a response.
 
-    @wraps(handler)
-    async def handle(
-        self: _Self, request: Request, /, *args: _P.args, **named: _P.kwargs
-    ) -> Response:
-        try:
-            return await handler(self, request, *args, **named)
-        except ApiError as failure:
-            return told(failure.status, failure.line, failure.code)
-        except UrcError as error:
-            return told(409, str(error).strip().partition("\n")[0])
+    Args:
+        status: HTTP status of a `UrcError`; an `ApiError` has its own.
+    """
 
-    return handle
+    def decorate(
+        handler: Callable[Concatenate[_Self, Request, _P], Awaitable[Response]],
+    ) -> Callable[Concatenate[_Self, Request, _P], Awaitable[Response]]:
+        @wraps(handler)
+        async def handle(
+            self: _Self, request: Request, /, *args: _P.args, **named: _P.kwargs
+        ) -> Response:
+            try:
+                return await handler(self, request, *args, **named)
+            except ApiError as failure:
+                return told(failure.status, failure.line, failure.code)
+            except UrcError as error:
+                return told(status, str(error).strip().partition("\n")[0])
+
+        return handle
+
+    return decorate
+
+
+answers_errors: Final = answers_errors_with(409)
+"""Decorator of a handler that refuses requests because of the state of a robot or the server."""

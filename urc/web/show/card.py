@@ -30,11 +30,11 @@ class Cards:
     """The route that serves the current content of the cards on the menu.
 
     Args:
-        stations: the served robots, by the name in their URL.
+        services: the served robots, by the name in their URL.
     """
 
-    def __init__(self, stations: Callable[[], Mapping[str, RobotService]]) -> None:
-        self._stations = stations
+    def __init__(self, services: Callable[[], Mapping[str, RobotService]]) -> None:
+        self._services = services
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the route for the content of cards."""
@@ -46,7 +46,7 @@ class Cards:
         The header ``x-urc-old`` marks the last image of a session that has ended.
         """
         name = request.path_params["name"]
-        service = self._stations().get(name)
+        service = self._services().get(name)
         if service is None:
             raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
         seen = service.glimpse()
