@@ -10,7 +10,6 @@ the sign-in, including those of the person's devices and passkeys, and the next 
 So an account that is blocked at its provider keeps no way in.
 """
 
-import json
 import sqlite3
 from collections.abc import Iterable
 from typing import Final, NamedTuple
@@ -18,7 +17,7 @@ from urllib.parse import urlsplit
 
 from urc.access.administration import principal_named
 from urc.access.directory import Principal
-from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.grants import AccessError, Grant, grants_from_json, grants_to_json
 from urc.access.store import LONGEST_NAME, AccessStore
 
 __all__ = ["ExternalAccount", "admit_account", "admit_named"]
@@ -61,7 +60,7 @@ def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> P
             (account.issuer, account.subject),
         ).fetchone()
         if row is not None:
-            person = _renewed(store, row[0], _grants(row[1]), account.grants)
+            person = _renewed(store, row[0], grants_from_json(row[1]), account.grants)
             if person.grants:
                 person = _extended(base, person, account.ends_at)
         elif account.grants:
@@ -140,11 +139,10 @@ def _is_of_proxy(base: sqlite3.Connection, principal: str) -> bool:
 
 
 def _keep(base: sqlite3.Connection, account: ExternalAccount, principal: str) -> None:
-    grants = json.dumps([str(grant) for grant in account.grants])
     base.execute(
         "INSERT INTO external_accounts VALUES (?, ?, ?, ?)"
         " ON CONFLICT (issuer, subject) DO UPDATE SET grants = excluded.grants",
-        (account.issuer, account.subject, principal, grants),
+        (account.issuer, account.subject, principal, grants_to_json(account.grants)),
     )
 
 
@@ -160,7 +158,3 @@ def _free_name(store: AccessStore, account: ExternalAccount) -> str:
         if principal_named(directory, "person", name) is None:
             return name
     raise AccessError(f"{_MOST_NAMESAKES} people have the name {account.name!r}")
-
-
-def _grants(text: str) -> tuple[Grant, ...]:
-    return tuple(parse_grant(each) for each in json.loads(text))

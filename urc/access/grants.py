@@ -3,13 +3,23 @@
 Layer 4. Pure. The text form is ``ROLE``, ``ROLE@ROBOT`` or ``ROLE@#TAG``, such as ``drive@#lab``.
 """
 
+import json
 from collections.abc import Collection, Iterable
 from typing import Final, NamedTuple
 
 from urc.model.role import ROLES, Role, includes
 from urc.problems import UrcError
 
-__all__ = ["ALL", "AccessError", "Grant", "highest", "parse_grant", "role_at"]
+__all__ = [
+    "ALL",
+    "AccessError",
+    "Grant",
+    "grants_from_json",
+    "grants_to_json",
+    "highest",
+    "parse_grant",
+    "role_at",
+]
 
 ALL: Final = "*"
 """Scope of a grant for all robots, now and later."""
@@ -54,6 +64,16 @@ def parse_grant(text: str) -> Grant:
     if role == "administer" and scope not in ("", ALL):
         raise AccessError(f"administer is for all robots: write 'administer', found {text!r}")
     return Grant(role, scope or ALL)
+
+
+def grants_to_json(grants: Iterable[Grant]) -> str:
+    """Return grants in the form of the store, a JSON list of their text forms."""
+    return json.dumps([str(grant) for grant in grants])
+
+
+def grants_from_json(text: str) -> tuple[Grant, ...]:
+    """Return the grants that `grants_to_json` has written."""
+    return tuple(parse_grant(each) for each in json.loads(text))
 
 
 def role_at(grants: Iterable[Grant], robot: str = "", tags: Collection[str] = ()) -> Role | None:

@@ -5,12 +5,11 @@ stays valid. The functions block for some milliseconds.
 """
 
 import hashlib
-import json
 from typing import Final, NamedTuple
 
 from urc.access.administration import principal_named, replace_passphrase
-from urc.access.directory import Directory, Principal, SignIn, digest_of
-from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.directory import Directory, Kind, Principal, SignIn
+from urc.access.grants import AccessError
 from urc.access.lifetimes import DEVICE, PERSON
 from urc.access.store import AccessStore, Invitation
 
@@ -19,7 +18,6 @@ __all__ = [
     "NewSignIn",
     "Origin",
     "check_number",
-    "find",
     "free_name",
     "join",
     "pair",
@@ -46,26 +44,6 @@ class NewSignIn(NamedTuple):
     principal: Principal
     sign_in: SignIn
     secret: str
-
-
-def find(store: AccessStore, code: str, now: float) -> Invitation | None:
-    """Return the invitation of a code, which stays valid; None if the code is unknown or too old.
-
-    Args:
-        store: the store.
-        code: the code.
-        now: UTC time in seconds since 1970.
-    """
-    with store.transaction() as base:
-        row = base.execute(
-            "SELECT kind, name, grants, owner, ends_at FROM invitations"
-            " WHERE digest = ? AND ends_at > ?",
-            (digest_of(code), now),
-        ).fetchone()
-    if row is None:
-        return None
-    kind, name, grants, owner, ends_at = row
-    return Invitation(kind, name, _parsed(grants), owner, ends_at)
 
 
 def pair(
@@ -140,12 +118,9 @@ def free_name(directory: Directory, wanted: str) -> str:
     return name
 
 
-def _redeemed(store: AccessStore, code: str, now: float, kind: str) -> Invitation:
-    found = find(store, code, now)
-    if found is None or found.kind != kind or store.redeem(code, now) is None:
+def _redeemed(store: AccessStore, code: str, now: float, kind: Kind) -> Invitation:
+    found = store.redeem(code, now)
+    if found is None or found.kind != kind:
+        # The error undoes the caller's transaction, so a code of the other kind stays valid.
         raise AccessError(UNKNOWN_CODE)
     return found
-
-
-def _parsed(texts: str) -> tuple[Grant, ...]:
-    return tuple(parse_grant(each) for each in json.loads(texts))

@@ -1,6 +1,6 @@
-"""Passphrases: the rules for new ones, and their argon2id hashes.
+"""Passphrases: the rules for new ones, their argon2id hashes, and the check of a sign-in.
 
-Layer 4. Pure, and slow on purpose: a hash takes about 50 ms and 64 MiB. Servers therefore make one
+Layer 4. Slow on purpose: a hash takes about 50 ms and 64 MiB. Servers therefore make one
 hash at a time, in a thread. RFC 9106 (argon2id, the second recommended choice of
 parameters); NIST SP 800-63B-4 for the rules: length counts, common passwords are refused, and no
 composition rules.
@@ -12,13 +12,23 @@ from typing import Final
 import argon2
 
 from urc.access.grants import AccessError
+from urc.access.store import AccessStore
 
-__all__ = ["LONGEST", "SHORTEST", "hash_of", "is_stale", "matches"]
+__all__ = [
+    "LONGEST",
+    "SHORTEST",
+    "WRONG",
+    "hash_of",
+    "is_stale",
+    "matches",
+    "person_by_passphrase",
+]
 
 SHORTEST: Final = 8
 """Fewest characters."""
 LONGEST: Final = 256
 """Most characters; the hash of a longer text would cost an attacker nothing and the server time."""
+WRONG: Final = "the name or the passphrase is wrong"
 _FEWEST_DIFFERENT: Final = 4
 _JUDGED: Final = 16
 """Characters that the estimate of guesses reads; 16 take at most 0.1 s."""
@@ -77,6 +87,26 @@ def matches(passphrase: str, kept: str | None) -> bool:
 def is_stale(kept: str) -> bool:
     """Return whether the hash has older parameters and should be replaced at the next sign-in."""
     return _HASHER.check_needs_rehash(kept)
+
+
+def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
+    """Return the id of the person with this name and passphrase; "" if one of them is wrong.
+
+    The answer takes equally long for an unknown name and for a wrong passphrase. A hash with older
+    parameters is replaced. The call blocks for about 50 ms.
+
+    Raises:
+        AccessError: the store cannot be used.
+    """
+    person, kept = store.passphrase_of(" ".join(name.split()))
+    if not matches(passphrase, kept) or kept is None:
+        return ""
+    if is_stale(kept):
+        try:
+            store.set_passphrase(person, hash_of(passphrase))
+        except AccessError:
+            return person  # stricter rules apply to new passphrases only
+    return person
 
 
 def _is_common(passphrase: str, name: str) -> bool:

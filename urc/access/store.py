@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from urc.access.directory import Directory, Kind, Principal, SignIn, Way, digest_of
-from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.grants import AccessError, Grant, grants_from_json, grants_to_json
 from urc.private_files import make_private
 
 __all__ = [
@@ -184,7 +184,7 @@ class AccessStore:
             now, ends_at,
         )  # fmt: skip
         row = principal._replace(
-            grants=_texts(principal.grants),  # type: ignore[arg-type]
+            grants=grants_to_json(principal.grants),  # type: ignore[arg-type]
             commands=json.dumps(principal.commands),  # type: ignore[arg-type]
         )
         with self._change():
@@ -211,7 +211,9 @@ class AccessStore:
 
     def set_grants(self, principal: str, grants: Iterable[Grant]) -> None:
         """Replace the rights of a principal; raise `AccessError` if it is unknown."""
-        self._update("UPDATE principals SET grants = ? WHERE id = ?", _texts(grants), principal)
+        self._update(
+            "UPDATE principals SET grants = ? WHERE id = ?", grants_to_json(grants), principal
+        )
 
     def remove(self, principal: str) -> None:
         """Remove a principal with its sign-ins, credentials and devices.
@@ -327,10 +329,26 @@ class AccessStore:
                 raise AccessError(f"{count} codes are valid; wait until some have ended")
             self._base.execute(
                 "INSERT INTO invitations VALUES (?, ?, ?, ?, ?, ?)",
-                (digest_of(code), invitation.kind, invitation.name, _texts(invitation.grants),
-                 invitation.owner, invitation.ends_at),
-            )  # fmt: skip
+                (
+                    digest_of(code),
+                    invitation.kind,
+                    invitation.name,
+                    grants_to_json(invitation.grants),
+                    invitation.owner,
+                    invitation.ends_at,
+                ),
+            )
         return code
+
+    def invitation(self, code: str, now: float) -> Invitation | None:
+        """Return the invitation of a code, which stays valid; None if it is unknown or too old."""
+        with self._change():
+            row = self._base.execute(
+                "SELECT kind, name, grants, owner, ends_at FROM invitations"
+                " WHERE digest = ? AND ends_at > ?",
+                (digest_of(code), now),
+            ).fetchone()
+        return _invitation(row) if row else None
 
     def redeem(self, code: str, now: float) -> Invitation | None:
         """Return the invitation of a code, and end it; None if the code is unknown or too old."""
@@ -341,10 +359,7 @@ class AccessStore:
                 " RETURNING kind, name, grants, owner, ends_at",
                 (digest_of(code),),
             ).fetchone()
-        if row is None:
-            return None
-        kind, name, grants, owner, ends_at = row
-        return Invitation(kind, name, _grants(grants), owner, ends_at)
+        return _invitation(row) if row else None
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
@@ -417,14 +432,13 @@ def parse_name(name: str) -> str:
     return name
 
 
-def _texts(grants: Iterable[Grant]) -> str:
-    return json.dumps([str(grant) for grant in grants])
-
-
-def _grants(text: str) -> tuple[Grant, ...]:
-    return tuple(parse_grant(each) for each in json.loads(text))
-
-
 def _principal(row: Any) -> Principal:
     found = Principal(*row)
-    return found._replace(grants=_grants(str(row[3])), commands=tuple(json.loads(str(row[5]))))
+    return found._replace(
+        grants=grants_from_json(str(row[3])), commands=tuple(json.loads(str(row[5])))
+    )
+
+
+def _invitation(row: Any) -> Invitation:
+    kind, name, grants, owner, ends_at = row
+    return Invitation(kind, name, grants_from_json(grants), owner, ends_at)

@@ -9,7 +9,6 @@ from typing import Final, Literal, NamedTuple
 from urc.model.values import Alarm, AlarmLimits, AlarmPriority, Reading, state_texts
 
 __all__ = [
-    "EVENT_KINDS",
     "PRIORITIES",
     "AlarmEvent",
     "AlarmEventKind",
@@ -32,10 +31,6 @@ AlarmEventKind = Literal[
 ]  # fmt: skip
 """Kind of an event. ``changed``: less severe than before. ``unknown``: the value is not known any
 more. ``removed``: the robot's document declares the alarm no longer."""
-EVENT_KINDS: Final[tuple[AlarmEventKind, ...]] = (
-    "raised", "changed", "returned", "acknowledged", "shelved", "unshelved", "suppressed",
-    "unsuppressed", "unknown", "removed", "flood began", "flood ended",
-)  # fmt: skip
 _MILD: Final = ("low", "high", "minor")
 _SAME_SIDE: Final = {("lolo", "low"), ("hihi", "high")}
 _LONGEST_VALUE: Final = 100

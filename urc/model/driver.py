@@ -35,13 +35,9 @@ __all__ = [
     "Message",
     "Poll",
     "Reply",
-    "ScalarOrTemplate",
     "Timeouts",
     "TransportSpec",
 ]
-
-ScalarOrTemplate = bool | int | float | str | None | Template
-"""Value of an option in a document: a plain value, or a template over ``settings``."""
 
 
 class Timeouts(NamedTuple):

@@ -263,7 +263,6 @@ class Hub:
         self.notes_count = 0
         """Total number of log entries, including entries that the list has dropped."""
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
-        self.traffic_count = 0
         self.traffic_watchers = 0
         """Number of readers of the traffic; traffic is recorded only if this number is above 0."""
         self.streams = SampleHistory()
@@ -369,7 +368,6 @@ class Hub:
 
     def _show(self, traffic: Traffic) -> None:
         self.traffic.append(traffic)
-        self.traffic_count += 1
         self.revision += 1
         for tap in self._traffic_taps:
             tap.push((traffic,))

@@ -21,7 +21,7 @@ def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
     packages in the neighbouring folders. Any other document uses the folder ``widgets`` next to the
     document.
     """
-    home = ecosystem_of(Path(document)) or _workshop_of(Path(document))
+    home = ecosystem_of(Path(document)) or _packages_folder_of(Path(document))
     ours = shipped("widgets")
     brought = (home or Path(document).parent) / "widgets"
     if home is None and (not brought.is_dir() or brought.resolve() == ours.resolve()):
@@ -46,7 +46,7 @@ def hidden_widget(manifest: str, name: str) -> Problem:
     )
 
 
-def _workshop_of(document: Path) -> Path | None:
+def _packages_folder_of(document: Path) -> Path | None:
     """Return the top folder of packages that contains a document, or None."""
     home = document.resolve().parent
     is_package = home.parent.name in FOLDERS and (home / MANIFEST).is_file()

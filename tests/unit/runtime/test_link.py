@@ -327,7 +327,7 @@ async def test_traffic_is_recorded_only_while_somebody_watches() -> None:
     """Both directions, as they were handed over."""
     clock, line = FakeClock(), MemoryTransport(answer=says_42)
     async with opened(line, clock) as session:
-        assert session.hub.traffic_count == 0
+        assert not session.hub.traffic
         session.hub.traffic_watchers += 1
         await clock.advance(1)
         seen = [(entry.direction, entry.data) for entry in session.hub.traffic]

@@ -8,13 +8,13 @@ from urc.config.parse.conversion import CONVERSION_KEYS, parse_conversion, parse
 from urc.config.parse.limits import parse_limits
 from urc.config.values import check_range
 from urc.expressions import Template
-from urc.model.axes import ANGLE_UNITS
 from urc.model.driver import Poll
 from urc.model.values import Signal
 
 __all__ = ["parse_signal", "with_ages"]
 
 _NUMBERS: Final = ("integer", "number")
+_ANGLE_UNITS: Final = ("rad", "deg", "°")
 _ROTATIONS: Final = ("roll", "pitch", "yaw")
 _BYTES: Final = ("image", "blob")
 
@@ -113,7 +113,7 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
 def _check_rotation(part: Node, kind: str, problems: Problems) -> None:
     """Warn of a received rotation signal without an axis convention."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
-    is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
+    is_angle = kind in _NUMBERS and part.text("unit") in _ANGLE_UNITS
     if is_named and is_angle and "value" not in part.data:
         problems.warn(
             part,
@@ -133,8 +133,8 @@ def _axes(part: Node, kind: str, problems: Problems) -> str:
     axes = str(inner.data)
     size = part.integer("size")
     if axes == "bearing":
-        fits = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
-        wanted = f"a bearing is a number in one of the units {', '.join(ANGLE_UNITS)}"
+        fits = kind in _NUMBERS and part.text("unit") in _ANGLE_UNITS
+        wanted = f"a bearing is a number in one of the units {', '.join(_ANGLE_UNITS)}"
     elif kind in _NUMBERS:
         fits = part.text("unit") != ""
         wanted = "a number with axes needs a unit"

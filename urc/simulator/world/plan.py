@@ -22,7 +22,6 @@ class Edge(NamedTuple):
     y2: float
     height: float
     colour: str
-    is_landmark: bool = False
 
 
 class Contact(NamedTuple):
@@ -105,10 +104,7 @@ def _faces(box: Box) -> list[Edge]:
     left, right = box.x - box.width / 2, box.x + box.width / 2
     low, high = box.y - box.depth / 2, box.y + box.depth / 2
     corners = ((left, low), (right, low), (right, high), (left, high), (left, low))
-    return [
-        Edge(*start, *end, box.height, box.colour, is_landmark=True)
-        for start, end in pairwise(corners)
-    ]
+    return [Edge(*start, *end, box.height, box.colour) for start, end in pairwise(corners)]
 
 
 def _nearest(edge: Edge, x: float, y: float) -> tuple[float, float]:

@@ -33,7 +33,6 @@ __all__ = [
     "RobotInfo",
     "RobotList",
     "RobotSummary",
-    "SessionAsked",
     "SignalInfo",
     "SignalValue",
     "SignalValues",
@@ -266,12 +265,6 @@ class LeaseAsked(ApiMessage, frozen=True):
     """Time for the holder's answer to ``ask``, 3 to 60 s."""
     session: _Word = ""
     """Secret of an open session; "" opens a session."""
-
-
-class SessionAsked(ApiMessage, frozen=True):
-    """A request to close a session."""
-
-    session: _Word
 
 
 class MotionNotice(ApiMessage, frozen=True):

@@ -11,13 +11,14 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc.access.administration import (
+    add_guest,
+    add_token,
     change_grants,
     end_sign_ins,
     invite_person,
     overview,
     principal_named,
 )
-from urc.access.bearer_links import add_guest, add_token
 from urc.access.directory import Kind, Principal
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.access.lifetimes import INVITATION_S

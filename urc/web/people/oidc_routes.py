@@ -16,7 +16,7 @@ from urc.access.external_accounts import admit_account
 from urc.access.grants import AccessError
 from urc.access.oidc import STATE_S, OidcSignIn
 from urc.web.people.browser_sign_ins import BrowserSignIns, address_of, answers_refusals
-from urc.web.people.wire import ProviderAddress
+from urc.web.people.passkey_messages import ProviderAddress
 from urc.web.serve.replies import ApiError, answer
 from urc.web.serve.rights import ANYONE, ProtectedRoute
 from urc.web.show.pages import PageHead, render

@@ -1,6 +1,7 @@
-"""The administrator's page of people and devices, and the page of one's own account.
+"""The pages about people and devices: for administrators, for one's own account, and for codes.
 
-Layer 5. The modules of the pages fetch all data; the pages themselves contain none of it.
+Layer 5. The modules of the pages fetch all data; the pages themselves contain none of it. The page
+of a code is equal for all visitors; its module reads the code from the fragment.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,12 +11,19 @@ from typing import Final, NamedTuple
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
-from urc.web.serve.rights import ADMINISTER, SIGNED_IN, ProtectedRoute
+from urc.web.serve.rights import ADMINISTER, ANYONE, SIGNED_IN, ProtectedRoute
 from urc.web.show.menu import Nav, NavigationLinks
 from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["AccountPage", "PeoplePage", "PeoplePages", "GrantScope"]
+__all__ = [
+    "AccountPage",
+    "CodePages",
+    "GrantScope",
+    "OneTimeCodePage",
+    "PeoplePage",
+    "PeoplePages",
+]
 
 _NO_STORE: Final = {"cache-control": "no-store"}
 
@@ -45,6 +53,13 @@ class AccountPage:
 
     head: PageHead
     nav: Nav
+
+
+@dataclass(frozen=True, slots=True)
+class OneTimeCodePage:
+    """Context of ``pair.html.j2``, ``join.html.j2`` and ``guest.html.j2``."""
+
+    head: PageHead
 
 
 class PeoplePages:
@@ -96,3 +111,22 @@ class PeoplePages:
         head = PageHead(request.state.nonce, t("Your account"))
         html = render("account.html.j2", AccountPage(head, Nav("account", self._ways)))
         return HTMLResponse(html, headers=_NO_STORE)
+
+
+class CodePages:
+    """The routes of the pages for links with a code: a new device, an invited person, a guest."""
+
+    def routes(self) -> list[ProtectedRoute]:
+        """Return the routes."""
+        return [ProtectedRoute(path, self.page, ANYONE) for path in ("/pair", "/join", "/guest")]
+
+    async def page(self, request: Request) -> Response:
+        """Show one of the pages."""
+        name = request.url.path.strip("/")
+        title = {
+            "pair": t("Pair this device"),
+            "join": t("Choose a passphrase"),
+            "guest": t("Watch as a guest"),
+        }[name]
+        page = OneTimeCodePage(PageHead(request.state.nonce, title))
+        return HTMLResponse(render(f"{name}.html.j2", page), headers=_NO_STORE)

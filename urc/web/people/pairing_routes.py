@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc.access.grants import AccessError
-from urc.access.pairing import UNKNOWN_CODE, Origin, check_number, find, free_name, join, pair
+from urc.access.pairing import UNKNOWN_CODE, Origin, check_number, free_name, join, pair
 from urc.access.passphrases import hash_of
 from urc.access.store import Invitation, parse_name
 from urc.web.people.browser_sign_ins import BrowserSignIns, address_of, agent_of, answers_refusals
@@ -145,7 +145,7 @@ class PairingRoutes:
         """Return the invitation of a code; count and report an unknown code."""
         sign_ins = self._sign_ins
         sign_ins.check_wait(request)
-        found = await asyncio.to_thread(find, sign_ins.store, code, sign_ins.control.now())
+        found = await asyncio.to_thread(sign_ins.store.invitation, code, sign_ins.control.now())
         if found is None:
             sign_ins.failed(request, "pairing", AccessError(UNKNOWN_CODE))
             raise ApiError(403, t("This code is unknown, was used already, or is too old."))

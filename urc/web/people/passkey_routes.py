@@ -14,13 +14,13 @@ from urc.access.grants import AccessError
 from urc.access.passkey_table import Passkey, PasskeyTable
 from urc.access.passkeys import Passkeys, RelyingParty, relying_party
 from urc.web.people.browser_sign_ins import BrowserSignIns, address_of, answers_refusals
-from urc.web.people.wire import (
+from urc.web.people.messages import SignInResult
+from urc.web.people.passkey_messages import (
     PasskeyAnswer,
     PasskeyChoice,
     PasskeyLine,
     PasskeyList,
     PasskeyName,
-    SignedIn,
 )
 from urc.web.serve.actors import actor_of
 from urc.web.serve.policy import parse_host
@@ -88,7 +88,7 @@ class PasskeyRoutes:
                 raise AccessError(
                     f"the rights of {person.name!r} have ended: sign in with the identity provider"
                 )
-            done = answer(SignedIn(person.name))
+            done = answer(SignInResult(person.name))
             await self._sign_ins.open(request, done, person, "passkey")
         except AccessError as error:
             self._sign_ins.failed(request, "passkey", error)

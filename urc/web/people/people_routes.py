@@ -8,9 +8,8 @@ from pathlib import Path
 
 from urc.web.people.account_routes import AccountRoutes
 from urc.web.people.admin_routes import AdminRoutes
-from urc.web.people.code_pages import CodePages
 from urc.web.people.link_maker import LinkMaker
-from urc.web.people.pages import PeoplePages
+from urc.web.people.pages import CodePages, PeoplePages
 from urc.web.people.pairing_routes import PairingRoutes
 from urc.web.people.pairings import Pairings
 from urc.web.people.sign_in_page import FurtherWays, SignInPages, Stoppable

@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc.access.grants import AccessError
-from urc.access.passphrase_check import WRONG, person_by_passphrase
+from urc.access.passphrases import WRONG, person_by_passphrase
 from urc.web.people.browser_sign_ins import BrowserSignIns, answers_refusals
 from urc.web.people.messages import SignInRequest, SignInResult
 from urc.web.serve.actors import actor_of

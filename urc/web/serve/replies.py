@@ -15,7 +15,17 @@ from starlette.responses import Response
 
 from urc.problems import UrcError
 
-__all__ = ["API", "ApiError", "Endpoint", "Failure", "answer", "answers_errors", "body_of", "told"]
+__all__ = [
+    "API",
+    "ApiError",
+    "Endpoint",
+    "Failure",
+    "answer",
+    "answers_errors",
+    "answers_errors_with",
+    "body_of",
+    "told",
+]
 
 Endpoint = Callable[..., Any]
 

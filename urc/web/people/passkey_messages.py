@@ -14,7 +14,6 @@ __all__ = [
     "PasskeyList",
     "PasskeyName",
     "ProviderAddress",
-    "SignedIn",
 ]
 
 
@@ -57,13 +56,6 @@ class PasskeyList(msgspec.Struct, frozen=True):
     """All passkeys of a person."""
 
     passkeys: list[PasskeyLine]
-
-
-class SignedIn(msgspec.Struct, frozen=True):
-    """The response to a successful sign-in."""
-
-    name: str
-    """Name of the person."""
 
 
 class ProviderAddress(msgspec.Struct, frozen=True):
