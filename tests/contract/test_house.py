@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from scripts.structure import modules, structure
+
 ROOT = Path(__file__).resolve().parents[2]
 NOT_OURS = {
     ".git", ".venv", "node_modules", "dist", "build", "__pycache__",
@@ -65,6 +67,13 @@ def test_python_files_stay_short() -> None:
     """A module that outgrows 600 lines has two subjects."""
     lengths = {path: text.count("\n") for path, text in texts() if path.endswith((".py", "dev"))}
     assert {path: lines for path, lines in lengths.items() if lines > MAX_LINES} == {}
+
+
+def test_classes_and_functions_have_one_meaning_each() -> None:
+    """No public name of a class stands for two things, and no function outgrows 60 lines."""
+    found = structure(modules(ROOT, "urc"))
+    assert found.public_twice == {}
+    assert found.long_functions == []
 
 
 @pytest.mark.parametrize("lock", ["package-lock.json", "scripts/chromium/package-lock.json"])

@@ -159,10 +159,11 @@ class AccessControl:
 
     def used(self, sign_in: str) -> None:
         """Note the use of a sign-in, which `watch` records."""
+        # Only in memory, because each request is a use, and a transaction waits for the disk.
         self._used[sign_in] = self.now()
 
     async def _record_use(self) -> None:
-        used, self._used = self._used, {}
+        used, self._used = self._used, {}  # uses during the write are recorded the next time
         if used and self.store is not None:
             await asyncio.to_thread(self.store.touch_all, used)
             await self.reload()
@@ -173,6 +174,7 @@ class AccessControl:
         Sockets of such sign-ins close, and a clock that is set back before the next start revives
         none of them.
         """
+        # First the uses that are only in memory: a sign-in in use must not end as an idle one.
         await self._record_use()
         if self.store is not None:
             now, directory = self.now(), self._stored
@@ -186,6 +188,8 @@ class AccessControl:
         self._next_end = min(ends, default=float("inf"))
         own = {self._program.id: self._program, **self._local}
         sign_ins = {**self._stored.sign_ins, **own}
+        # One assignment: no request sees half a change. The listeners come after it, because each
+        # socket asks the new directory whether its right still exists.
         self.directory = Directory(
             {**self._stored.principals, LOCAL_USER.id: LOCAL_USER},
             sign_ins,

@@ -116,6 +116,7 @@ class OidcSignIn:
             AccessError: the sign-in was refused, took too long or began in another browser, or the
                 provider's response is invalid.
         """
+        # The state ends here, whatever follows: each state has one attempt.
         flow = self._pending.finish(answer.get("state", ""), self._clock())
         if flow is None or not compare_digest(flow.binding, digest_of(binding)):
             raise AccessError(_LATE)

@@ -123,4 +123,5 @@ class OptionsFile:
 
 def is_loopback_host(host: str) -> bool:
     """Return whether a host of a URL is this machine, where plain HTTP is private."""
+    # A fixed list: any other name is resolved again at each request, and may then be elsewhere.
     return host in ("127.0.0.1", "localhost", "::1", "[::1]")

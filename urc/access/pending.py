@@ -52,6 +52,7 @@ class Pending(Generic[_Value]):
         """
         place = place_of(place)
         self._forget_old(now)
+        # A place at its limit loses its own oldest key, never that of another place.
         here = [key for key, entry in self._entries.items() if entry.place == place]
         if len(here) >= MOST_PENDING_HERE:
             del self._entries[here[0]]

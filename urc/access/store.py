@@ -118,6 +118,7 @@ class AccessStore:
 
     def _prepare(self) -> None:
         self._base.execute("PRAGMA foreign_keys = ON")
+        # Hashes of removed people are overwritten in the file, not only unlinked.
         self._base.execute("PRAGMA secure_delete = ON")
         with self._change():
             (version,) = self._base.execute("PRAGMA user_version").fetchone()
@@ -222,6 +223,8 @@ class AccessStore:
             AccessError: the principal is unknown.
         """
         with self._change():
+            # Devices and codes name their owner without a foreign key, because most have none.
+            # Sign-ins, passphrases and passkeys go with their principal (ON DELETE CASCADE).
             self._base.execute("DELETE FROM principals WHERE owner = ?", (principal,))
             self._base.execute("DELETE FROM invitations WHERE owner = ?", (principal,))
             self._update("DELETE FROM principals WHERE id = ?", principal)
@@ -272,6 +275,8 @@ class AccessStore:
             place[:LONGEST_NAME], agent[:LONGEST_NAME],
         )  # fmt: skip
         with self._change():
+            # Room for the new sign-in: first within the limit of its person, then within that of
+            # all. Tokens stay, because a program cannot sign in again by itself.
             self._base.execute(
                 "DELETE FROM sign_ins WHERE ends_at <= ? OR used_at + idle_s <= ?", (now, now)
             )
@@ -387,6 +392,7 @@ class AccessStore:
                 yield
                 return
             with self._readable():
+                # Immediate: of two processes that read first, one would fail at its first change.
                 self._base.execute("BEGIN IMMEDIATE")
                 try:
                     yield

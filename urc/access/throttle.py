@@ -46,6 +46,7 @@ class Throttle:
             bucket = self._bucket(now, key)
             self._buckets[key] = _Bucket(bucket.failures + 1, now)
             self._buckets.move_to_end(key)
+        # An attacker needs this many addresses before the failures of one are forgotten early.
         while len(self._buckets) > MOST:
             self._buckets.popitem(last=False)
 
@@ -63,5 +64,6 @@ class Throttle:
         bucket = self._bucket(now, key)
         if bucket.failures < FREE:
             return 0.0
+        # 1, 2, 4, … s: a person who mistypes hardly waits, and a program guesses twice a minute.
         pause_s = min(LONGEST_S, 2.0 ** (bucket.failures - FREE))
         return max(0.0, bucket.at + pause_s - now)

@@ -111,6 +111,7 @@ class AlarmList:
             record = self._put(record._replace(is_known=True))
         if condition:
             self._activate(signal, condition, value, now)
+            # Suppression that changed while the value was unknown takes effect only now.
             self._suppress(self.records[signal], now)
         elif record is not None and record.is_active:
             self._deactivate(record, value, now)
@@ -119,17 +120,19 @@ class AlarmList:
         record = self.records.get(signal)
         priority = self._limits[signal].attributes_of(condition).priority
         if record is not None and record.is_active:
+            # A chattering alarm that comes back before its end is counted, and not raised again.
             if self._settling.pop(signal, None) is not None:
                 record = self._put(record._replace(times=record.times + 1))
             if record.condition != condition:
                 text = text_of_value(value)
                 changed = record._replace(condition=condition, priority=priority, value=text)
+                # Only a change for the worse needs another acknowledgement.
                 if is_easing(record.condition, condition):
                     self._record(self._put(self._judged(changed)), "changed", now)
                 else:
                     self._raise(changed, now)
             return
-        self._flood_counts(now)
+        self._flood_counts(now)  # first: the record has the number of the burst that it may begin
         self._activations.setdefault(signal, deque(maxlen=CHATTER_TIMES)).append(now)
         self._number += 1
         fresh = AlarmRecord(
@@ -163,6 +166,7 @@ class AlarmList:
         self._return(record._replace(value=text_of_value(value)), now)
 
     def _return(self, record: AlarmRecord, now: float) -> None:
+        # No operator has to see a shelved or suppressed alarm, so none has to acknowledge it.
         is_unseen = not record.is_annunciated
         returned = record._replace(
             is_active=False,

@@ -397,6 +397,7 @@ class RemoteRobot(HubReadings):
         try:
             async with httpx2.AsyncClient(
                 verify=self._context if self._context is not None else True,
+                # A proxy of the environment cannot reach this computer, and would read the token.
                 trust_env=not self._address.is_loopback,
                 timeout=_POST_S,
             ) as client:

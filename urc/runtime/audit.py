@@ -6,7 +6,7 @@ in batches, with one transaction per batch. If the queue or the disk is full, en
 counted; the next written entry records the count. Entries beyond the limits are deleted, oldest
 first.
 
-Each row contains a hash of itself and the previous row, so `urc.runtime.audit_search.check` detects
+Each row contains a hash of itself and the previous row, so `urc.runtime.audit_check.check` detects
 a changed, removed or inserted row. The hashes do not protect against an attacker who rewrites the
 whole file; an exported copy in another place does.
 """

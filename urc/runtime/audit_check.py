@@ -56,6 +56,8 @@ def check(file: Path) -> str:
     with opened_for_reading(file) as base:
         if base is None:
             return ""
+        # After a deletion, the chain begins with the link that the entry about the deletion keeps.
+        # Older versions kept none: then the first row may have any number, and later gaps count.
         last, chain = _last_pruning(base)
         is_explained = bool(last) or is_migrated(base)
         for values in base.execute(select(base) + " ORDER BY id"):

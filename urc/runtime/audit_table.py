@@ -188,6 +188,7 @@ def _delete(base: sqlite3.Connection, until: int, now: float, reason: str) -> No
     before = base.execute(
         "SELECT id, chain FROM entries WHERE id < ? ORDER BY id DESC LIMIT 1", (until,)
     ).fetchone()
+    # In the same transaction, with the link before the new beginning: the rest proves itself.
     count = base.execute("DELETE FROM entries WHERE id < ?", (until,)).rowcount
     append(base, [_pruning(count, before[0], before[1], now, reason)])
 

@@ -203,6 +203,8 @@ class RobotAlarms:
         """Judge the samples whose alarm has changed; first, evaluate the suppression."""
         if self._inputs:
             self._update_inputs(samples)
+        # Most samples end at this comparison, so it has no call and no name of a field. Alarms of
+        # limits have no condition here. Several alarm states can share one alarm: they are judged.
         seen = self._seen
         for sample in samples:
             before = seen.get(sample[0])
@@ -297,6 +299,7 @@ class RobotAlarms:
 
     def _judge_connection(self, hub: Hub) -> None:
         """Judge the connections: one that was lost for `LOST_S` is an alarm."""
+        # An idle connection is not lost: only commands open it.
         now, links = self._clock.now(), hub.links.values()
         self._lost_s = {
             one.transport: self._lost_s.get(one.transport, now)

@@ -102,6 +102,7 @@ class AlarmNotifier:
             return
         with self._wakes:
             self._waiting += found
+            # The oldest are dropped: the newest alarms describe the present.
             excess = len(self._waiting) - MOST_WAITING
             if excess > 0:
                 del self._waiting[:excess]
@@ -148,6 +149,7 @@ class AlarmNotifier:
             self._pause(GATHER_S)
             while not self._is_closing:
                 now = self._now()
+                # By robot: the flood of one robot must not delay the alarms of another.
                 due = [one for one in self._waiting if self._next_at.get(one.robot, 0.0) <= now]
                 if due:
                     self._waiting = [one for one in self._waiting if one not in due]

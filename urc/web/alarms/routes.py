@@ -188,6 +188,7 @@ class AlarmCalls:
         signals = tuple(one.signal for one in done)
         if signals:
             self._recorder.alarm(actor_of(request, name), name, step, signals, **about)
+        # The change is in force already; without a confirmation, a restart may forget it.
         is_stored = self._store is not None and await asyncio.to_thread(
             self._store.settle, STORED_S
         )

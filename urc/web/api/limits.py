@@ -31,7 +31,7 @@ class RequestLimits:
     def count(self, who: str, now_s: float) -> None:
         """Count a request of `who`; raise `ApiError` 429 above the rate."""
         bucket = self._rates.pop(who, None) or TokenBucket(REQUESTS_PER_S, now_s)
-        self._rates[who] = bucket
+        self._rates[who] = bucket  # at the end: the first rate is the least recent one
         while len(self._rates) > MOST_VISITORS:
             self._rates.popitem(last=False)
         if not bucket.allow(now_s):

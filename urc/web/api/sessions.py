@@ -191,6 +191,7 @@ class ProgramSessions:
             ),
             None,
         )
+        # The same answer for a session of another visitor, so that no secret is confirmed.
         is_ours = (
             kept is not None
             and kept.session.service is service

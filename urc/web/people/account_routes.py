@@ -127,6 +127,7 @@ class AccountRoutes:
                 raise ApiError(403, t("The present passphrase is wrong."))
             kept = await asyncio.to_thread(hash_of, said.passphrase, name=who.name)
         await asyncio.to_thread(replace_passphrase, store, who.principal, kept)
+        # Before `reload`, after which this request has no identity: its own sign-in has ended, too.
         sign_ins.recorder.access_changed(actor_of(request), "people passphrase", name=who.name)
         done = answer(SignInResult(who.name))
         await self._control.reload()
@@ -155,7 +156,7 @@ class AccountRoutes:
         device = self._control.directory.principals.get(said.id)
         if device is None or not _is_person(who) or device.owner != who.principal:
             raise ApiError(404, t("That device is not yours, or was removed."))
-        actor = actor_of(request)
+        actor = actor_of(request)  # before the change, which may concern the visitor
         await asyncio.to_thread(self._sign_ins.store.remove, device.id)
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, "devices remove", name=device.name)
@@ -170,7 +171,7 @@ class AccountRoutes:
         found = self._control.directory.sign_ins.get(said.id)
         if found is None or found.principal not in self._own(visitor_of(request).identity):
             raise ApiError(404, t("This sign-in has ended already."))
-        actor = actor_of(request)
+        actor = actor_of(request)  # before the change, which may concern the visitor
         await self._control.end_sign_in(said.id)
         self._sign_ins.recorder.revoked(actor, "sign-in", name=actor.name, agent=found.agent)
         return answer(ResultLine(t("the sign-in has ended")))

@@ -123,6 +123,7 @@ class BrowserSignIns:
     @asynccontextmanager
     async def hashing(self) -> AsyncIterator[None]:
         """Wait for one of the few places to hash a passphrase; raise `ApiError` 503 if all wait."""
+        # Each attempt delays all later ones, so a crowd is refused at once.
         if self._waiting >= MOST_WAITING:
             raise ApiError(503, t("Too many people sign in at this moment: try again."))
         self._waiting += 1
@@ -163,6 +164,7 @@ class BrowserSignIns:
             ends_at=min(ends, default=None), idle_s=PERSON.idle_s,
             place=address_of(request), agent=agent_of(request),
         )  # fmt: skip
+        # After the new sign-in: if opening it fails, the browser keeps the one that it has.
         await self._end_previous(request)
         return self.admit(request, response, secret)
 

@@ -110,11 +110,12 @@ class ProxyMiddleware:
         secret = self._known(browser)
         if secret is not None:
             return secret
+        # A page loads tens of files; a refused person must not cost a transaction for each of them.
         at, reason = self._refused.get(browser.user, (float("-inf"), ""))
         if time.monotonic() - at < _REFUSED_S:
             raise AccessError(reason)
         async with self._lock:
-            secret = self._known(browser)
+            secret = self._known(browser)  # another request of this browser may have been faster
             if secret is None:
                 try:
                     secret = await self._opened(scope, user, proxy, agent)
