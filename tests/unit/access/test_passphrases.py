@@ -5,7 +5,7 @@ import time
 import pytest
 
 from urc.access.grants import AccessError
-from urc.access.passphrases import hash_of, is_stale, matches
+from urc.access.passphrases import _NEVER, hash_of, is_stale, matches
 
 GOOD = "correct horse battery"
 
@@ -49,6 +49,10 @@ def test_a_hash_with_older_parameters_is_due_for_another() -> None:
     assert matches("password", old)
     assert is_stale(old)
     assert not is_stale(hash_of(GOOD))
+
+
+def test_the_hash_for_unknown_names_costs_what_a_new_hash_costs() -> None:
+    assert not is_stale(_NEVER)
 
 
 def test_two_forms_of_the_same_letters_are_one_passphrase() -> None:
