@@ -62,7 +62,7 @@ class Manager:
             lambda name, robot: set(self.document_of(name, robot).interfaces),
             lambda: self.catalogue.refresh(force=True),
         )
-        self._parked: dict[str, Lock] = {}
+        self._packages: dict[str, Lock] = {}
         """Served version of each robot that is on the menu because its package is installed, by
         name."""
         self._offered: dict[str, str] = {}
@@ -89,21 +89,24 @@ class Manager:
         """Update the robots of installed packages, if the menu shows installed robots."""
         if not self.factory.robot_options.shows_installed:
             return
-        parked = await asyncio.to_thread(self.factory.parked)
-        for name in [one for one in self._parked if one not in parked]:
+        installed = await asyncio.to_thread(self.factory.installed_robots)
+        for name in [one for one in self._packages if one not in installed]:
             if self._waits(name):
                 continue
             await self.fleet.remove(name)
-            del self._parked[name]
-        for name, locks in parked.items():
-            if name in self.fleet.robots and name not in self._parked:
+            del self._packages[name]
+        for name, locks in installed.items():
+            if name in self.fleet.robots and name not in self._packages:
                 continue  # a robot with this name was given at the start
             await self._park(name, locks)
 
     async def _park(self, name: str, locks: list[Lock]) -> None:
         try:
             kept = await asyncio.to_thread(self.factory.settings_store(name).load)
-            lock, served = self.factory.chosen_version(locks, kept.version), self._parked.get(name)
+            lock, served = (
+                self.factory.chosen_version(locks, kept.version),
+                self._packages.get(name),
+            )
             if served in locks and not kept.version:
                 lock = served  # another program installed a newer version; the user chooses
             if name in self.fleet.robots and (served == lock or self._waits(name)):
@@ -114,11 +117,11 @@ class Manager:
                 self._renew(name, robot)
             else:
                 self.fleet.add(name, robot)
-            self._parked[name] = lock
+            self._packages[name] = lock
         except (UrcError, OSError) as error:
             text = str(error).strip().partition("\n")[0]
             self.fleet.broken[name] = BrokenRobot(name, text)
-            self._parked.setdefault(name, locks[-1])
+            self._packages.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
         """Return whether a robot is driven, which defers a change of its package."""
@@ -151,25 +154,25 @@ class Manager:
             self._renew(name, robot)
         else:
             self.fleet.add(name, robot)
-        if name in self._parked:
-            locks = (await asyncio.to_thread(self.factory.parked)).get(name)
+        if name in self._packages:
+            locks = (await asyncio.to_thread(self.factory.installed_robots)).get(name)
             if locks:
-                self._parked[name] = self.factory.chosen_version(locks, version)
+                self._packages[name] = self.factory.chosen_version(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
         """Return a robot's profile as its document defines it, without added interfaces."""
-        lock = self._parked.get(name)
+        lock = self._packages.get(name)
         if lock is not None:
             return self.factory.profile(lock)
         return self.factory.reload(robot.profile)
 
     def drivers(self) -> dict[str, str]:
         """Return the installed package of each robot, such as ``drivers/puppet 1.0.0``, by name."""
-        return {name: str(lock) for name, lock in self._parked.items()}
+        return {name: str(lock) for name, lock in self._packages.items()}
 
     def lock_of(self, name: str) -> Lock | None:
         """Return the installed package of a robot; None for a robot given at the start."""
-        return self._parked.get(name)
+        return self._packages.get(name)
 
     # Changes
 
@@ -299,7 +302,7 @@ class Manager:
         return old
 
     def _check_idle_of(self, key: PackageId) -> None:
-        for name, lock in self._parked.items():
+        for name, lock in self._packages.items():
             if lock.key == key or (name == key.name and key.kind in DRIVEN):
                 self.check_idle(name)
 
@@ -373,7 +376,7 @@ class Manager:
         except UrcError as error:
             fault = str(error)
         key, name = lock.key, lock.key.name
-        is_served = self._parked.get(name) == lock
+        is_served = self._packages.get(name) == lock
         page = f"/robots/{quote(name, safe='')}/"
         broken = self.fleet.broken.get(name) if is_served else None
         newest = next(iter(self.catalogue.versions(key)), None)
