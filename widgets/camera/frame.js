@@ -2,7 +2,7 @@
 /**
  * The placement of an image in its box. Pure: no DOM.
  *
- * @typedef {"contain" | "cover" | "fill" | "zoom"} Fit "zoom": as "cover", but at most half larger than whole
+ * @typedef {"contain" | "cover" | "fill" | "zoom"} Fit "zoom": as "cover", but at most 1.9 times as large as whole
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -16,8 +16,8 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Most enlargement of an image that fills the background: two thirds of it stay visible. */
-const MOST_ZOOM = 1.5;
+/** Most enlargement of an image that fills the background: half of it stays visible. */
+const MOST_ZOOM = 1.9;
 
 /**
  * @param {Size} picture

@@ -18,6 +18,8 @@ import { ringStep } from "./rays.js";
  * @property {Record<string, string> | undefined} ink
  */
 
+/** Radius from which on rings have a label, in pixels. */
+const LABELLED_RADIUS = 64;
 const FONT = "600 12px system-ui, sans-serif";
 
 export class Overlay {
@@ -64,9 +66,20 @@ function rings(pen, { most, near, stop, unit, ink }, radius) {
   pen.globalAlpha = 0.5;
   for (let distance = step; distance <= most * 1.001; distance += step) circle(distance);
   pen.globalAlpha = 1;
-  for (let distance = step; distance < most * 0.99; distance += step) {
-    pen.fillText(`${format(unit.factor(distance))} ${unit.symbol}`.trim(), 3, -(radius * distance) / most - 3);
+  // To the lower right, with an edge: what is ahead stays free, and dots do not cross the figures.
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  pen.strokeStyle = ink?.["raised"] ?? "";
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  const isRoomy = radius >= LABELLED_RADIUS;
+  for (let distance = step; isRoomy && distance < most * 0.99; distance += step) {
+    const words = `${format(unit.factor(distance))} ${unit.symbol}`.trim();
+    const at = (radius * distance * Math.SQRT1_2) / most;
+    pen.strokeText(words, at, at);
+    pen.fillText(words, at, at);
   }
+  pen.lineWidth = 1;
   for (const [distance, name, dash] of /** @type {[number, string, number[]][]} */ ([[near, "caution", [8, 5]], [stop, "alarm", [3, 3]]])) {
     if (!(distance > 0) || distance >= most) continue;
     pen.strokeStyle = ink?.[name] ?? "";

@@ -44,6 +44,29 @@ export function directions(fan) {
   return { right, down };
 }
 
+/** Share of the picture's radius that the farthest obstacle takes at most. */
+const FILL = 0.9;
+/** A picture this much too large for its obstacles is drawn in a larger scale; a little less is not. */
+const LOOSE = 0.75;
+
+/**
+ * Return the distance at the rim of a picture that its obstacles fill: a round number, at most `most`.
+ *
+ * @param {Float32Array} distances
+ * @param {number} most greatest distance that the sensor measures
+ * @param {number} near distance that must be visible
+ * @param {number} shown present distance at the rim: it stays while it fits, so that nothing flickers
+ */
+export function rimOf(distances, most, near, shown) {
+  let farthest = 0;
+  for (const distance of distances) if (distance < most && distance > farthest) farthest = distance;
+  if (farthest === 0) return most;
+  const least = Math.max(farthest, near) / FILL;
+  const step = ringStep(least, 8);
+  const wanted = Math.min(most, Math.ceil(least / step) * step);
+  return shown <= most && wanted <= shown && wanted > shown * LOOSE ? shown : wanted;
+}
+
 /**
  * Return the direction of each pixel of a square image around the sensor, in radians.
  *

@@ -12,7 +12,7 @@ import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, rimOf, sideOf,
 } from "./rays.js";
 
 /** Largest image in pixels: a slow device fills no more in a frame. */
@@ -75,6 +75,8 @@ class Scan {
     this.heading = NaN;
     this.serial = -1;
     this.most = 10;
+    /** Distance at the rim of the picture; 0 before the first sweep. */
+    this.rim = 0;
     this.distances = new Float32Array(0);
     /** @type {Fan} */
     this.fan = new Even(0, 0, 0);
@@ -193,11 +195,12 @@ class Scan {
     const { width, height } = this.room;
     if (!reading || width === 0 || height === 0) return;
     const isFlat = this.view === "graph" || this.view === "depth";
+    if (reading.serial !== this.serial) this.measure(Array.isArray(reading.value) ? reading.value : []);
     this.overlay.draw({
       width,
       height,
       view: this.view,
-      most: this.most,
+      most: this.rim,
       near: Number(this.options["near"] ?? 0),
       stop: Number(this.options["stop"] ?? 0),
       vehicle: this.options["vehicle"],
@@ -211,7 +214,7 @@ class Scan {
     const across = Math.max(16, Math.round((isFlat ? width : Math.min(width, height)) * scale));
     this.size(across, isFlat ? Math.max(16, Math.round(height * scale)) : across);
     this.makeTables(isFlat);
-    this.paint(Array.isArray(reading.value) ? reading.value : []);
+    this.paint();
     this.sheet.pen.putImageData(this.image, 0, 0);
     this.sheet.show();
   }
@@ -243,12 +246,17 @@ class Scan {
   }
 
   /** @param {readonly unknown[]} values */
-  paint(values) {
-    const { pixels, ink, tables, image, most } = this;
+  measure(values) {
+    const all = measured(values, Number(this.options["range_min"] ?? 0), this.most, this.distances);
+    const isPlan = this.view === "polar" || this.view === "map";
+    this.rim = isPlan ? rimOf(all, this.most, Number(this.options["near"] ?? 0), this.rim) : this.most;
+  }
+
+  paint() {
+    const { pixels, ink, tables, image, distances: all } = this;
     if (!ink) return;
     const near = Number(this.options["near"] ?? 0);
-    const limits = { most, near, stop: Number(this.options["stop"] ?? 0) };
-    const all = measured(values, Number(this.options["range_min"] ?? 0), most, this.distances);
+    const limits = { most: this.rim, near, stop: Number(this.options["stop"] ?? 0) };
     const { width, height } = image;
     if (all.length === 0) pixels.fill(0);
     else if (this.view === "polar") dots(pixels, width, all, tables.ways, limits, ink);

@@ -70,6 +70,11 @@
   const sticks = [...document.querySelectorAll(".joystick-face")].filter(isShown).map(boxOf);
   const sizes = sticks.map(({ width, height }) => Math.min(width, height));
   if (Math.max(0, ...sizes) - Math.min(...sizes) > SLACK) faults.push(`sticks of different sizes: ${sizes.join(", ")}`);
+  // A finger must reach the whole stick without scrolling, unless the widgets are below the background.
+  const isOver = document.querySelector('[data-place="ground"]') !== null && innerWidth >= 600;
+  for (const { bottom } of isOver ? sticks : []) {
+    if (bottom > Math.min(innerHeight, room.bottom) + SLACK) faults.push(`a stick is ${Math.round(bottom - innerHeight)} px below the screen`);
+  }
   const edges = sticks.map(({ left, right }) => Math.min(left, innerWidth - right));
   const gap = sticks.length > 1 ? Math.max(...sticks.map(({ left }) => left)) - Math.min(...sticks.map(({ right }) => right)) : null;
   const isOverGround = document.querySelector('[data-place="ground"]') !== null;

@@ -27,6 +27,8 @@ SCREENS = {
 }
 WIDE = ("phone, landscape", "tablet", "tablet, landscape", "desktop", "large")
 """Screens on which widgets are in front of the background."""
+STICK_PX = (143, 221)
+"""Sizes of a stick's face, with the rounding of half a pixel."""
 LANGUAGES = ("en-GB", "de-DE", "fr-FR", "it-IT")
 TEXT_PX = (16, 24)
 """Sizes of normal text in the browser's settings: usual, and large."""
@@ -101,6 +103,8 @@ def faults(seen: dict[str, Any], screen: str, is_large: bool) -> list[str]:
         return lines
     if seen["isPicture"] and seen["ground"] < 55:
         lines.append(f"the camera has {seen['ground']} % of the stage")
+    if any(size < STICK_PX[0] or size > STICK_PX[1] for size in seen["sizes"]):
+        lines.append(f"sticks are {seen['sizes']} px wide")
     if any(not 8 <= edge <= 32 for edge in seen["edges"]):
         lines.append(f"sticks are {seen['edges']} px from the side")
     if seen["gap"] is not None and seen["gap"] < 16:

@@ -161,6 +161,46 @@ def test_a_stick_in_a_lower_corner_reaches_down_next_to_stop() -> None:
     assert base.count("--urc-corner:1") == 2
 
 
+def rules_of(css: str, index: int) -> str:
+    """Return the rules of a cell."""
+    return css.split(f'[data-place="{index}"]{{')[1].split("}")[0]
+
+
+def test_buttons_above_a_corner_reach_down_with_it() -> None:
+    """They are a pile: the gaps between them are equal."""
+    slots = (Slot("dock", 2, 0), Slot("undock", 3, 0), Slot("a", 0, 0))
+    names = ("dock", "undock", "a")
+    base = over(Layout(4, 3, slots), *names, **dict.fromkeys(names, "button")).split("@media")[0]
+    corners = [rules_of(base, index)[-1] for index in (1, 2, 3)]
+    assert corners == ["1", "1", "0"]
+
+
+def test_a_row_of_buttons_stays_a_row() -> None:
+    """A button in the corner is as high as its neighbour, which is above STOP."""
+    slots = (Slot("on", 1, 0), Slot("off", 1, 1))
+    base = over(Layout(2, 4, slots), "on", "off", on="button", off="button").split("@media")[0]
+    assert "--urc-left:0px" in base
+    assert rules_of(base, 1).endswith("--urc-corner:0")
+
+
+def test_next_to_a_stick_only_the_first_row_grows() -> None:
+    slots = (Slot("dock", 1, 0), Slot("undock", 2, 0), Slot("move", 1, 2, 2, 1))
+    feet: dict[str, Footprint] = {"dock": "button", "undock": "button", "move": "stick"}
+    css = over(Layout(3, 3, slots), "dock", "undock", "move", **feet)
+    last = "max(var(--urc-target-drive))"
+    base, phone = css.split("@media")[0], css.split("@media (max-width: 37.499rem)")[1]
+    assert f"auto {last};" in base
+    assert f" {last};" in phone
+    assert "--urc-down:end" in rules_of(phone, 1)
+
+
+def test_views_give_way_to_sticks_on_a_phone_in_landscape() -> None:
+    slots = (Slot("map", 0, 2), Slot("move", 1, 2, 2, 1))
+    css = over(Layout(3, 3, slots), "map", "move", map="view", move="stick")
+    low = css.split("@media (max-height: 29.999rem)")[1]
+    assert "grid-template-rows:minmax(3.625rem,max-content) " in low
+
+
 def test_only_a_background_lets_a_button_reach_down_next_to_stop() -> None:
     """A button of a plain grid is as wide as its column, which may be under STOP."""
     wide = Layout(2, 3, (Slot("a", 1, 0),))

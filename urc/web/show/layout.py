@@ -14,7 +14,8 @@ slot is. Empty rows and columns take the remaining space: there the background i
 phone in portrait, the background takes the height that the widgets below leave.
 
 STOP is at the bottom of the screen, in the middle. Widgets end above STOP. In the lower corners,
-sticks reach down next to it, and over a background buttons and values do, too.
+sticks reach down next to it. Over a background, columns of buttons and values do, too, but a row of
+them stays a row.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -46,6 +47,12 @@ _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: as much as the widgets below leave."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that reach down next to STOP over a background; without one, only sticks do."""
+_SHRINKING = ("value", "instrument", "view", "list")
+"""Footprints whose rows give way to sticks and buttons on a phone in landscape."""
+_HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-drive)"}
+"""Heights of footprints that have the same height on all pages."""
+_SOFT = "minmax(3.625rem,max-content)"
+"""Height of such a row: at least that of a value."""
 _SIDES = ("start", "center", "end")
 
 
@@ -169,12 +176,43 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
     if canvas.background and len(used_rows) == grid.rows:
         used_rows = used_rows - {grid.rows // 2}  # no row is empty: the middle one grows
+    sizes = _tracks(grid.rows, used_rows, row, empty_row)
+    if canvas.background:
+        window = _PHONE_WINDOW if screen == PHONE else empty_row
+        sizes = _over_rows(grid, canvas, screen, _tracks(grid.rows, used_rows, row, window))
     if canvas.background and screen == PHONE:
-        rows = f"{_GROUND_ROW} {_tracks(grid.rows, used_rows, row, _PHONE_WINDOW)}"
-    else:
-        rows = _tracks(grid.rows, used_rows, row, empty_row)
-    columns = _tracks(grid.columns, used_columns, column, empty_column)
+        sizes = [_GROUND_ROW, *sizes]
+    rows = " ".join(sizes) or "none"
+    columns = " ".join(_tracks(grid.columns, used_columns, column, empty_column)) or "none"
     return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+
+
+def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str]) -> list[str]:
+    """Return the sizes of rows over a background.
+
+    Next to a slot of several rows, such as a stick, only the first row grows: the widgets next to
+    it are a pile. On a low screen, rows of views give way.
+    """
+    firm = _used((slot.row, slot.row_span) for slot in grid.slots if _is_firm(slot, canvas))
+    lower = _used((slot.row + 1, slot.row_span - 1) for slot in grid.slots)
+    rows = []
+    for place, size in enumerate(sizes):
+        if screen == SHORT and size == _OVER and place not in firm:
+            size = _SOFT
+        kinds = {
+            canvas.footprints.get(slot.name, "")
+            for slot in grid.slots
+            if slot.row_span == 1 and slot.row == place
+        }
+        if place in lower and kinds and kinds <= _HEIGHTS.keys():
+            size = "max(" + ",".join(_HEIGHTS[kind] for kind in sorted(kinds)) + ")"
+        rows.append(size)
+    return rows
+
+
+def _is_firm(slot: Slot, canvas: _Canvas) -> bool:
+    """Return whether a widget keeps its height on a low screen."""
+    return canvas.footprints.get(slot.name, "") not in _SHRINKING
 
 
 def _corners(grid: Layout, canvas: _Canvas) -> dict[str, str]:
@@ -191,9 +229,37 @@ def _is_corner(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
     """Return whether a slot reaches down next to STOP."""
     is_last = slot.row + slot.row_span == grid.rows
     is_edge = slot.column == 0 or slot.column + slot.column_span == grid.columns
-    reaching = _LOW_OVER if canvas.background else ("stick",)
-    reaches = canvas.footprints.get(slot.name) in reaching
-    return is_last and is_edge and reaches and slot.column_span < grid.columns
+    if not (is_last and is_edge and slot.column_span < grid.columns):
+        return False
+    footprint = canvas.footprints.get(slot.name)
+    if footprint == "stick":
+        return True
+    return bool(canvas.background) and footprint in _LOW_OVER and not _has_neighbour(slot, grid)
+
+
+def _has_neighbour(slot: Slot, grid: Layout) -> bool:
+    """Return whether another slot of the last row touches a slot."""
+    ends = (slot.column, slot.column + slot.column_span)
+    return any(
+        other.row + other.row_span == grid.rows
+        and (other.column + other.column_span == ends[0] or other.column == ends[1])
+        for other in grid.slots
+    )
+
+
+def _drops(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
+    """Return whether a slot is lower by the height of the dock: a corner, or in a pile on one."""
+    if _is_corner(slot, grid, canvas):
+        return True
+    if not canvas.background or _down(slot, grid) != "end":
+        return False
+    return any(
+        other.row == slot.row + slot.row_span
+        and (other.column, other.column_span) == (slot.column, slot.column_span)
+        and canvas.footprints.get(other.name) != "stick"
+        and _drops(other, grid, canvas)
+        for other in grid.slots
+    )
 
 
 def _across(slot: Slot, grid: Layout) -> str:
@@ -204,6 +270,13 @@ def _across(slot: Slot, grid: Layout) -> str:
 def _down(slot: Slot, grid: Layout) -> str:
     """Return the end of the screen at which a slot is: its upper half, else its lower half."""
     return "start" if 2 * slot.row + slot.row_span < grid.rows else "end"
+
+
+def _beside(slot: Slot, grid: Layout) -> bool:
+    """Return whether a slot of one row is next to a slot of several rows."""
+    return slot.row_span == 1 and any(
+        tall.row_span > 1 and tall.row <= slot.row < tall.row + tall.row_span for tall in grid.slots
+    )
 
 
 def _third(first: int, span: int, count: int) -> int:
@@ -217,13 +290,15 @@ def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> 
     row, column = slot.row + 1 + is_below, slot.column + 1
     area = f"{row}/{column}/{row + slot.row_span}/{column + slot.column_span}"
     across, down = _across(slot, grid), _down(slot, grid)
-    corner = int(_is_corner(slot, grid, canvas))
+    if is_below and _beside(slot, grid):
+        down = "end"
+    corner = int(_drops(slot, grid, canvas))
     sides = f"--urc-across:{across};--urc-down:{down};--urc-corner:{corner}"
     return f"display:grid;grid-area:{area};{sides}"
 
 
-def _tracks(count: int, used: set[int], size: str, empty: str) -> str:
-    return " ".join(size if place in used else empty for place in range(count)) or "none"
+def _tracks(count: int, used: set[int], size: str, empty: str) -> list[str]:
+    return [size if place in used else empty for place in range(count)]
 
 
 def _used(spans: Iterable[tuple[int, int]]) -> set[int]:
