@@ -22,6 +22,7 @@ from tests.e2e.processes import UrcProcess
 
 ROOT = Path(__file__).resolve().parents[1]
 MENU = "menu"
+DESKTOP = "desktop"
 ROBOTS = (MENU, *sorted(path.stem for path in (ROOT / "robots").glob("*.yaml")))
 SCREENS = {
     "desktop": (1440, 900),
@@ -35,6 +36,9 @@ THEMES = ("light", "dark", "sunlight", "night")
 LAYOUT = (ROOT / "tests/e2e/robots/page_layout.js").read_text("utf-8")
 LIVE = "() => document.querySelector('[data-badge]')?.dataset.state === 'good'"
 WAIT_MS = 30_000
+THEME = "(theme) => { document.documentElement.dataset.theme = theme; }"
+DRAWN_MS = 400
+"""Time for a new size and new colours, in milliseconds."""
 SETTLE_MS = 1500
 """Time for pictures of cameras and the first values, in milliseconds."""
 
@@ -61,17 +65,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 async def take(address: str, given: argparse.Namespace) -> None:
     """Take the pictures, and write the measures."""
     lines = ["| robot | screen | background | bars | faults |", "|---|---|---|---|---|"]
+    touched = [screen for screen in given.screens if screen != DESKTOP]
     async with running_browser() as browser:
-        for theme in given.themes:
-            for screen in given.screens:
-                for name, seen in (await pictures(browser, address, given, screen, theme)).items():
-                    if theme == "light":
-                        share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
-                        faults = "; ".join(seen["faults"]) or "none"
-                        lines.append(
-                            f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
-                        )
-                print(theme, screen, flush=True)
+        for screens in ([DESKTOP] if DESKTOP in given.screens else [], touched):
+            if screens:
+                lines += await pictures(browser, address, given, screens)
     (given.folder / "shares.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -83,23 +81,20 @@ def row(name: str, screen: str, seen: dict[str, Any]) -> str:
 
 
 async def pictures(
-    browser: Browser, address: str, given: argparse.Namespace, screen: str, theme: str
-) -> dict[str, dict[str, Any]]:
-    """Picture the pages on one screen in one theme; return the measures by robot."""
-    width, height = SCREENS[screen]
+    browser: Browser, address: str, given: argparse.Namespace, screens: Sequence[str]
+) -> list[str]:
+    """Picture the pages on some screens; return the rows of the table.
+
+    A page is loaded once: then its window and its theme change.
+    """
     context = await browser.new_context(
-        viewport={"width": width, "height": height},
-        has_touch="desktop" not in screen,
-        locale=LOCALE,
-        reduced_motion="reduce",
+        has_touch=DESKTOP not in screens, locale=LOCALE, reduced_motion="reduce"
     )
     await enter(context, address)
-    await context.add_init_script(
-        f"localStorage.setItem('urc-theme', '{theme}'); localStorage.setItem('urc-hints', 'seen')"
-    )
+    await context.add_init_script("localStorage.setItem('urc-hints', 'seen')")
     page = await context.new_page()
     start = address.split("?")[0].split("#")[0].rstrip("/")
-    found = {}
+    rows = []
     for name in given.robots:
         await page.goto(f"{start}/" if name == MENU else f"{start}/robots/{name}/")
         if name != MENU:
@@ -108,11 +103,18 @@ async def pictures(
             except Error:
                 print(f"{name} was not live in time", file=sys.stderr)
         await page.wait_for_timeout(SETTLE_MS)
-        await page.screenshot(path=given.folder / f"{name}-{screen}-{theme}.png")
-        if name != MENU:
-            found[name] = await page.evaluate(LAYOUT)
+        for screen in screens:
+            width, height = SCREENS[screen]
+            await page.set_viewport_size({"width": width, "height": height})
+            for theme in given.themes:
+                await page.evaluate(THEME, theme)
+                await page.wait_for_timeout(DRAWN_MS)
+                await page.screenshot(path=given.folder / f"{name}-{screen}-{theme}.png")
+            if name != MENU:
+                rows.append(row(name, screen, await page.evaluate(LAYOUT)))
+        print(name, *screens, flush=True)
     await context.close()
-    return found
+    return rows
 
 
 if __name__ == "__main__":

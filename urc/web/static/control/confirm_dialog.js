@@ -33,6 +33,17 @@ export function questionsOf(asks, args) {
   return asks.filter(({ argument, value }) => !argument || String(args[argument] ?? "") === value);
 }
 
+/**
+ * Show the remaining time as an edge of the question that shrinks, from the whole again at each call.
+ *
+ * @param {HTMLElement} box
+ * @param {number} limitMs
+ */
+function showTime(box, limitMs) {
+  box.style.setProperty("--urc-ask-time", `${limitMs}ms`);
+  box.dataset["time"] = box.dataset["time"] === "even" ? "odd" : "even"; // another name restarts the motion
+}
+
 export class ConfirmDialog {
   /**
    * @param {HTMLElement} heading element after which questions of other pages are shown
@@ -94,9 +105,12 @@ export class ConfirmDialog {
       };
       this.standing.add(refuse);
       end.signal.addEventListener("abort", () => this.standing.delete(refuse));
-      let expiring = window.setTimeout(() => refuse(t("Not confirmed")), isHazard ? HAZARD_MS : ASK_MS);
+      const limitMs = isHazard ? HAZARD_MS : ASK_MS;
+      let expiring = window.setTimeout(() => refuse(t("Not confirmed")), limitMs);
+      showTime(box, limitMs);
       const agree = () => {
         clearTimeout(expiring);
+        delete box.dataset["time"];
         yes.remove();
         no.hidden = !isTwo;
         text.textContent = isTwo ? t("Waiting for a second person") : t("… sending");
@@ -119,6 +133,7 @@ export class ConfirmDialog {
           touched: () => {
             clearTimeout(expiring);
             expiring = window.setTimeout(() => refuse(t("Not confirmed")), HAZARD_MS);
+            showTime(box, HAZARD_MS);
           },
           done: agree,
         });

@@ -13,6 +13,8 @@ import { t } from "../core/words.js";
 
 const CAUTION_MS = 100;
 const POOR_MS = 250;
+/** From here on in seconds: more digits are wider than their place. */
+const SECONDS_FROM_MS = 2000;
 /** Link states from worst to best: the worst link decides. @type {Link["state"][]} */
 const WORST_FIRST = ["lost", "silent", "connecting", "idle", "live"];
 
@@ -71,7 +73,7 @@ function summary(store, hasFailed) {
  */
 function tripOf(tripMs) {
   if (tripMs === null) return ["", ""];
-  const figure = `${Math.max(1, Math.round(tripMs))} ms`;
+  const figure = tripMs < SECONDS_FROM_MS ? `${Math.max(1, Math.round(tripMs))} ms` : `${Math.round(tripMs / 1000)} s`;
   if (tripMs > POOR_MS) return ["bad", `▲ ${figure}`];
   if (tripMs > CAUTION_MS) return ["caution", `◆ ${figure}`];
   return ["good", figure];
