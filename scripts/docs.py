@@ -1,6 +1,6 @@
-"""The command `./dev docs`: check that every link and picture of the Markdown files exists.
+"""The command `./dev docs`: check every link and picture of the Markdown files, and build the site.
 
-The check follows only links to files in the tree, so the check needs no network.
+The check follows only links to files in the tree, so the command needs no network.
 """
 
 import re
@@ -10,22 +10,27 @@ from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
+from scripts import site
+
 ROOT = Path(__file__).resolve().parents[1]
+GLOSSARY = ROOT / "docs" / "glossary.md"
 
 FENCE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(<?([^)\s>]+)>?[^)]*\)")
 HEADING = re.compile(r"^#{1,6}\s+(.+?)\s*#*$", re.MULTILINE)
+TERM = re.compile(r"^\| ([^|]+?) \|", re.MULTILINE)
 SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
 def main() -> int:
-    """Print a line for each broken link; return 1 if any link is broken."""
+    """Print each broken link, and build the site; return 1 if a link is broken or a page is bad."""
     pages = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
     faults = [fault for page in pages for fault in faults_of(page)]
     for fault in faults:
         print(fault)
     print(f"{len(pages)} pages, {len(faults)} broken links")
-    return 1 if faults else 0
+    code = site.main()
+    return 1 if faults or code else 0
 
 
 def faults_of(page: Path) -> Iterator[str]:
@@ -59,7 +64,16 @@ def anchors_of(page: Path) -> set[str]:
     """Return the anchors that code-hosting sites generate from a page's headings."""
     prose = FENCE.sub("", page.read_text("utf-8"))
     plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(prose))
-    return {heading.strip().replace(" ", "-") for heading in plain}
+    found = {heading.strip().replace(" ", "-") for heading in plain}
+    if page == GLOSSARY:
+        found |= {one for cell in TERM.findall(prose) for one in term_anchors(cell)}
+    return found
+
+
+def term_anchors(cell: str) -> list[str]:
+    """Return the anchors of a cell of the glossary with one term or several terms."""
+    plain = [re.sub(r"[^\w-]+", "-", term.lower()).strip("-") for term in cell.split(",")]
+    return [f"term-{term}" for term in plain]
 
 
 if __name__ == "__main__":

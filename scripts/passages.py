@@ -1,7 +1,8 @@
 """The extraction of prose from the tree: documentation, docstrings, and strings for people.
 
 `scripts/sentences.py` and `scripts/prose.py` use this module, so both have the same definition of
-prose. Generated pages (docs/reference, docs/robots), tests, code blocks and licences are excluded.
+prose. Generated pages (docs/reference, docs/robots, docs/gallery), tests, code blocks and licences
+are excluded.
 """
 
 import ast
@@ -14,7 +15,7 @@ import yaml
 
 __all__ = ["Passage", "Sentence", "is_read", "passages", "sentences"]
 
-GENERATED = ("docs/reference/", "docs/robots/")
+GENERATED = ("docs/reference/", "docs/robots/", "docs/gallery/")
 CODE_FOLDERS = ("urc/", "bench/", "scripts/")
 YAML_FOLDERS = ("robots/", "widgets/")
 PROSE_KEYS = ("title", "summary", "description", "help", "notes", "why")

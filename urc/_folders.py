@@ -5,6 +5,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from urc._environment import DATA_DIR
+
 __all__ = ["data_folder"]
 
 
@@ -15,7 +17,7 @@ def data_folder(environ: Mapping[str, str] = os.environ) -> Path:
     ``~/.local/share`` on Linux, in ``~/Library/Application Support`` on macOS, and in
     ``LOCALAPPDATA`` on Windows.
     """
-    if named := environ.get("URC_DATA_DIR"):
+    if named := environ.get(DATA_DIR):
         return Path(named).expanduser()
     if sys.platform == "win32":
         base = environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")

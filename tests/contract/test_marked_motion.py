@@ -12,8 +12,9 @@ from urc.config.rules.unmarked import why_it_moves
 from urc.model.driver import Argument, Command
 from urc.model.payload import WriteSpec
 
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
-CODES = ROOT / "urc" / "config" / "codes.md"
+CODES = ROOT / "docs" / "reference" / "codes.md"
+"""Made from the pages of `urc explain`, whose examples are wrong on purpose."""
+PAGES = sorted({ROOT / "README.md", *(ROOT / "docs").rglob("*.md")} - {CODES})
 MARKS = frozenset(("hold", "moves", "stop"))
 
 

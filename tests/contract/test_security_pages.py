@@ -21,10 +21,12 @@ def test_the_policy_says_how_to_report() -> None:
 
 
 def test_people_find_the_policy() -> None:
-    for page in ("README.md", "docs/security.md", "docs/advisories.md"):
-        assert "SECURITY.md)" in (ROOT / page).read_text("utf-8"), page
-    for page in ("security.md", "threats.md", "advisories.md"):
-        assert f"({page})" in (ROOT / "docs/README.md").read_text("utf-8"), page
+    assert "SECURITY.md)" in (ROOT / "README.md").read_text("utf-8")
+    assert "SECURITY.md" in (ROOT / "docs/project/vulnerabilities.md").read_text("utf-8")
+    for page in ("security.md", "advisories.md"):
+        assert "project/vulnerabilities.md)" in (ROOT / "docs" / page).read_text("utf-8"), page
+    for index, page in (("explanation", "security"), ("project", "advisories")):
+        assert f"(../{page}.md)" in (ROOT / f"docs/{index}/index.md").read_text("utf-8"), page
 
 
 def test_each_advisory_has_a_whole_row_and_a_line_in_the_changelog() -> None:

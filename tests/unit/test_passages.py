@@ -20,7 +20,7 @@ def found(path: str, text: str) -> list[tuple[int, str, str]]:
     [
         ("README.md", True),
         ("docs/language/flow.md", True),
-        ("docs/reference/driver.md", False),
+        ("docs/reference/codes.md", False),
         ("docs/robots/puppet.md", False),
         ("urc/config/codes.md", True),
         ("urc/web/app.py", True),

@@ -4,6 +4,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from urc._environment import DATA_DIR
 from urc._folders import data_folder
 from urc.private_files import make_private
 
@@ -25,6 +26,6 @@ def own_folder(named: Path | None = None) -> Path:
     folder = named or data_folder()
     with suppress(OSError):
         make_private(folder)
-        if named is None and "URC_DATA_DIR" not in os.environ:
+        if named is None and DATA_DIR not in os.environ:
             folder.chmod(_OWN)
     return folder

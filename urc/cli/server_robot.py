@@ -11,15 +11,13 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urc._environment import TOKEN
 from urc.cli.error_report import Misuse
 
 if TYPE_CHECKING:
     from urc.client.remote import RemoteRobot
 
-__all__ = ["TOKEN", "add_server", "opened_robot", "refuse_local_options"]
-
-TOKEN = "URC_TOKEN"  # noqa: S105 - the name of a variable
-"""Variable of the environment with the token, if no file is given."""
+__all__ = ["add_server", "opened_robot", "refuse_local_options"]
 
 
 def add_server(parser: argparse.ArgumentParser) -> None:

@@ -15,10 +15,10 @@ import time
 from types import FrameType
 from typing import Final
 
-__all__ = ["FATAL_S", "LONGEST_S", "PAUSE_S", "SWITCH", "RealTimePriority", "why_not"]
+from urc._environment import REAL_TIME
 
-SWITCH: Final = "URC_REAL_TIME"
-"""Environment variable; the value ``no`` disables real-time priority."""
+__all__ = ["FATAL_S", "LONGEST_S", "PAUSE_S", "RealTimePriority", "why_not"]
+
 LONGEST_S: Final = 0.1
 FATAL_S: Final = 2.0
 PAUSE_S: Final = 1.0
@@ -67,8 +67,8 @@ class RealTimePriority:
 
     def request(self) -> str:
         """Request real-time priority; return the reason for a refusal, or ""."""
-        if os.environ.get(SWITCH, "").lower() == "no":
-            return f"{SWITCH} is no"
+        if os.environ.get(REAL_TIME, "").lower() == "no":
+            return f"{REAL_TIME} is no"
         refusal = _ask()
         if not refusal:
             signal.signal(signal.SIGXCPU, self._is_too_long)
@@ -88,8 +88,8 @@ class RealTimePriority:
 
 def why_not() -> str:
     """Return the reason why a guard on this machine cannot get the priority, or ""."""
-    if os.environ.get(SWITCH, "").lower() == "no":
-        return f"{SWITCH} is no"
+    if os.environ.get(REAL_TIME, "").lower() == "no":
+        return f"{REAL_TIME} is no"
     refusal = _ask()
     if not refusal:
         _give_back()

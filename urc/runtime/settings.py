@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from urc._environment import SETTING
 from urc.expressions import ExpressionError, Template
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
@@ -34,7 +35,7 @@ _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
 
 def environment_name(name: str) -> str:
     """Return the environment variable of a setting; for ``robot-host``, ``URC_SET_ROBOT_HOST``."""
-    return "URC_SET_" + name.upper().replace("-", "_")
+    return SETTING + name.upper().replace("-", "_")
 
 
 def resolve_settings(

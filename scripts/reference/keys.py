@@ -1,23 +1,21 @@
-"""The generator of the language reference, docs/reference/*.md, from the schemas.
-
-``python -m scripts.reference`` writes the pages; a test fails if a page is outdated. The same
-schema produces the same bytes on every machine.
-"""
+"""Pages of the language's keys, from the schemas: one page for each family of keys."""
 
 import json
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["KINDS", "main", "missing", "page"]
+from scripts.reference.families import FAMILIES
 
-ROOT = Path(__file__).resolve().parents[1]
-FOLDER = ROOT / "docs" / "reference"
+__all__ = ["KINDS", "definitions", "index", "missing", "page", "read_schema"]
+
+ROOT = Path(__file__).resolve().parents[2]
 SCHEMAS = ROOT / "schemas"
 KINDS = ("robot", "driver", "interface", "widget")
+COMMON = "driver:anyTransport"
+"""Keys of every transport; a transport repeats only the keys that differ from these."""
 
 Schema = Mapping[str, Any]
 
@@ -46,17 +44,6 @@ _PLAIN = re.compile(r"[A-Za-z_][\w ./%-]*")
 _WORDS_OF_YAML = frozenset(("true", "false", "null", "yes", "no", "on", "off", "y", "n"))
 
 
-def main() -> int:
-    """Write every page, and print the names of changed pages."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    for kind in KINDS:
-        file, text = FOLDER / f"{kind}.md", page(kind)
-        if not file.is_file() or file.read_text("utf-8") != text:
-            file.write_text(text, encoding="utf-8")
-            print(f"written: {file.relative_to(ROOT)}")
-    return 0
-
-
 @cache
 def read_schema(name: str) -> Schema:
     """Return a schema by its file name."""
@@ -64,22 +51,60 @@ def read_schema(name: str) -> Schema:
     return schema
 
 
-def page(kind: str) -> str:
-    """Return the reference page of a kind of document."""
-    file = f"{kind}.schema.json"
-    schema = read_schema(file)
-    lines = [
-        f"# {schema['title']}",
-        "",
-        f"Every key of a document with `kind: {kind}`.",
-        "Made from the schema by `python -m scripts.reference`; do not edit it.",
-        "",
-        *_paragraph(schema["description"]),
-        *_keys(file, kind, schema),
-    ]
-    for name, inner in sorted(schema.get("$defs", {}).items()):
-        lines += [f"## {name}", "", *_described(file, inner), *_keys(file, name, inner)]
+@cache
+def definitions() -> dict[str, Schema]:
+    """Return each kind of document and each definition of a schema, as `driver:hold`."""
+    found: dict[str, Schema] = {}
+    for kind in KINDS:
+        schema = read_schema(f"{kind}.schema.json")
+        found[kind] = schema
+        found |= {f"{kind}:{name}": inner for name, inner in schema.get("$defs", {}).items()}
+    return found
+
+
+def page(name: str) -> str:
+    """Return the page of a family of keys."""
+    family = FAMILIES[name]
+    lines = [f"# {family.title}", "", *_paragraph(family.summary)]
+    for guide, text in family.guides.items():
+        lines += [f"Guide: [{text}](../../{guide}).", ""]
+    every = definitions()
+    for address in family.definitions:
+        kind, _, short = address.partition(":")
+        lines += _definition(f"{kind}.schema.json", short or kind, every[address])
     return "\n".join(lines).rstrip() + "\n"
+
+
+@cache
+def page_of() -> dict[str, str]:
+    """Return the page of each definition."""
+    return {one: name for name, family in FAMILIES.items() for one in family.definitions}
+
+
+def _definition(file: str, name: str, schema: Schema) -> Iterator[str]:
+    yield from (f"## {name}", "")
+    if file.partition(".")[0] == name:
+        yield from _paragraph(schema["description"])
+    else:
+        yield from _described(file, schema)
+    shared = _shared(file, name, schema)
+    yield from _keys(file, name, schema, shared)
+    if shared:
+        links = ", ".join(f"[{one}](connections.md#anytransport{one})" for one in shared)
+        yield from (f"Keys of every transport: {links}.", "")
+
+
+def _shared(file: str, name: str, schema: Schema) -> list[str]:
+    """Return the keys of a transport that every transport has, with the same meaning."""
+    common = definitions()[COMMON]
+    if schema is common or "type" not in schema.get("properties", {}):
+        return []
+    properties = common["properties"]
+    return [
+        key
+        for key, inner in schema["properties"].items()
+        if key in properties and inner == properties[key] and key != "type"
+    ]
 
 
 def missing() -> list[str]:
@@ -103,11 +128,12 @@ def _objects(kind: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
         yield f"{kind}: {name}", inner
 
 
-def _keys(file: str, owner: str, schema: Schema) -> Iterator[str]:
-    """Yield a section for each property."""
+def _keys(file: str, owner: str, schema: Schema, shared: list[str]) -> Iterator[str]:
+    """Yield a section for each property, except for the keys of every transport."""
     required = dict.fromkeys(_required_when_whole(schema), "yes, in a whole document")
     required |= dict.fromkeys(schema.get("required", ()), "yes")
-    for name, inner in schema.get("properties", {}).items():
+    own = {key: one for key, one in schema.get("properties", {}).items() if key not in shared}
+    for name, inner in own.items():
         yield from (f"### {owner}.{name}", "")
         yield from _described(file, inner, required.get(name, ""))
 
@@ -215,12 +241,10 @@ def _refers(schema: Schema) -> bool:
 
 def _link(file: str, reference: str) -> str:
     other, _, pointer = reference.partition("#")
+    kind = (other or file).partition(".")[0]
     name = pointer.rpartition("/")[2]
-    page_name = f"{other.partition('.')[0]}.md" if other and other != file else ""
-    if not name:
-        kind = (other or file).partition(".")[0]
-        return f"[{kind}]({kind}.md)"
-    return f"[{name}]({page_name}#{name.lower()})"
+    where = page_of()[f"{kind}:{name}" if name else kind]
+    return f"[{name or kind}]({where}.md#{(name or kind).lower()})"
 
 
 def _allowed(schema: Schema) -> str:
@@ -252,5 +276,22 @@ def _is_plain(text: str) -> bool:
     return is_word and text.lower() not in _WORDS_OF_YAML
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def index() -> str:
+    """Return the page with the list of all families."""
+    lines = [
+        "# Keys of documents by task",
+        "",
+        "Every key of the language, made from the schemas. Each page describes one family of keys.",
+        "",
+        "| page | keys |",
+        "|---|---|",
+        *(f"| [{one.title}]({name}.md) | {one.summary} |" for name, one in FAMILIES.items()),
+        "",
+        "```{toctree}",
+        ":hidden:",
+        "",
+        *FAMILIES,
+        "```",
+        "",
+    ]
+    return "\n".join(lines)

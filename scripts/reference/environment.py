@@ -1,0 +1,19 @@
+"""The page of environment variables, from the table in the code."""
+
+from collections.abc import Mapping
+
+from urc._environment import SYSTEM, VARIABLES
+
+__all__ = ["page"]
+
+
+def page() -> str:
+    """Return the page: one section for each variable."""
+    lines = ["# Environment variables", "", "Variables that `urc` reads.", ""]
+    lines += ["## Variables of URC", "", *_sections(VARIABLES)]
+    lines += ["## Variables of the system", "", *_sections(SYSTEM)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _sections(table: Mapping[str, str]) -> list[str]:
+    return [line for name, text in table.items() for line in (f"### {name}", "", text, "")]

@@ -1,0 +1,111 @@
+"""The page of expressions and filters. URC itself computes the result of each example."""
+
+from collections.abc import Mapping
+
+from scripts.reference.markdown import table
+from urc._number_types import NUMBER_NAMES
+from urc.expressions import compile_expression
+from urc.filters.table import FILTERS
+
+__all__ = ["EXAMPLES", "page"]
+
+EXAMPLES: Mapping[str, tuple[str, str]] = {
+    "abs": ("-3 | abs", "absolute value"),
+    "acos": ("1 | acos", "arc cosine, in radians"),
+    "asin": ("0 | asin", "arc sine, in radians"),
+    "atan": ("0 | atan", "arc tangent, in radians"),
+    "atan2": ("0 | atan2(1)", "angle of the point (argument, value), in radians"),
+    "b64decode": ("'T0s=' | b64decode", "bytes of a Base64 text"),
+    "b64encode": ("'OK' | b64encode", "Base64 text of bytes or text"),
+    "ceil": ("1.2 | ceil", "next higher whole number"),
+    "checksum": ("'123456789' | checksum('crc16-modbus')", "checksum by its algorithm"),
+    "column": ("[[1, 2], [3, 4]] | column(1)", "one column of rows"),
+    "cos": ("0 | cos", "cosine of radians"),
+    "cut": ("['ab', 'cd'] | cut(1)", "part of each text, from start to stop"),
+    "ddmm": ("'4730.0' | ddmm", "degrees of a number DDMM.mmm, as in NMEA"),
+    "default": ("none | default(5)", "another value for a missing value"),
+    "degrees": ("0 | degrees", "degrees of radians"),
+    "digits": ("'0102' | digits(2, 10)", "numbers of a fixed count of digits"),
+    "exp": ("0 | exp", "exponential function"),
+    "first": ("[4, 5] | first", "first element"),
+    "fixed": ("2 | fixed(2)", "a fixed count of decimals"),
+    "float": ("'2.5' | float", "number of a text"),
+    "floor": ("1.8 | floor", "next lower whole number"),
+    "hex": ("255 | hex(4)", "hexadecimal digits, at least as many as given"),
+    "hexbytes": ("'4f4b' | hexbytes", "bytes of hexadecimal digits"),
+    "hexdigits": ("'OK' | utf8 | hexdigits", "hexadecimal digits of bytes"),
+    "hmac_sha256": ("'x' | hmac_sha256('key')", "keyed hash, for logins by challenge"),
+    "hypot": ("3 | hypot(4)", "length of a vector"),
+    "int": ("'42' | int", "whole number of a text"),
+    "iso": ("0 | iso", "time in ISO format, from seconds since 1970"),
+    "join": ("[1, 2] | join(',')", "text of a list"),
+    "last": ("[4, 5] | last", "last element"),
+    "length": ("'abc' | length", "number of elements or characters"),
+    "log": ("1 | log", "natural logarithm"),
+    "lower": ("'ON' | lower", "lower-case letters"),
+    "max": ("[4, 5] | max", "largest number"),
+    "md5": ("'x' | md5", "MD5 hash, in hexadecimal digits"),
+    "min": ("[4, 5] | min", "smallest number"),
+    "numbers": ("'4f4b' | hexbytes | numbers('u8')", "all numbers of one type in bytes"),
+    "pad": ("7 | pad(4)", "leading zeros, or another character"),
+    "pitch": ("[0, 0, 0, 1] | pitch", "pitch of a quaternion [x, y, z, w], in radians"),
+    "radians": ("0 | radians", "radians of degrees"),
+    "ramp": ("0 | ramp(0.5, 3)", "numbers that increase by a step"),
+    "replace": ("'a-b' | replace('-', '_')", "text with replaced parts"),
+    "roll": ("[0, 0, 0, 1] | roll", "roll of a quaternion [x, y, z, w], in radians"),
+    "round": ("2.345 | round(1)", "rounded number"),
+    "sha1": ("'x' | sha1", "SHA-1 hash, in hexadecimal digits"),
+    "sha256": ("'x' | sha256", "SHA-256 hash, in hexadecimal digits"),
+    "sign": ("1.5 | fixed(2) | sign", "a sign, even for positive numbers"),
+    "signed": ("255 | signed(8)", "signed value of a two's complement number"),
+    "sin": ("0 | sin", "sine of radians"),
+    "split": ("'a,b' | split(',')", "parts of a text"),
+    "sqrt": ("9 | sqrt", "square root"),
+    "string": ("1.0 | string", "text of a value"),
+    "sum": ("[4, 5] | sum", "sum of numbers"),
+    "tan": ("0 | tan", "tangent of radians"),
+    "trim": ("' a ' | trim", "text without spaces at both ends"),
+    "unpack": ("'0102' | hexbytes | unpack('u16be', 0)", "number of a type at a byte offset"),
+    "upper": ("'on' | upper", "upper-case letters"),
+    "utf8": ("'OK' | utf8", "bytes of a text"),
+    "yaw": ("[0, 0, 0, 1] | yaw", "yaw of a quaternion [x, y, z, w], in radians"),
+}
+"""An example and the meaning of each filter."""
+_OPERATORS = (
+    ("`+` `-` `*` `/` `//` `%` `**`", "arithmetic; `+` also joins texts or bytes"),
+    ("`==` `!=` `<` `<=` `>` `>=`", "comparisons"),
+    ("`and` `or` `not`", "logic"),
+    ("`x in [1, 2]`", "membership"),
+    ("`'a' if test else 'b'`", "choice"),
+    ("`x[0]` `x[1:3]`", "element and slice"),
+    ("`x is defined` `x is none`", "whether a value is there"),
+    ("`x is number` `x is string`", "type"),
+    ("`x is match('^E')` `x is search('E')`", "pattern at the start, or anywhere"),
+)
+
+
+def page() -> str:
+    """Return the page: operators, filters, number types."""
+    lines = ["# Expressions and filters", ""]
+    lines += [
+        "Templates (`send:`) and expressions (`when:`, `set:`, `requires:`) use a subset of Jinja.",
+        "Expressions have no loops, no statements and no access to Python.",
+        "",
+        "## Operators and tests",
+        "",
+    ]
+    lines += table(("written", "meaning"), _OPERATORS)
+    lines += ["## Filters", "", "URC computed each result on this page.", ""]
+    for name, (example, meaning) in sorted(EXAMPLES.items()):
+        result = compile_expression(example, allows_bytes=True).evaluate({})
+        lines += [f"### {name}", "", f"{meaning[0].upper()}{meaning[1:]}.", ""]
+        lines += [f"- arguments: {_arguments(name)}", f"- example: `{example}` is `{result!r}`", ""]
+    numbers = ", ".join(f"`{name}`" for name in sorted(NUMBER_NAMES))
+    lines += ["## Number types as filters", "", "Each number type is a filter that returns bytes:"]
+    lines += [numbers + ".", ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _arguments(name: str) -> str:
+    least, most = FILTERS[name].arity
+    return str(least) if least == most else f"{least} to {most}"

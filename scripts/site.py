@@ -1,0 +1,47 @@
+"""The builder of the documentation site: `python -m scripts.site`, part of `./dev docs`.
+
+Sphinx reads docs/ and writes .site/html. A warning is an error: a dead reference, a page in no
+table of contents, a heading that skips a level. The build needs no network.
+"""
+
+import shutil
+import sys
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+__all__ = ["HTML", "build"]
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / ".site"
+HTML = FOLDER / "html"
+PROCESSES = "2"
+
+
+def main() -> int:
+    """Build the site, in the folder of the command line if one is given; return the exit code."""
+    folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
+    code = build(folder)
+    print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
+    return code
+
+
+def build(html: Path = HTML) -> int:
+    """Build the site from nothing; print the warnings; return the exit code of Sphinx.
+
+    A cache of pages would hide warnings about a page that did not change, such as a link to a
+    heading that another page lost.
+    """
+    from sphinx.cmd.build import build_main  # a second that the check of links does not need
+
+    shutil.rmtree(html, ignore_errors=True)
+    options = ("--builder=html", "--fail-on-warning", "--keep-going", f"--jobs={PROCESSES}")
+    trees = f"--doctree-dir={html.parent / 'doctrees'}"
+    with redirect_stdout(StringIO()):
+        code = build_main([*options, "--fresh-env", trees, str(ROOT / "docs"), str(html)])
+    # The playground adds its files here, after a good build: scripts.playground.build(html)
+    return int(code)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""The Sphinx extension of the documentation site: marks, glossary anchors, and llms.txt."""
+
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+from scripts.docs import term_anchors
+from scripts.site_names import place_of
+
+__all__ = ["setup"]
+
+GLOSSARY = "glossary"
+DOCUMENT = "urc-document"
+"""The class of a block with a whole document; the playground adds its button there."""
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect the extension to Sphinx."""
+    app.connect("doctree-read", mark_documents)
+    app.connect("doctree-read", anchor_terms)
+    app.connect("doctree-resolved", link_names)
+    app.connect("html-page-context", shorten_navigation, priority=400)  # before the theme's own
+    app.connect("build-finished", write_llms)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def mark_documents(_: Sphinx, tree: nodes.document) -> None:
+    """Give each fenced block with a whole document its class."""
+    for block in tree.findall(nodes.literal_block):
+        if block.get("language") == "yaml" and block.astext().startswith("urc: 1\n"):
+            block["classes"].append(DOCUMENT)
+
+
+def anchor_terms(app: Sphinx, tree: nodes.document) -> None:
+    """Give each term of the glossary an anchor: `#term-signal`."""
+    if app.env.docname != GLOSSARY:
+        return
+    slugs = app.env.metadata[GLOSSARY].setdefault("myst_slugs", {})
+    for row in tree.findall(nodes.row):
+        cells = [cell.astext() for cell in row.findall(nodes.entry)]
+        if len(cells) != 4 or isinstance(row.parent, nodes.thead):
+            continue
+        for anchor in term_anchors(cells[0]):
+            row["ids"].append(anchor)
+            slugs[anchor] = (row.line or 0, anchor, cells[0])
+
+
+def link_names(app: Sphinx, tree: nodes.document, name: str) -> None:
+    """Link the first mention of each command, variable, code and key to the reference."""
+    if name.startswith(("reference/", "decisions/")):
+        return
+    seen = set()
+    for literal in list(tree.findall(nodes.literal)):
+        place = place_of(literal.astext())
+        if place is None or place in seen or is_within(literal, nodes.reference, nodes.title):
+            continue
+        seen.add(place)
+        address = f"{app.builder.get_relative_uri(name, place.page)}#{place.anchor}"
+        link = nodes.reference("", "", internal=True, refuri=address, classes=["urc-name"])
+        literal.replace_self(link)
+        link += literal
+
+
+def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
+    """Return whether a node is inside a node of one of the kinds."""
+    while (node := node.parent) is not None:
+        if isinstance(node, kinds):
+            return True
+    return False
+
+
+def shorten_navigation(
+    app: Sphinx, name: str, _template: str, context: dict[str, Any], _tree: nodes.document | None
+) -> None:
+    """Give the theme the chapters, with the pages of the current chapter only.
+
+    Sphinx resolves the whole table of contents for each page: two minutes for 270 pages.
+    """
+    here = {name, *ancestors(app, name)}
+
+    def listed(parent: str, level: int) -> str:
+        items = []
+        for page in app.env.toctree_includes.get(parent, []):
+            is_current = page in here
+            mark = " current" if is_current else ""
+            address = "#" if page == name else context["pathto"](page)
+            inner = listed(page, level + 1) if is_current else ""
+            link = f'<a class="reference internal{mark}" href="{address}">{title(app, page)}</a>'
+            items.append(f'<li class="toctree-l{level}{mark}">{link}{inner}</li>')
+        return f"<ul>{''.join(items)}</ul>" if items else ""
+
+    context["toctree"] = lambda **_: listed(app.config.root_doc, 1)
+
+
+def ancestors(app: Sphinx, name: str) -> list[str]:
+    """Return the pages above a page in the table of contents, nearest first."""
+    includes = app.env.toctree_includes
+    parents = {child: page for page, inner in includes.items() for child in inner}
+    found = []
+    while (name := parents.get(name, "")) and name not in found:
+        found.append(name)
+    return found
+
+
+def title(app: Sphinx, name: str) -> str:
+    """Return the title of a page as HTML."""
+    return escape(title_of(app, name))
+
+
+def write_llms(app: Sphinx, fault: Exception | None) -> None:
+    """Write llms.txt, the list of all pages for language models, and the pages as Markdown."""
+    if fault is not None or app.builder.name != "html":
+        return
+    root = app.config.root_doc
+    lines = [f"# {app.config.project}", "", f"> {summary_of(app, root)}", ""]
+    for name in app.env.toctree_includes.get(root, []):
+        lines += [f"## {title_of(app, name)}", ""]
+        for page in [name, *below(app, name)]:
+            source = f"_sources/{page}.md.txt"
+            lines.append(f"- [{title_of(app, page)}]({source}): {summary_of(app, page)}")
+        lines.append("")
+    (Path(app.outdir) / "llms.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
+def below(app: Sphinx, name: str) -> list[str]:
+    """Return the pages below a page in the table of contents, in order."""
+    found: list[str] = []
+    for page in app.env.toctree_includes.get(name, []):
+        found += [page, *below(app, page)]
+    return found
+
+
+def title_of(app: Sphinx, name: str) -> str:
+    """Return the title of a page."""
+    return app.env.titles[name].astext()
+
+
+def summary_of(app: Sphinx, name: str) -> str:
+    """Return the first paragraph of a page, on one line."""
+    tree = app.env.get_doctree(name)
+    first = next(tree.findall(nodes.paragraph), None)
+    return " ".join(first.astext().split()) if first else ""

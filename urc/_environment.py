@@ -1,0 +1,34 @@
+"""The environment variables of URC, in one table.
+
+`python -m scripts.reference` writes docs/reference/environment.md from this table.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+__all__ = ["DATA_DIR", "REAL_TIME", "SETTING", "SYSTEM", "TOKEN", "VARIABLES"]
+
+DATA_DIR: Final = "URC_DATA_DIR"
+TOKEN: Final = "URC_TOKEN"  # noqa: S105 - the name of a variable
+REAL_TIME: Final = "URC_REAL_TIME"
+SETTING: Final = "URC_SET_"
+"""Start of the names of all variables that hold a setting of a robot."""
+
+VARIABLES: Final[Mapping[str, str]] = {
+    DATA_DIR: "Data folder with people, keys, packages, settings and logs. `--data-dir` overrides"
+    " the variable.",
+    f"{SETTING}NAME": "Value of the setting `name` of a robot, in upper case with `_` in place of"
+    " `-`. `--set` overrides the variable.",
+    TOKEN: "Token for a robot of a server, for `urc watch`, `urc send` and `urc record` with"
+    " `--server`.",
+    REAL_TIME: "`no` disables the real-time priority of the guard.",
+}
+"""Meaning of each variable of URC."""
+SYSTEM: Final[Mapping[str, str]] = {
+    "DISPLAY": "Without `DISPLAY` and `WAYLAND_DISPLAY`, `urc demo` opens no browser on Linux.",
+    "LOCALAPPDATA": "On Windows, the folder of the default data folder.",
+    "NO_COLOR": "If the variable is not empty, URC prints no progress with control characters.",
+    "SSH_AUTH_SOCK": "The SSH agent with the keys of transports with `agent: true`.",
+    "XDG_DATA_HOME": "On Linux, the folder of the default data folder.",
+}
+"""Effect of variables that other programs use as well."""
