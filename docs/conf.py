@@ -30,6 +30,9 @@ myst_enable_extensions = ["attrs_inline", "colon_fence"]
 myst_heading_anchors = 4
 """Headings down to this level get the anchors that code-hosting sites give them."""
 
+smartquotes = False
+"""Two hyphens are an option of the command line, not a dash."""
+
 html_theme = "furo"
 html_title = f"URC {__version__}"
 html_static_path = ["_static"]

@@ -13,6 +13,26 @@ from scripts.site_names import place_of
 __all__ = ["setup"]
 
 GLOSSARY = "glossary"
+REFERENCE = (
+    *("reference/keys/", "reference/cli", "reference/codes", "reference/filters"),
+    *("reference/http-api", "reference/websocket", "reference/python-client"),
+    *("reference/environment", "reference/limits", "gallery/robots", "gallery/widgets"),
+)
+MADE_BY = (
+    (REFERENCE, "python -m scripts.reference"),
+    (("robots/",), "python -m scripts.robot_pictures"),
+    (("licences",), "python -m scripts.licences"),
+)
+"""Starts of the names of generated pages, with the command that writes them."""
+LABELS = {
+    '<aside class="sidebar-drawer"': '<aside aria-label="Chapters" class="sidebar-drawer"',
+    '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
+    '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
+    'class="content-icon-container"': (
+        'class="content-icon-container" role="navigation" aria-label="Page"'
+    ),
+}
+"""Parts of the theme's markup, with what axe misses."""
 DOCUMENT = "urc-document"
 """The class of a block with a whole document; the playground adds its button there."""
 
@@ -24,13 +44,17 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("doctree-resolved", link_names)
     app.connect("html-page-context", shorten_navigation, priority=400)  # before the theme's own
     app.connect("build-finished", write_llms)
+    app.connect("build-finished", label_pages)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def mark_documents(_: Sphinx, tree: nodes.document) -> None:
     """Give each fenced block with a whole document its class."""
+    texts = [block.astext() for block in tree.findall(nodes.literal_block)]
     for block in tree.findall(nodes.literal_block):
-        if block.get("language") == "yaml" and block.astext().startswith("urc: 1\n"):
+        text = block.astext()
+        is_piece = any(text in other and len(text) < len(other) for other in texts)
+        if block.get("language") == "yaml" and text.startswith("urc: 1\n") and not is_piece:
             block["classes"].append(DOCUMENT)
 
 
@@ -92,7 +116,19 @@ def shorten_navigation(
             items.append(f'<li class="toctree-l{level}{mark}">{link}{inner}</li>')
         return f"<ul>{''.join(items)}</ul>" if items else ""
 
+    if context.get("body") and name not in ("genindex", "search"):
+        context["body"] += source_line(context, name)
     context["toctree"] = lambda **_: listed(app.config.root_doc, 1)
+
+
+def source_line(context: dict[str, Any], name: str) -> str:
+    """Return the line at the end of a page that says where to correct the page."""
+    for starts, command in MADE_BY:
+        if name.startswith(starts):
+            return f'<p class="urc-source">Made by <code>{command}</code> from the code.</p>'
+    address = context["pathto"](f"_sources/{name}.md.txt", True)
+    file = f'<a href="{address}">docs/{name}.md</a>'
+    return f'<p class="urc-source">To correct this page, edit {file}.</p>'
 
 
 def ancestors(app: Sphinx, name: str) -> list[str]:
@@ -123,6 +159,18 @@ def write_llms(app: Sphinx, fault: Exception | None) -> None:
             lines.append(f"- [{title_of(app, page)}]({source}): {summary_of(app, page)}")
         lines.append("")
     (Path(app.outdir) / "llms.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
+def label_pages(app: Sphinx, fault: Exception | None) -> None:
+    """Give landmarks of the theme their names, and let keys scroll wide blocks of code."""
+    if fault is not None or app.builder.name != "html":
+        return
+    for name in app.env.all_docs:
+        file = Path(app.builder.get_outfilename(name))
+        text = file.read_text("utf-8")
+        for before, after in LABELS.items():
+            text = text.replace(before, after)
+        file.write_text(text, encoding="utf-8")
 
 
 def below(app: Sphinx, name: str) -> list[str]:

@@ -50,7 +50,7 @@ QUESTIONS = {
     "URC_DATA_DIR": "reference/environment",
     "environment variables": "reference/environment",
     "urc validate options": "reference/cli",
-    "hold to run": "explanation/stopping",
+    "hold to run": "language/flow",
     "login sequence": "language/flow",
     "ssh tunnel": "how-to/ssh-robot",
     "backup": "backup",
