@@ -10,6 +10,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from tests.documentation import ROOT, blocks
+from tests.e2e.dashboards import until
 from tests.e2e.ports import free_port
 from urc import connect
 
@@ -75,7 +76,6 @@ async def test_a_machine_is_read_and_driven(tmp_path: Path, name: str, framer: F
                     while 500 not in written:
                         stick(wanted=50.0)
                         await asyncio.sleep(0.05)
-            while written[-1] != 0:
-                await asyncio.sleep(0.05)
+            await until(lambda: written[-1] == 0)
     finally:
         await server.shutdown()
