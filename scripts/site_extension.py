@@ -166,7 +166,7 @@ def label_pages(app: Sphinx, fault: Exception | None) -> None:
     if fault is not None or app.builder.name != "html":
         return
     for name in app.env.all_docs:
-        file = Path(app.builder.get_outfilename(name))
+        file = Path(app.outdir) / f"{name}.html"
         text = file.read_text("utf-8")
         for before, after in LABELS.items():
             text = text.replace(before, after)
@@ -183,7 +183,7 @@ def below(app: Sphinx, name: str) -> list[str]:
 
 def title_of(app: Sphinx, name: str) -> str:
     """Return the title of a page."""
-    return app.env.titles[name].astext()
+    return str(app.env.titles[name].astext())
 
 
 def summary_of(app: Sphinx, name: str) -> str:

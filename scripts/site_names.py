@@ -39,7 +39,7 @@ def place_of(literal: str) -> Place | None:
 @cache
 def names() -> Mapping[str, Place]:
     """Return the place of each name. A key that several definitions share has none."""
-    found = {}
+    found: dict[str, Place] = {}
     for page in ("cli", "environment", "codes"):
         found |= {one: Place(f"reference/{page}", make_id(one)) for one in headings(page, "##+")}
     pages = [f"keys/{file.stem}" for file in sorted((REFERENCE / "keys").glob("*.md"))]

@@ -14,6 +14,7 @@ __all__ = ["Limit", "limits", "page"]
 ROOT = Path(__file__).resolve().parents[2]
 _WORDS = ("Maximum ", "Longest ", "Largest ")
 _KIB = 1024
+_PLAIN = 1e5
 
 
 class Limit(NamedTuple):
@@ -69,4 +70,4 @@ def _shown(limit: Limit) -> str:
     if "byte" in limit.meaning and value >= _KIB and value % _KIB == 0:
         size = int(value) // _KIB
         return f"{size // _KIB} MiB" if size % _KIB == 0 else f"{size} KiB"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if value < _PLAIN else f"{int(value)}"

@@ -79,9 +79,10 @@ def _texts(message: type) -> Mapping[str, str]:
     body = definition.body if isinstance(definition, ast.ClassDef) else []
     found = {}
     for field, text in pairwise(body):
-        is_text = isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
-            found[field.target.id] = plain(inspect.cleandoc(text.value.value))
+        if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
+            continue
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+            found[field.target.id] = plain(inspect.cleandoc(str(text.value.value)))
     return found
 
 
