@@ -124,9 +124,7 @@ async def test_widgets_are_whole_and_look_as_they_did(
             keep(name, pictures)
     for name, pictures in seen.items():
         before = kept(name)
-        assert before.keys() == pictures.keys(), (
-            f"{name} has no picture yet: run with --update"
-        )
+        assert before.keys() == pictures.keys(), f"{name} has no picture yet: run with --update"
         faults += [
             f"{name} looks otherwise in {theme}"
             for theme, grid in pictures.items()
