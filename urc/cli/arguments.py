@@ -25,6 +25,7 @@ __all__ = [
     "add_port",
     "add_profile",
     "add_settings",
+    "describe",
     "duration",
     "is_loopback",
     "load",
@@ -58,19 +59,21 @@ class _ArgumentParser(argparse.ArgumentParser):
 
 def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Namespace | int:
     """Return the parsed arguments, or the exit code after help text or an error message."""
-    parser = _ArgumentParser(
-        prog=f"urc {verb}",
-        description=summary[0].upper() + summary[1:] + ".",
-        epilog=f"example:\n  {module.EXAMPLE}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    module.add_arguments(parser)
+    parser = _ArgumentParser(prog=f"urc {verb}", allow_abbrev=False)
+    describe(parser, summary, module)
     try:
         # Options may stand between words, as in `urc watch PROFILE --for 5s SIGNAL`.
         return parser.parse_intermixed_args(words)
     except _Exit as ended:
         return int(ended.args[0])
+
+
+def describe(parser: argparse.ArgumentParser, summary: str, module: Any) -> None:
+    """Give a parser the description, the example and the arguments of a subcommand."""
+    parser.description = summary[0].upper() + summary[1:] + "."
+    parser.epilog = f"example:\n  {module.EXAMPLE}"
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    module.add_arguments(parser)
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,8 @@ from contextlib import suppress
 from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
 from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
+from urc.cli.output import complain
+from urc.cli.progress import Progress
 from urc.cli.start_addresses import ReadyDashboard
 from urc.cli.tls_options import add_tls, tls_of
 from urc.problems import UrcError
@@ -19,6 +21,7 @@ from urc.shipped import shipped
 
 EXAMPLE = "urc demo"
 USUAL_PORT = 8080
+_ALL_NETWORKS = "0.0.0.0"  # noqa: S104 - what --phone asks for; devices pair or sign in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,6 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-browser", action="store_true", help="print the address without opening a browser"
     )
+    parser.add_argument(
+        "--phone",
+        action="store_true",
+        help="accept devices on this network, and print a QR code that pairs one of them",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,20 +48,30 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.config.load import load_profile
     from urc.runtime.registries import built_in_catalog
 
+    if arguments.phone and is_loopback(arguments.host):
+        arguments.host = _ALL_NETWORKS
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(
             "--dev shows all traffic, so it is allowed only on this machine;"
-            f" found --host {arguments.host}"
+            f" found {'--phone' if arguments.phone else f'--host {arguments.host}'}"
         )
     catalog = built_in_catalog()
     files = sorted(shipped("robots").glob("*.yaml"))
-    profiles = [load_profile(file, catalog) for file in files]
+    profiles = []
+    with Progress("loading robots", len(files)) as progress:
+        for file in files:
+            progress.step(file.stem)
+            profiles.append(load_profile(file, catalog))
     if not profiles:
         raise UrcError(f"{shipped('robots')} contains no robots")
 
     def announce(ready_dashboard: ReadyDashboard) -> None:
         first, *others = ready_dashboard.lines()
         print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
+        if arguments.phone:
+            _invite_phone(ready_dashboard.others)
+        elif sys.stdout.isatty() and is_loopback(arguments.host):
+            print("on a phone: 'urc demo --phone' prints a QR code", flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
             # Every user of this machine can read the command line of a browser.
             url = ready_dashboard.address_once
@@ -67,6 +85,16 @@ def run(arguments: argparse.Namespace) -> int:
         is_dev=arguments.dev,
         faults=arguments.faults,
     )
+
+
+def _invite_phone(address: str) -> None:
+    """Print a link and a QR code that pair one device, which may then drive."""
+    from urc.cli.devices import invite_device
+    from urc.cli.identities import opened, roles_in
+
+    with opened(None) as store:
+        invite_device(store, address.rstrip("/"), roles_in(["drive"]))
+    complain("another device: 'urc devices pair' in a second terminal")
 
 
 def _port(arguments: argparse.Namespace) -> int:

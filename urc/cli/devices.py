@@ -27,6 +27,8 @@ from urc.cli.output import complain
 from urc.problems import UrcError
 
 if TYPE_CHECKING:
+    from urc.access.directory import Principal
+    from urc.access.grants import Grant
     from urc.access.store import AccessStore
 
 EXAMPLE = "urc devices pair --name 'Tablet in the lab' --role drive@#lab"
@@ -100,8 +102,8 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
 def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Print a link that pairs one device."""
     from urc.access.administration import principal_named
-    from urc.access.store import Invitation, parse_name
-    from urc.cli.invitation_links import print_link, server_address
+    from urc.access.store import parse_name
+    from urc.cli.invitation_links import server_address
 
     words_of(arguments, "devices")
     address = server_address(store.file.parent, arguments.address)
@@ -112,6 +114,30 @@ def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
     name = parse_name(arguments.name) if arguments.name else ""
     if name and principal_named(store.directory(), "device", name):
         raise UrcError(f"a device has the name {name!r} already")
+    invite_device(store, address, roles, name=name, owner=owner)
+    return 0
+
+
+def invite_device(
+    store: "AccessStore",
+    address: str,
+    roles: "tuple[Grant, ...]",
+    *,
+    name: str = "",
+    owner: "Principal | None" = None,
+) -> None:
+    """Print a link and a QR code that pair one device.
+
+    Args:
+        store: the open store.
+        address: address of the server for other devices; "" if no server is running.
+        roles: roles of the device; empty for a device with an owner.
+        name: suggested name; "" lets the device choose.
+        owner: person whose device pairs.
+    """
+    from urc.access.store import Invitation
+    from urc.cli.invitation_links import print_link
+
     now = time.time()
     invitation = Invitation("device", name, roles, owner.id if owner else "", now + _VALID_S)
     code = store.invite(invitation, now=now)
@@ -119,7 +145,6 @@ def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
     record(store, "devices pair", name=name, roles=rights)
     print_link(store.file.parent, address, "pair", code)
     complain(f"pairs one device ({rights}): works once, valid for {minutes_of(_VALID_S)}")
-    return 0
 
 
 def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:

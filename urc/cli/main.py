@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-__all__ = ["VERBS", "main", "module_of"]
+__all__ = ["GROUPS", "VERBS", "main", "module_of"]
 
 VERBS: dict[str, str] = {
     "demo": "emulate all shipped robots and open the dashboard in a browser",
@@ -43,7 +43,28 @@ VERBS: dict[str, str] = {
     "discover": "find robots on the network, serial ports and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",
+    "completion": "print the script that completes this command in bash, zsh or fish",
 }
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "drive": ("demo", "serve", "watch", "send", "record", "replay", "trust", "discover"),
+    "write and check documents": (
+        *("validate", "explain", "simulate", "docs", "resolve", "migrate", "new", "schema"),
+    ),
+    "packages": (*("search", "install", "update", "list", "remove", "bundle", "publish", "repo"),),
+    "people and rights": ("people", "devices", "tokens", "sign-ins", "audit"),
+    "this machine": ("doctor", "backup", "restore", "completion"),
+}
+"""Headings of the help text, each with its subcommands."""
+
+_FIRST_STEPS: dict[str, str] = {
+    "urc demo": "drive emulated robots in the browser",
+    "urc demo --phone": "the same, with a QR code for a phone on this network",
+    "urc serve FILE": "drive your robot, described in a YAML file",
+    "urc validate FILE": "check this file, without the robot",
+    "urc doctor": "check this machine",
+}
+"""Commands for new users."""
 
 _INTERRUPTED = 130
 """Exit code of a shell after SIGINT: 128 + 2."""
@@ -55,6 +76,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     Exit codes are 0 for success, 1 for problems or failure, and 2 for invalid use.
     """
     _mend_streams()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions of its line
+        from urc.cli.completion import answer
+
+        answer()
     words = list(sys.argv[1:] if argv is None else argv)
     try:
         code = _answer(words)
@@ -72,7 +97,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _answer(words: list[str]) -> int:
     if not words:
-        print(_usage(), file=sys.stderr)
+        print(_first_steps(), file=sys.stderr)
         return 2
     verb, *rest = words
     if verb == "help" and rest:
@@ -105,15 +130,32 @@ def module_of(verb: str) -> str:
     return f"urc.cli.{verb.replace('-', '_')}"
 
 
+def _first_steps() -> str:
+    width = max(map(len, _FIRST_STEPS))
+    lines = (f"  {command:<{width}}   {text}" for command, text in _FIRST_STEPS.items())
+    return "\n".join(
+        (
+            "URC: describe a robot in one YAML file, and drive it from any browser.",
+            "",
+            *lines,
+            "",
+            "'urc --help' lists all subcommands. 'urc SUBCOMMAND --help' explains one.",
+        )
+    )
+
+
 def _usage() -> str:
     width = max(map(len, VERBS))
-    lines = [f"  {name:<{width}}  {text}" for name, text in VERBS.items()]
+    lines = [
+        line
+        for title, verbs in GROUPS.items()
+        for line in ("", f"{title}:", *(f"  {verb:<{width}}  {VERBS[verb]}" for verb in verbs))
+    ]
     return "\n".join(
         (
             "usage: urc SUBCOMMAND …",
             "",
             "Describe a robot in one YAML file, and drive it from any browser.",
-            "",
             *lines,
             "",
             "'urc SUBCOMMAND --help' explains a subcommand. 'urc --version' prints the version.",

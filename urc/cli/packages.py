@@ -1,7 +1,6 @@
 """Code shared by the package subcommands: store, repositories, confirmation and installed names."""
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -240,11 +239,10 @@ def keep_in_use(lock: "Lock") -> None:
 
 def _warn(line: str) -> None:
     """Print one line to standard error, in red on a terminal."""
+    from urc.cli.colours import painted
     from urc.problems import printable
 
-    is_plain = not sys.stderr.isatty() or bool(os.environ.get("NO_COLOR"))
-    text = printable(line)
-    print(text if is_plain else f"\x1b[1;31m{text}\x1b[0m", file=sys.stderr, flush=True)
+    print(painted(printable(line), "bad", sys.stderr), file=sys.stderr, flush=True)
 
 
 def signer(file: Path | None = None) -> "Signer | None":

@@ -6,14 +6,17 @@ command on every save.
 
 import argparse
 import os
+import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import profile_path
+from urc.cli.colours import coloured_problem, is_terminal
 from urc.cli.output import complain, json_text
-from urc.problems import Problem, UrcError, has_errors, to_json, to_text
+from urc.problems import Problem, UrcError, has_errors, to_json
 
 if TYPE_CHECKING:
+    from urc.cli.progress import Progress
     from urc.config.load import WidgetFolder
     from urc.model.profile import Profile
     from urc.model.widget import Widget
@@ -73,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = list(dict.fromkeys(map(_document_in, arguments.paths)))
     if arguments.watch:
         return _watch(paths, arguments)
-    report = _examine(paths, with_tests=not arguments.no_tests)
+    report = _examined(paths, with_tests=not arguments.no_tests)
     with suppress(BrokenPipeError):  # keeps the exit code, as in `… | head`
         _print(report, arguments, indent=2)
     return _exit_code(report, arguments)
@@ -91,7 +94,7 @@ def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
     try:
         while True:
             watched = FileWatcher(paths)  # created before reading, so that no change is missed
-            report = _examine(paths, with_tests=not arguments.no_tests)
+            report = _examined(paths, with_tests=not arguments.no_tests)
             watched.add(report.looked_at)
             code = _exit_code(report, arguments)
             _print(report, arguments)
@@ -104,7 +107,17 @@ def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
         return code
 
 
-def _examine(paths: list[str], *, with_tests: bool) -> _Report:
+def _examined(paths: list[str], *, with_tests: bool) -> _Report:
+    """Check the documents; on a terminal, many documents show a status line."""
+    if not paths[1:] or not is_terminal(sys.stderr):
+        return _examine(paths, with_tests=with_tests)
+    from urc.cli.progress import Progress
+
+    with Progress("checking", len(paths)) as progress:
+        return _examine(paths, with_tests=with_tests, progress=progress)
+
+
+def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" = None) -> _Report:
     from urc.config.load import WidgetFolder, check
     from urc.runtime.coverage import measure
     from urc.runtime.document_tests import exercise
@@ -113,6 +126,8 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
 
     report, catalog, registry = _Report(), built_in_catalog(), WidgetFolder(shipped("widgets"))
     for path in paths:
+        if progress is not None:
+            progress.step(path)
         report.files += 1
         checked = check(path, catalog, _widgets_of_package(path) or registry)
         report.add(list(checked.problems))
@@ -193,7 +208,7 @@ def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = 
         if arguments.format == "github":
             from urc.config.report_formats import to_github as tell
         else:
-            tell = to_text
+            tell = coloured_problem
         for problem in report.problems:
             print(tell(problem), flush=True)
         if arguments.coverage:

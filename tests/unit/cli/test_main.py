@@ -28,16 +28,25 @@ from urc.testing.profile import text as text_form
 Output = pytest.CaptureFixture[str]
 
 
-def test_no_words_is_wrong_use_and_help_is_not(capsys: Output) -> None:
-    """Both show the verbs; only the answer to a question goes to standard output."""
+def test_no_words_is_wrong_use_and_says_what_to_do_next(capsys: Output) -> None:
+    """A few first steps, each with a subcommand that exists."""
     assert main([]) == 2
-    output, usage = capsys.readouterr()
+    output, steps = capsys.readouterr()
     assert output == ""
+    named = re.findall(r"^  urc ([a-z]+)", steps, re.MULTILINE)
+    assert named[0] == "demo"
+    assert VERBS.keys() > {*named}
+    assert "'urc --help' lists all subcommands" in steps
+
+
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"]])
+def test_help_lists_every_subcommand(words: list[str], capsys: Output) -> None:
+    """The answer to a question goes to standard output."""
+    assert main(words) == 0
+    usage, errors = capsys.readouterr()
+    assert errors == ""
     for verb, summary in VERBS.items():
         assert re.search(rf"^  {verb} +{re.escape(summary)}$", usage, re.MULTILINE)
-    for words in (["--help"], ["-h"], ["help"]):
-        assert main(words) == 0
-        assert capsys.readouterr() == (usage, "")
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -1,0 +1,67 @@
+"""Colours of terminal output, which follow https://no-color.org and the terminal itself.
+
+Layer 6. A colour never carries a meaning of its own: each coloured word also says it.
+"""
+
+import os
+import sys
+from collections.abc import Mapping
+from typing import Literal, TextIO
+
+from urc.problems import Problem, to_text
+
+__all__ = ["Style", "coloured_problem", "has_colours", "is_terminal", "painted"]
+
+Style = Literal["bad", "warning", "good", "quiet", "title"]
+_CODES: dict[str, str] = {
+    "bad": "1;31",
+    "warning": "33",
+    "good": "32",
+    "quiet": "2",
+    "title": "1",
+}
+"""Parameters of the control sequence SGR (ECMA-48, 8.3.117)."""
+
+
+def is_terminal(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
+    """Return whether a stream is a terminal that understands control sequences."""
+    try:
+        return stream.isatty() and environment.get("TERM") != "dumb"
+    except ValueError:  # closed
+        return False
+
+
+def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
+    """Return whether output to a stream may be coloured.
+
+    A `NO_COLOR` that is not empty turns colours off. A `FORCE_COLOR` that is not empty turns
+    colours on for pipes and files, as the logs of CI servers need it.
+    """
+    if environment.get("NO_COLOR"):
+        return False
+    return bool(environment.get("FORCE_COLOR")) or is_terminal(stream, environment)
+
+
+def painted(text: str, style: Style, stream: TextIO | None = None) -> str:
+    """Return the text in a style, or unchanged if the stream (default: output) has no colours."""
+    if not text or not has_colours(stream or sys.stdout):
+        return text
+    return f"\x1b[{_CODES[style]}m{text}\x1b[0m"
+
+
+def coloured_problem(problem: Problem) -> str:
+    """Return a problem as text for standard output, with colours if it has any."""
+    text = to_text(problem)
+    if not has_colours(sys.stdout):
+        return text
+    style: Style = "bad" if problem.severity == "error" else "warning"
+    headline, *others = text.splitlines()
+    word = f" {problem.severity} {problem.code}"
+    lines = [headline.replace(word, f" {painted(word[1:], style)}", 1)]
+    for line in others:
+        before, carets = line.rstrip("^"), line.lstrip(" |")
+        if carets and not carets.strip("^"):
+            lines.append(before + painted(carets, style))
+        else:
+            lines.append(painted(line, "good") if line.startswith("     = ") else line)
+    return "\n".join(lines)

@@ -1,0 +1,88 @@
+"""A status line for long work on a terminal: the present step and its duration.
+
+Layer 6. The line is on standard error, and is erased at the end. Without a terminal, nothing is
+printed, so logs and pipes stay clean.
+"""
+
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import Self
+
+from urc.cli.colours import is_terminal, painted
+from urc.problems import printable
+
+__all__ = ["Progress"]
+
+_FIRST_S = 0.4
+"""Time before the first status line, in seconds: short work shows none."""
+_EVERY_S = 0.2
+_COLUMNS = 78
+_ERASE = "\r\x1b[K"
+
+
+class Progress:
+    """A context with a status line; `step` sets the text of the line.
+
+    A thread prints the line, because the work may block. All output of the command must wait until
+    the context ends.
+
+    Args:
+        title: name of the work, such as ``loading robots``.
+        total: number of steps; 0 if unknown.
+    """
+
+    def __init__(self, title: str, total: int = 0) -> None:
+        self._title = title
+        self._total = total
+        self._done = 0
+        self._detail = ""
+        self._start_s = time.monotonic()
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        """Start the status line, if standard error is a terminal."""
+        if is_terminal(sys.stderr):
+            self._thread = threading.Thread(target=self._work, name="progress", daemon=True)
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Erase the status line."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def step(self, detail: str = "") -> None:
+        """Begin the next step, such as the robot ``puppet``."""
+        self._done += 1
+        self._detail = detail
+
+    def line(self) -> str:
+        """Return the present status line, without control sequences."""
+        parts = [self._title]
+        if self._total:
+            parts.append(f"{self._done} of {self._total}")
+        if self._detail:
+            parts.append(printable(self._detail))
+        seconds = time.monotonic() - self._start_s
+        if seconds >= 1:
+            parts.append(f"{seconds:.0f} s")
+        return " · ".join(parts)[:_COLUMNS]
+
+    def _work(self) -> None:
+        is_shown = False
+        wait_s = _FIRST_S
+        while not self._ended.wait(wait_s):
+            print(_ERASE + painted(self.line(), "quiet", sys.stderr), end="", file=sys.stderr)
+            sys.stderr.flush()
+            is_shown, wait_s = True, _EVERY_S
+        if is_shown:
+            print(_ERASE, end="", file=sys.stderr, flush=True)
