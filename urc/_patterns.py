@@ -35,6 +35,8 @@ __all__ = [
     "literal_prefix",
 ]
 
+_OTHER_GROUP: Final = re.compile(r"\(?\?<([A-Za-z_]\w*)>")
+"""A named group as JavaScript, PCRE and .NET write it."""
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
 """Maximum ``n`` of a repeat ``{n}`` in RE2."""
@@ -155,7 +157,9 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
         words = str(error).lower()
         raise PatternError(f"{words}: write a backslash before it: {text!r}") from None
     except re.error as error:
-        raise PatternError(f"not a pattern: {error.msg}", error.pos or 0) from None
+        named = _OTHER_GROUP.match(text, error.pos or 0)
+        said = f"a named group begins with (?P<{named[1]}>" if named else error.msg
+        raise PatternError(f"not a pattern: {said}", error.pos or 0) from None
     except (RecursionError, OverflowError):
         raise PatternError("the pattern is nested too deeply or repeats too often") from None
     _check_dialect(tree, text)

@@ -240,6 +240,14 @@ def _block(at: _Clue) -> SyntaxFault | None:
     return None
 
 
+def _with_space(text: str) -> str:
+    """Return the hint for a line without ``: ``, such as ``type:tcp``."""
+    key, colon, value = text.partition(":")
+    if colon and re.fullmatch(r"[a-z][a-z0-9_-]*", key) and not value.startswith("//"):
+        return f"put a space after the colon: '{key}: {value}'"
+    return "write 'key: value', with a space after the colon"
+
+
 def _second_colon(at: _Clue) -> SyntaxFault:
     before = re.search(r": +\S", at.text[: at.column])
     if before is not None:
@@ -258,7 +266,7 @@ def _second_colon(at: _Clue) -> SyntaxFault:
             len(above) - len(above.lstrip()),
             "no-colon",
             "a line without ': ' between key and value",
-            "write 'key: value', with a space after the colon",
+            _with_space(above.strip()),
         )
     return SyntaxFault(
         at.line,

@@ -1,9 +1,10 @@
 """Hints with known words for a misspelt word."""
 
+import re
 from collections.abc import Iterable
 from typing import Final
 
-__all__ = ["did_you_mean", "listed"]
+__all__ = ["closest", "did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
@@ -18,15 +19,23 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
         known: the known words.
         noun: plural noun for the known words, such as ``signals``.
     """
-    from difflib import get_close_matches  # 6 ms that only a broken document pays
-
     names = sorted(known)
-    near = get_close_matches(word[:80].lower(), names, 1, 0.6)
+    bare = re.fullmatch(r"\{\{\s*([\w-]+)\s*\}\}", word)
+    if bare and bare[1] in names:
+        return f"write the name without braces: {bare[1]}"
+    near = closest(word, names)
     if near:
         return f"did you mean '{near[0]}'?"
     if not names:
         return f"there are no {noun} to choose from" if noun else ""
     return f"{noun or 'known'}: {listed(names, None if noun == 'keys' else _MOST)}"
+
+
+def closest(word: str, names: Iterable[str]) -> list[str]:
+    """Return the most similar name, or an empty list if none is similar."""
+    from difflib import get_close_matches  # 6 ms that only a broken document pays
+
+    return get_close_matches(word[:80].lower(), sorted(names), 1, 0.6)
 
 
 def listed(names: Iterable[str], most: int | None = _MOST) -> str:

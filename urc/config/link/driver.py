@@ -294,14 +294,21 @@ def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
 
 def _check_arguments_used(part: Node, send: WriteSpec, problems: Problems) -> None:
     for name, inner in part.named("args").items():
-        if name not in send.names:
-            problems.warn(
-                inner,
-                "unused-argument",
-                f"nothing sends the argument {name!r}",
-                key=True,
-                hint=f"write {{{{ {name} }}}} in 'send', or remove the argument",
-            )
+        if name in send.names:
+            continue
+        text = f"nothing sends the argument {name!r}"
+        if _has_single_braces(part, name):
+            hint = f"write two braces: {{{{ {name} }}}}"
+            problems.warn(part, "unused-argument", text, at="send", hint=hint)
+        else:
+            hint = f"write {{{{ {name} }}}} in 'send', or remove the argument"
+            problems.warn(inner, "unused-argument", text, key=True, hint=hint)
+
+
+def _has_single_braces(part: Node, name: str) -> bool:
+    """Return whether 'send' has the argument in single braces, as in an f-string of Python."""
+    send = part.get("send")
+    return send is not None and isinstance(send.data, str) and f"{{{name}}}" in send.data
 
 
 def link_simulator(

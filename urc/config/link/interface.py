@@ -10,7 +10,7 @@ from urc.config.node import Node, Problems
 from urc.config.parse.widget import WidgetFolder
 from urc.config.shape.check import check_options
 from urc.config.sources import Sources
-from urc.config.spelling_suggestions import did_you_mean, listed
+from urc.config.spelling_suggestions import closest, did_you_mean, listed
 from urc.model.driver import Driver
 from urc.model.interface import Interface, OutputBinding, WidgetUse
 from urc.model.units import conversion, quantity_of
@@ -213,8 +213,10 @@ def _check_required(
     part: Node, widget: Widget, bound: Mapping[str, object], driver: Driver, problems: Problems
 ) -> None:
     tried = part.named("bind")  # their problems are already reported
+    ports = (*widget.inputs, *widget.outputs)
+    meant = {close for key in tried if key not in ports for close in closest(key, ports)}
     for port in (*widget.inputs.values(), *widget.outputs.values()):
-        if port.is_required and port.name not in bound and port.name not in tried:
+        if port.is_required and port.name not in {*bound, *tried, *meant}:
             problems.error(
                 part,
                 "unbound-input",

@@ -53,7 +53,15 @@ def link_output(
 def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> OutputBinding:
     names: dict[str, str] = {}
     for source, inner in part.named("args").items():
-        if source not in port.arguments:
+        if source not in port.arguments and inner.data in port.arguments:
+            problems.error(
+                inner,
+                "unknown-argument",
+                f"the value of output {port.name!r} comes first, then the argument of the command",
+                key=True,
+                hint=f"swap them: {inner.data}: {source}",
+            )
+        elif source not in port.arguments:
             problems.error(
                 inner,
                 "unknown-argument",

@@ -20,6 +20,18 @@ _SWITCHABLE: Final = (
     "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json", "xml",
 )  # fmt: skip
 """Framing types that detect the end of a frame from its bytes, as `switch` requires."""
+_LINE_WORDS = (
+    "line",
+    "lines",
+    "text",
+    "newline",
+    "ascii",
+    "string",
+    "cr",
+    "lf",
+    "crlf",
+)
+_LINES = "for lines of text, write framing: { type: delimiter, tx: LF, rx: LF }"
 
 
 def parse_framing(
@@ -35,7 +47,9 @@ def parse_framing(
             kind,
             "unknown-framing",
             f"there is no framing of type {kind.data!r}",
-            hint=did_you_mean(kind.data, catalog.framings, "types"),
+            hint=_LINES
+            if kind.data.lower() in _LINE_WORDS
+            else did_you_mean(kind.data, catalog.framings, "types"),
         )
         return FramingSpec(max_bytes=longest)
     parse = _PARSERS.get(kind.data)

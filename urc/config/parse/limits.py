@@ -77,7 +77,9 @@ def _numbers(part: Node, kind: str, bounds: _Bounds, problems: Problems) -> dict
                 "wrong-order",
                 f"{after} {more:g} is not above {name} {value:g}",
                 at=after,
-                hint="the order is lolo < low < high < hihi",
+                hint=f"swap them: {name}: {more:g}, {after}: {value:g}"
+                if value > more
+                else "the order is lolo < low < high < hihi",
             )
     for name, value in given:
         check_within(value, *bounds, part.must(name), problems)

@@ -22,6 +22,30 @@ _COMMON: Final = (
 )  # fmt: skip
 
 
+_OTHER_WORDS = {
+    "socket": "tcp",
+    "tcpip": "tcp",
+    "ip": "tcp",
+    "ethernet": "tcp",
+    "usb": "serial",
+    "uart": "serial",
+    "rs232": "serial",
+    "com": "serial",
+    "rest": "http",
+    "https": "http",
+    "ws": "websocket",
+    "ros2": "ros",
+    "roslibjs": "ros",
+}
+"""Types of transports, by the corresponding word of other programs."""
+
+
+def _other_word(word: str) -> str:
+    """Return a hint with the type for a word of other programs, or ""."""
+    other = _OTHER_WORDS.get(word.lower())
+    return f"use the word '{other}'" if other else ""
+
+
 def parse_transport(part: Node, problems: Problems, catalog: Registries) -> TransportSpec:
     """Return the transport at `part`; report mistakes in the declaration."""
     kind = part.must("type")
@@ -31,6 +55,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
             "unknown-transport-type",
             f"there is no transport of type {kind.data!r}",
             hint=renamed_value_hint("type", kind.data)
+            or _other_word(kind.data)
             or did_you_mean(kind.data, catalog.transports, "types"),
         )
     check_headers(part, problems)

@@ -151,7 +151,9 @@ def _without_kind(document: Document) -> Problem:
         ("kind",),
         "unknown-kind",
         f"there is no kind of document {kind!r}",
-        hint=did_you_mean(str(kind), KINDS, "kinds"),
+        hint="use the word 'robot'"
+        if kind in ("profile", "robot-profile", "robots")
+        else did_you_mean(str(kind), KINDS, "kinds"),
     )
 
 

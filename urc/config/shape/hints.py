@@ -8,7 +8,7 @@ from urc.config.renames import renamed_hint
 from urc.config.spelling_suggestions import did_you_mean
 from urc.source import Document, Path
 
-__all__ = ["example_of", "key_hint", "mapping_hint", "type_hint", "word_hint"]
+__all__ = ["example_of", "key_hint", "mapping_hint", "text_hint", "type_hint", "word_hint"]
 
 _DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
 _OTHER_WORDS: Final = {
@@ -32,6 +32,13 @@ _OTHER_WORDS: Final = {
     "description": ("text",),
     "message": ("text",),
     "license": ("licence",),
+    "msg": ("type",),
+    "msg_type": ("type",),
+    "message_type": ("type",),
+    "messageType": ("type",),
+    "baud_rate": ("baud",),
+    "minimum": ("min",),
+    "maximum": ("max",),
 }
 """Keys of URC, by the corresponding key of another tool."""
 _SAME_TYPES: Final = {
@@ -50,6 +57,14 @@ _SAME_TYPES: Final = {
 }
 """Type names of URC, by the corresponding type name of another tool."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
+_SPAN: Final = re.compile(
+    r"(?P<number>[0-9]{1,6}(?:\.[0-9]{1,6})?)\s*"
+    r"(?P<unit>hz|ms|msec|milli(?:s|second)s?|s|secs?|seconds?|m|mins?|minutes?|h|hours?)",
+    re.IGNORECASE,
+)
+"""A duration or a rate, as other programs write it."""
+_UNITS: Final = "a duration has the unit ms, s, m (minutes) or h"
+_NUMBERS: Final = {"integer", "number"}
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
     ("reply_to", "leaves"): "polls run automatically in these steps; 'feed' gives their replies",
@@ -67,6 +82,8 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Pat
     name, colon, _ = key.partition(":")
     if colon and name in known:
         return f"put a space after the colon: '{name}: '"
+    if {"id", "const", "pad"} <= known.keys() and isinstance(value, str) and value.isalnum():
+        return f"write the type first: {value} {key}"
     for (other, beside), hint in _ELSEWHERE.items():
         if key == other and beside in known:
             return hint
@@ -83,7 +100,8 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
     found = _URL.match(value) if isinstance(value, str) else None
     if found is None:
         return "write 'host' and 'port', such as host: robot.local, port: 9090"
-    written = [f"host: {found['host']}"]
+    host = f'"{found["host"]}"' if "{" in found["host"] else found["host"]
+    written = [f"host: {host}"]
     written += [f"port: {found['port']}"] if found["port"] else []
     written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
     # The quoted names keep a missing 'host' from being reported a second time.
@@ -105,6 +123,8 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
     """Return the schema's example of a missing key, or ""."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
+    if key == "urc":
+        return "write 'urc: 1' in the first line"
     if key == "framing":
         return f"for most text protocols: {_FRAMING}"
     if not examples or isinstance(examples[0], (dict, list)):
@@ -159,9 +179,41 @@ def type_hint(
             return "yes, no, on and off are text in YAML 1.2; write true or false"
         if "object" in types:
             return "indent the inner keys, or write { key: value }"
+    if "string" in types and isinstance(value, list) and path[-1:] == ("grid",):
+        return "write the rows below 'grid: |', without '- '"
     if "array" in types:
         return "write a list: '- ' before each item, or [a, b]"
     return ""
+
+
+def text_hint(document: Document, path: Path, value: str, schema: Mapping[str, Any]) -> str:
+    """Return a hint for a text that does not match the pattern of its schema, or ""."""
+    if schema.get("title") == "duration":
+        found = _SPAN.fullmatch(value.strip())
+        if found is None:
+            return ""
+        return f"write {_duration(float(found['number']), found['unit'])}; {_UNITS}"
+    if _NUMBERS & {*_listed(schema.get("type", ()))} and value.isascii() and value.isdecimal():
+        return "" if _is_filled_in(document, path) else f"remove the quotes: {value}"
+    if path == ("name",):
+        plain = re.sub(r"[^a-z0-9]+", "-", value.lower()).strip("-")
+        rule = "a name has lower-case letters, digits and '-'"
+        return f"write {plain}; {rule}" if plain[:1].isalpha() else ""
+    return ""
+
+
+def _listed(types: object) -> Sequence[str]:
+    return (types,) if isinstance(types, str) else tuple(types) if isinstance(types, list) else ()
+
+
+def _duration(number: float, unit: str) -> str:
+    """Return a duration of the language, from a number and a unit of other programs."""
+    if unit.lower() == "hz":
+        return f"{1000 / number:.0f}ms" if number > 0 else "1s"
+    plain = unit.lower()
+    if plain.startswith("m") and plain not in ("m", "min", "mins", "minute", "minutes"):
+        return f"{number:g}ms"
+    return f"{number:g}{plain[0]}"
 
 
 def _written(document: Document, path: Path) -> str:

@@ -17,6 +17,7 @@ from urc.config.shape.hints import (
     example_of,
     key_hint,
     mapping_hint,
+    text_hint,
     type_hint,
     word_hint,
 )
@@ -210,6 +211,7 @@ def _wrong_pattern(document: Document, path: Path, error: _Error) -> list[Proble
     examples = error.schema.get("examples", ())
     if examples:
         hint = f"such as {listed(str(one) for one in examples)}; {hint[:1].lower()}{hint[1:]}"
+    hint = text_hint(document, path, error.value, error.schema) or hint
     return [document.problem(path, "bad-text", f"{_cut(error.value)} is not {noun}", hint=hint)]
 
 
@@ -281,7 +283,7 @@ def _noun(schema: Mapping[str, Any]) -> str:
 
 
 def _plain_noun(schema: Mapping[str, Any]) -> str:
-    title = str(schema.get("title", "document"))
+    title = str(schema.get("title", "document" if "properties" in schema else "valid value"))
     return title[:1].lower() + title[1:]
 
 

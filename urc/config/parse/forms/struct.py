@@ -30,7 +30,8 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     before = len(problems.problems)
     parser = ItemParser(problems, context.types, context.enums, "read", context.encoding)
     items = parser.items(part)
-    _check_size(part, items, context.framing, problems)
+    if len(problems.problems) == before:  # the size of an unknown type is unknown
+        _check_size(part, items, context.framing, problems)
     if len(problems.problems) > before:
         return None
     return ReadSpec("struct", {"items": items}, tuple(dict.fromkeys(names_of(items))))
@@ -42,7 +43,8 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
     parser = ItemParser(problems, context.types, context.enums, "send", context.encoding)
     items = parser.items(part)
     framing = context.framing
-    _check_size(part, items, framing and (framing.sent or framing), problems)
+    if len(problems.problems) == before:
+        _check_size(part, items, framing and (framing.sent or framing), problems)
     if len(problems.problems) > before:
         return None
     derived = derived_sizes(items).keys()

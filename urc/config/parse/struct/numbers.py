@@ -1,5 +1,6 @@
 """Parsers of a struct's numbers: widths, constants, enums and ranges."""
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Final
 
@@ -40,11 +41,28 @@ def written_constant(text: str) -> int | float | bool | None:
         return None
 
 
+_NUMBER_WORD: Final = re.compile(
+    r"(?P<sign>u?)int(?P<bits>8|16|32|64)(?:_t)?_?(?P<order>be|le)?|(?P<word>byte|char|float|double)"
+)
+"""Numbers as C, Python and ROS write them."""
+
+
+def _our_type(found: re.Match[str]) -> str:
+    """Return the type for a word of another language; small robots mostly are little-endian."""
+    if found["word"]:
+        return {"byte": "u8", "char": "i8", "float": "f32le", "double": "f64le"}[found["word"]]
+    name = ("u" if found["sign"] else "i") + found["bits"]
+    return name if found["bits"] == "8" else name + (found["order"] or "le")
+
+
 def unknown_type(
     part: Node, word: str, types: Iterable[str], problems: Problems, *, only_types: bool = False
 ) -> None:
     """Report an unknown type, and suggest a known type."""
-    if width_of(word) is not None and number_of(f"{word}be") is None:
+    plain = _NUMBER_WORD.fullmatch(word.lower())
+    if plain and number_of(other := _our_type(plain)) is not None:
+        hint = f"use the type '{other}'"
+    elif width_of(word) is not None and number_of(f"{word}be") is None:
         hint = f"only arrays may have numbers of {word[1:]} bits: {{ type: {word}, count: 16 }}"
     elif number_of(f"{word}be") is not None:
         hint = f"add the byte order: {word}be or {word}le"
