@@ -14,6 +14,7 @@ from urc.cli.error_report import Misuse
 from urc.cli.event_loop import run_loop
 from urc.cli.fault_injection import FaultInjector
 from urc.cli.output import complain
+from urc.cli.rendering import warn_without_rendering
 from urc.cli.start_addresses import ReadyDashboard, access_for, announce, ready_addresses
 from urc.cli.tls_options import PLAIN, TlsOptions, certificates_of
 from urc.model.profile import Profile
@@ -35,6 +36,7 @@ from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.clock_check import clock_warning
+from urc.web.serve.service_manager import ServiceManager, answers
 
 __all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
@@ -111,6 +113,8 @@ def run_dashboard(
     for name in names:
         if names.count(name) > 1:
             raise Misuse(f"two robots have the name {name!r}; each name must be unique")
+    if is_simulated:
+        warn_without_rendering(profiles)
     faulty = FaultInjector() if is_simulated else None
     work = _serve(profiles, place, faulty, on_ready, given, is_dev, faults)
     return run_loop(work, code_when_ended=0, is_fast=True)
@@ -136,10 +140,16 @@ async def _serve(
         access.clock_check = partial(clock_warning, data)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
+        manager = ServiceManager()
+        stack.callback(manager.tell, "STOPPING=1")
+
         def ready(url: str) -> None:
             addresses = ready_addresses(url, place.host, access, certificates, place.tls)
             announce(stack, data, addresses)
             on_ready(addresses)
+            manager.tell("READY=1", f"STATUS=dashboard {addresses.url}")
+            watch = asyncio.ensure_future(manager.watch(partial(answers, addresses.url)))
+            stack.callback(watch.cancel)
 
         factory = RobotFactory(robot_options)
         robots = {

@@ -1,0 +1,109 @@
+"""Messages to systemd: the server is ready, alive or ending (sd_notify(3)).
+
+Without systemd, or under another service manager, `NOTIFY_SOCKET` is not set, and nothing is sent.
+
+The watchdog is tied to the server's own health: before each heartbeat, the server requests its
+own `/healthz` over a real connection. If the event loop is blocked, or the port no longer accepts
+connections, the heartbeat is missing, and systemd restarts the server. The guard has already
+stopped the robots by then (docs/motion.md).
+"""
+
+import asyncio
+import logging
+import os
+import socket
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from typing import Final
+from urllib.parse import urlsplit
+
+__all__ = ["ServiceManager", "answers"]
+
+log = logging.getLogger(__name__)
+
+_SIGNS: Final = 3
+"""Heartbeats in one interval of the watchdog. sd_watchdog_enabled(3) recommends two; with three,
+one lost request ends no server."""
+_STATUS: Final = b"HTTP/1.1 "
+
+
+class ServiceManager:
+    """The service manager of this process.
+
+    Args:
+        environment: the environment, with `NOTIFY_SOCKET`, `WATCHDOG_USEC` and `WATCHDOG_PID`.
+    """
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        self._place = environment.get("NOTIFY_SOCKET", "")
+        has_sockets = hasattr(socket, "AF_UNIX")  # Windows has none in Python
+        if not has_sockets or not self._place.startswith(("/", "@")):
+            self._place = ""
+        self.watchdog_s = _watchdog_s(environment) if self._place else 0.0
+        """Interval in which systemd expects a heartbeat, in seconds; 0 without a watchdog."""
+
+    def tell(self, *lines: str) -> None:
+        """Send assignments such as ``READY=1``; ignore a service manager that does not listen."""
+        if not self._place:
+            return
+        # A leading @ is the notation for the abstract namespace (unix(7)).
+        place = "\0" + self._place[1:] if self._place.startswith("@") else self._place
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out:
+                out.setblocking(False)
+                out.sendto("\n".join(lines).encode(), place)
+        except OSError as error:
+            log.warning("systemd gets no messages: %s", error.strerror or error)
+
+    async def watch(self, is_healthy: Callable[[float], Awaitable[bool]]) -> None:
+        """Send a heartbeat in time, as long as the server is healthy; never return.
+
+        Args:
+            is_healthy: function that returns whether the server answers within a time in seconds.
+        """
+        if not self.watchdog_s:
+            return
+        every_s = self.watchdog_s / _SIGNS
+        was_healthy = True
+        while True:
+            healthy = await is_healthy(every_s)
+            if healthy:
+                self.tell("WATCHDOG=1")
+            elif was_healthy:
+                log.warning("the server does not answer itself; systemd gets no heartbeat")
+            was_healthy = healthy
+            await asyncio.sleep(every_s)
+
+
+def _watchdog_s(environment: Mapping[str, str]) -> float:
+    """Return the interval of the watchdog for this process, in seconds; 0 without a watchdog."""
+    if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
+        return 0.0
+    text = environment.get("WATCHDOG_USEC", "")
+    return int(text) / 1e6 if text.isascii() and text.isdecimal() else 0.0
+
+
+async def answers(url: str, within_s: float) -> bool:
+    """Return whether a server answers a plain HTTP request for `/healthz` in time.
+
+    Any answer counts, also that there are too many connections: a busy server is no broken server.
+
+    Args:
+        url: address of the server. A port with HTTPS answers plain HTTP for this path, too.
+        within_s: time limit in seconds.
+    """
+    place = urlsplit(url)
+    writer: asyncio.StreamWriter | None = None
+    try:
+        async with asyncio.timeout(within_s):
+            reader, writer = await asyncio.open_connection(place.hostname, place.port)
+            head = f"GET /healthz HTTP/1.1\r\nHost: {place.netloc}\r\nConnection: close\r\n\r\n"
+            writer.write(head.encode())
+            return await reader.readexactly(len(_STATUS)) == _STATUS
+    except (OSError, TimeoutError, asyncio.IncompleteReadError):
+        return False
+    finally:
+        if writer is not None:
+            writer.close()
+            with suppress(OSError):
+                await writer.wait_closed()
