@@ -25,6 +25,7 @@ LOCK = "requirements/demo.txt"
 _LICENCES = "requirements/licences.toml"
 _FORMAT = "1.6"
 _PIN = re.compile(r"^([a-z0-9][a-z0-9._-]*)==([^\s;\\]+)(?: ; ([^\\\n]+?))? \\$", re.MULTILINE)
+_NAME = re.compile(r"[a-z0-9-]+")
 _HASH = re.compile(r"--hash=sha256:([0-9a-f]{64})")
 
 
@@ -39,6 +40,8 @@ class LockedPackage(NamedTuple):
     """SPDX expression."""
     hashes: tuple[str, ...]
     """SHA-256 of each file of this version, in hex digits."""
+    is_optional: bool
+    """Whether only the extra `demo` needs the package."""
 
 
 class NpmPackage(NamedTuple):
@@ -55,13 +58,15 @@ class NpmPackage(NamedTuple):
 def python_packages(root: Path) -> Iterator[LockedPackage]:
     """Yield the packages in the lock; raise `KeyError` for a package without a licence."""
     licences: dict[str, str] = tomllib.loads((root / _LICENCES).read_text("utf-8"))
+    project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
+    extra = {_NAME.match(one)[0] for one in project["optional-dependencies"]["demo"]}  # type: ignore[index]  # each begins with a name
     text = (root / LOCK).read_text("utf-8")
     heads = list(_PIN.finditer(text))
     ends = [*(head.start() for head in heads[1:]), len(text)]
     for head, end in zip(heads, ends, strict=True):
         name, version, marker = head.groups(default="")
         hashes = tuple(_HASH.findall(text[head.end() : end]))
-        yield LockedPackage(name, version, marker, licences[name], hashes)
+        yield LockedPackage(name, version, marker, licences[name], hashes, name in extra)
 
 
 def npm_packages(root: Path, names: list[str]) -> Iterator[NpmPackage]:
@@ -150,7 +155,7 @@ def _package(one: LockedPackage) -> dict[str, Any]:
         "name": one.name,
         "version": one.version,
         "purl": ref,
-        "scope": "required",
+        "scope": "optional" if one.is_optional else "required",
         "licenses": [{"expression": one.licence}],
         "hashes": [{"alg": "SHA-256", "content": digest} for digest in one.hashes],
         "properties": [{"name": "urc:bundled", "value": "false"}, *marker],

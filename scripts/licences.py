@@ -26,7 +26,8 @@ The shipped robots, widgets, templates and schemas are parts of URC.
 _MODULES = "The wheel contains files of these packages in `urc_vendor/`, with their licence texts."
 _PACKAGES = """\
 The wheel does not contain these packages. \
-An installation of URC without extras needs them; `./dev demo` installs exactly these versions.
+An installation of URC needs them; `./dev demo` installs exactly these versions. \
+Packages marked with “extra” are needed for cameras and laser scanners of emulated robots only.
 """
 
 
@@ -41,7 +42,7 @@ def page() -> str:
         _table((one.name, one.version, one.licence) for one in modules),
         "## Python packages\n",
         _PACKAGES,
-        _table((one.name, _version(one), one.licence) for one in packages),
+        _table((_named(one), _version(one), one.licence) for one in packages),
     ]
     return "\n".join(parts)
 
@@ -49,6 +50,10 @@ def page() -> str:
 def _table(rows: Iterable[tuple[str, str, str]]) -> str:
     lines = ["| package | version | licence |", "|---|---|---|"]
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows), ""])
+
+
+def _named(one: hatch_sbom.LockedPackage) -> str:
+    return f"{one.name} (extra `demo`)" if one.is_optional else one.name
 
 
 def _version(one: hatch_sbom.LockedPackage) -> str:

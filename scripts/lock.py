@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "requirements"
 OLDEST = "3.11"
 LOCKS: dict[str, tuple[str, ...]] = {
-    "demo": ("pyproject.toml",),
+    "demo": ("pyproject.toml", "--extra", "demo"),
     "build": ("--group", "build"),
     "dev": ("pyproject.toml", "--group", "build", "--group", "dev"),
     "node": ("--group", "node"),

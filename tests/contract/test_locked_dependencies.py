@@ -20,7 +20,10 @@ ROOT = Path(__file__).resolve().parents[2]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 GROUPS = PROJECT["dependency-groups"]
 WANTED = {
-    "demo": PROJECT["project"]["dependencies"],
+    "demo": [
+        *PROJECT["project"]["dependencies"],
+        *PROJECT["project"]["optional-dependencies"]["demo"],
+    ],
     "build": GROUPS["build"],
     "dev": [*PROJECT["project"]["dependencies"], *GROUPS["build"], *GROUPS["dev"]],
     "node": GROUPS["node"],

@@ -97,7 +97,7 @@ def test_where_no_lock_fits_one_line_says_so(
     else:
         monkeypatch.setattr(dev.platform, change[0], lambda: change[1])
     dev.set_up(["dev"])
-    assert dev.done == ["venv", "install --upgrade pip", "install --editable . --group=dev"]
+    assert dev.done == ["venv", "install --upgrade pip", "install --editable .[demo] --group=dev"]
     (line,) = [one for one in capsys.readouterr().err.splitlines() if "locked" in one.lower()]
     assert said in line
     assert "without the hashes of requirements/" in line

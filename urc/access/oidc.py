@@ -19,6 +19,7 @@ from hmac import compare_digest
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlencode, urlsplit
 
+from urc._extras import missing
 from urc.access.directory import digest_of
 from urc.access.external_accounts import ExternalAccount
 from urc.access.grants import AccessError
@@ -71,7 +72,7 @@ class OidcSignIn:
             AccessError: the extra `oidc` is not installed.
         """
         if importlib.util.find_spec("joserfc") is None:
-            raise AccessError("--oidc needs the package joserfc: pip install 'urc[oidc]'")
+            raise AccessError(missing("--oidc needs", "joserfc", "oidc"))
         self.options = options
         self._provider = provider or OidcProvider(options, clock)
         self._clock = clock

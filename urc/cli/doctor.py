@@ -3,14 +3,16 @@
 import argparse
 import platform
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
 from urc import __version__
+from urc._extras import install_command
 from urc._folders import data_folder
 from urc.cli.arguments import add_port
+from urc.cli.colours import Style, painted
 from urc.cli.output import complain
 from urc.problems import UrcError, printable
 from urc.shipped import shipped, vendored
@@ -29,12 +31,18 @@ REQUIRED = {
     "asyncssh": "robots behind SSH",
     "roslibpy": "robots behind rosbridge",
 }
+EXTRAS = {
+    "numpy": ("demo", "cameras and laser scanners of emulated robots"),
+    "pillow": ("demo", "cameras of emulated robots"),
+    "serialx": ("serial", "robots on serial ports"),
+    "paho-mqtt": ("mqtt", "robots behind an MQTT broker"),
+    "cbor2": ("cbor", "CBOR images from rosbridge"),
+    "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
+    "mcap": ("record", "recordings of sessions"),
+    "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
+}
+"""Packages of extras: the extra, and what it is for."""
 OPTIONAL = {
-    "paho-mqtt": "robots behind an MQTT broker (pip install 'urc[mqtt]')",
-    "cbor2": "CBOR images from rosbridge (pip install 'urc[cbor]')",
-    "zeroconf": "discovery of announced robots by 'urc discover' (pip install 'urc[mdns]')",
-    "mcap": "recordings of sessions (pip install 'urc[record]')",
-    "joserfc": "sign-in with an OpenID Connect provider (pip install 'urc[oidc]')",
     "google-re2": "patterns without provably linear run time; refused without this package",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
 }
@@ -73,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     width = max(len(finding.name) for finding in problems)
     for finding in problems:
         mark = "ok     " if finding.is_good else "MISSING" if finding.is_required else "note   "
-        print(printable(f"{mark} {finding.name:<{width}}  {finding.text}"))
+        style: Style = "good" if finding.is_good else "bad" if finding.is_required else "warning"
+        print(painted(mark, style), printable(f"{finding.name:<{width}}  {finding.text}"))
     missing = sum(finding.is_required and not finding.is_good for finding in problems)
     if missing:
         complain(f"urc doctor: {missing} of {len(problems)} checks failed")
@@ -86,6 +95,11 @@ def _problems(port: int, data: Path) -> Iterator[_Finding]:
         yield _package(name, purpose, is_required=True)
     for name, purpose in OPTIONAL.items():
         yield _package(name, purpose, is_required=False)
+    for name, (extra, purpose) in EXTRAS.items():
+        found = _package(name, purpose, is_required=False)
+        if not found.is_good:
+            found = replace(found, text=f"{found.text}: {install_command(extra)}")
+        yield found
     for folder in FOLDERS:
         place = shipped(folder)
         is_there = place.is_dir() and any(place.iterdir())

@@ -141,16 +141,18 @@ class EmulatedRobot:
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return the robot's camera image as JPEG; None for a world without a camera.
+        """Return the robot's camera image as JPEG; None without a working camera.
 
         `now_s` is the current time, in seconds since the epoch.
         """
         body = self._values.body
         name = next(iter(self._pictures.values()), None)
-        return None if body is None or name is None else body.picture(name, now_s)
+        if body is None or name is None or self._values.faults.drops((name,)):
+            return None
+        return body.picture(name, now_s)
 
     def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
-        """Return a top view of the world as JPEG; None for a robot without a world.
+        """Return a top view of the world as JPEG; None without a world, or without Pillow.
 
         Args:
             width: width of the image in pixels, 16 to 2000.
@@ -158,7 +160,7 @@ class EmulatedRobot:
             now_s: current time, in seconds since the epoch.
         """
         body = self._values.body
-        if body is None:
+        if body is None or "top" in body.world.dropped:
             return None
         body.world.advance(now_s)
         return body.world.top_view(width, height)

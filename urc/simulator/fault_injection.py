@@ -41,7 +41,7 @@ def mend(values: Values) -> None:
     values.faults.clear()
     if values.body is not None:
         values.body.world.noise = 1.0
-        values.body.world.dropped.clear()
+        values.body.world.dropped = set(values.body.world.missing)
 
 
 def _check_signal(fault: Fault, values: Values) -> None:

@@ -93,11 +93,16 @@ def _within(value: float, low: float, high: float, wanted: UrcError) -> float:
 class Faults:
     """The active faults of one robot."""
 
-    def __init__(self) -> None:
-        """Begin without faults."""
+    def __init__(self, missing: frozenset[str] = frozenset()) -> None:
+        """Begin without faults.
+
+        Args:
+            missing: signals whose sensors never work on this machine.
+        """
         self.active: dict[str, Fault] = {}
         """Faults by name; for faults of a signal, by name and signal."""
-        self.dropped: frozenset[str] = frozenset()
+        self._missing = missing
+        self.dropped = missing
         """Signals with failed sensors."""
         self.stuck: dict[str, Reading] = {}
         """Last values of the stuck signals, by name."""
@@ -122,7 +127,7 @@ class Faults:
     def clear(self) -> None:
         """Remove all faults."""
         self.active.clear()
-        self.dropped = frozenset()
+        self.dropped = self._missing
         self.stuck.clear()
 
     def loses(self) -> bool:

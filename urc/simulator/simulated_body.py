@@ -8,6 +8,8 @@ import logging
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from importlib.util import find_spec
 
 from urc.expressions import ExpressionError, Template
 from urc.model.driver import Driver
@@ -15,15 +17,15 @@ from urc.model.values import Reading
 from urc.model.world import Failsafe, WorldSpec
 from urc.simulator.world.world import SensorView, World
 
-__all__ = ["SimulatedBody", "failsafe_of"]
+__all__ = ["SimulatedBody", "failsafe_of", "has_rendering", "rendered_signals"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
 """Inputs that stay active when the fail-safe stops the body, because these inputs cause no motion.
 For example, a drone without commands stays in the air."""
 
-_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
-"""Sensors that need numpy."""
+_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
+"""Sensors that need numpy or Pillow."""
 
 Evaluate = Callable[[Template, float], object]
 """Function that evaluates a template over the robot's signals and state at a given time."""
@@ -47,7 +49,7 @@ class SimulatedBody:
         put: Callable[[str, object], None],
     ) -> None:
         self.spec = spec
-        self.world = World(spec, self._inputs, self._holds)
+        self.world = World(spec, self._inputs, self._holds, has_rendering=has_rendering())
         self.failsafe = spec.failsafe or failsafe_of(driver)
         self._evaluate = evaluate
         self._put = put
@@ -64,7 +66,7 @@ class SimulatedBody:
 
     def prepare(self) -> None:
         """Load the laser and camera modules if a signal needs the modules; the call may block."""
-        if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
+        if has_rendering() and rendered_signals(self.spec):
             import urc.simulator.world.laser
             import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
 
@@ -119,6 +121,17 @@ class SimulatedBody:
         if text != self._last_fault:
             self._last_fault = text
             log.info("%s", text)
+
+
+@cache
+def has_rendering() -> bool:
+    """Return whether the packages of cameras and laser scanners are installed (extra `demo`)."""
+    return find_spec("numpy") is not None and find_spec("PIL") is not None
+
+
+def rendered_signals(spec: WorldSpec) -> frozenset[str]:
+    """Return the signals of cameras and laser scanners."""
+    return frozenset(name for name, one in spec.senses.items() if _LOOKS.search(one.python))
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:

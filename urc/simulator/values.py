@@ -17,7 +17,7 @@ from urc.problems import UrcError
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter
 from urc.simulator.faults import Faults
-from urc.simulator.simulated_body import SimulatedBody
+from urc.simulator.simulated_body import SimulatedBody, has_rendering, rendered_signals
 
 __all__ = ["Names", "Unsettable", "Values"]
 
@@ -118,7 +118,8 @@ class Values:
         """The simulated body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
         """Signals that the world provides."""
-        self.faults = Faults()
+        missing = rendered_signals(world) if world and not has_rendering() else frozenset[str]()
+        self.faults = Faults(missing)
         """Injected faults of the robot."""
         for name, value in initial.items():
             self.set(name, value)

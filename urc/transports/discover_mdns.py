@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
+from urc._extras import missing
 from urc.transports.base import TransportError
 
 __all__ = ["ServiceAnnouncement", "announced"]
@@ -42,7 +43,7 @@ async def announced(
         TransportError: the library is missing, or no network is available.
     """
     if find_spec("zeroconf") is None:
-        raise TransportError("mDNS needs the package zeroconf: pip install 'urc[mdns]'")
+        raise TransportError(missing("mDNS needs", "zeroconf", "mdns"))
     from zeroconf import InterfaceChoice, ServiceStateChange
     from zeroconf.asyncio import AsyncServiceBrowser, AsyncZeroconf
 

@@ -3,6 +3,7 @@
 from importlib.util import find_spec
 from typing import NamedTuple
 
+from urc._extras import missing
 from urc.transports.base import TransportError
 
 __all__ = ["SerialPort", "serial_ports"]
@@ -25,7 +26,7 @@ def serial_ports() -> list[SerialPort]:
         TransportError: the library is missing, or the system cannot list its ports.
     """
     if find_spec("serialx") is None:
-        raise TransportError("serial ports need the package serialx: pip install 'urc[serial]'")
+        raise TransportError(missing("serial ports need", "serialx", "serial"))
     import serialx
 
     try:

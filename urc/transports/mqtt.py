@@ -5,6 +5,7 @@ This module does not import the MQTT library itself, so that it can report a mis
 
 from importlib.util import find_spec
 
+from urc._extras import missing
 from urc.transports.base import Transport, TransportError, TransportSetup
 from urc.transports.mqtt_options import read_options
 from urc.transports.web_dial import Dialer
@@ -21,7 +22,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     """
     options = read_options(setup)
     if find_spec("paho") is None:
-        raise TransportError("mqtt needs the package paho-mqtt: pip install 'urc[mqtt]'")
+        raise TransportError(missing("mqtt needs", "paho-mqtt", "mqtt"))
     from urc.transports.mqtt_client import MqttTransport  # imports paho
 
     place = WebOrigin(options.tls is not None, options.host, options.port, "")

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from urc._extras import missing
 from urc.transports import _options
 from urc.transports._faults import late, reason
 from urc.transports._stream import StreamTransport, tune
@@ -205,7 +206,5 @@ def _host_and_port(address: str) -> tuple[str, int]:
 def _need_serialx() -> None:
     try:
         import serialx  # noqa: F401
-    except ImportError as missing:
-        raise TransportError(
-            "serial needs the package serialx: pip install 'urc[serial]'"
-        ) from missing
+    except ImportError as error:
+        raise TransportError(missing("serial needs", "serialx", "serial")) from error

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import IO, Any, Final, Literal
 
 from urc import __version__
+from urc._extras import missing
 from urc.config.resolve import resolve
 from urc.model.profile import Profile
 from urc.model.values import Sample
@@ -35,7 +36,6 @@ __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
 """Callback with a step of a recording, the name of its file, and the result as text."""
 _SUFFIX: Final = ".mcap"
-_MISSING: Final = "recordings need the package mcap: pip install 'urc[record]'"
 MOST_WAITING: Final = 50_000
 """Maximum number of queued events."""
 MOST_WAITING_BYTES: Final = 64 * 1024 * 1024
@@ -62,7 +62,7 @@ log = logging.getLogger(__name__)
 def check_installed() -> None:
     """Raise `UrcError` if the package for recordings is missing."""
     if find_spec("mcap") is None:
-        raise UrcError(_MISSING)
+        raise UrcError(missing("recordings need", "mcap", "record"))
 
 
 class Recorder:

@@ -41,6 +41,8 @@ _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
 """Battery level after the fault low-battery, in per cent."""
+_RENDERED: Final = frozenset({"laser", "picture", "panorama", "top"})
+"""Readings that need numpy or Pillow."""
 _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
@@ -57,6 +59,7 @@ class World:
             may observe the world at the current step.
         holds: function that evaluates a condition of the camera, which a document may give as a
             template.
+        has_rendering: whether numpy and Pillow are installed.
     """
 
     def __init__(
@@ -64,6 +67,8 @@ class World:
         spec: WorldSpec,
         inputs: Inputs,
         holds: Callable[[Template | bool], bool] = bool,
+        *,
+        has_rendering: bool = True,
     ) -> None:
         self.spec = spec
         self.plan = WorldMap(ROOM if spec.map is None else spec.map)
@@ -77,7 +82,9 @@ class World:
         self.time_s: float | None = None
         """End of the last step, in seconds since the epoch; None before the first observation."""
         self.noise = 1.0
-        self.dropped: set[str] = set()
+        self.missing = frozenset[str]() if has_rendering else _RENDERED
+        """Names of `READINGS` that need a package that is not installed."""
+        self.dropped = set(self.missing)
         """Names of failed `READINGS`. Failed readings have no value."""
         self._inputs = inputs
         self._holds = holds

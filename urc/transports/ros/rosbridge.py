@@ -25,6 +25,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any, Final, Literal
 
+from urc._extras import missing
 from urc.model.payload import Envelope, Payload
 from urc.model.values import NOTHING, Value
 from urc.transports.base import (
@@ -212,7 +213,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
     if compression not in ("none", "png", "cbor"):
         raise TransportError(f"ros: {compression!r} of {topic} is not none, png or cbor")
     if compression == "cbor" and find_spec("cbor2") is None:
-        raise TransportError("cbor needs the package cbor2: pip install 'urc[cbor]'")
+        raise TransportError(missing("cbor needs", "cbor2", "cbor"))
     return RosSubscription(
         topic,
         str(attributes.get("type") or ""),

@@ -1,0 +1,71 @@
+"""Optional packages: the command that adds the packages of an extra to this installation.
+
+Messages name packages, not ``urc[extra]``: pip would look for `urc` itself in the index, although
+this URC may come from a file or a checkout.
+"""
+
+import os
+import re
+import shlex
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+__all__ = ["install_command", "missing", "packages_of"]
+
+_IN_EXTRA = re.compile(r"""extra\s*==\s*['"]([a-z0-9-]+)['"]""")
+
+
+def missing(feature: str, package: str, extra: str) -> str:
+    """Return the message that a feature needs a package, with the command that installs it.
+
+    Args:
+        feature: subject and verb, such as ``mqtt needs``.
+        package: distribution name of the package.
+        extra: extra of URC with this package.
+    """
+    return f"{feature} the package {package}: {install_command(extra)}"
+
+
+def packages_of(extra: str) -> list[str]:
+    """Return the requirements of an extra, such as ``paho-mqtt<3,>=2.1``.
+
+    Return an empty list if this URC has no metadata, as in a browser.
+    """
+    from importlib.metadata import PackageNotFoundError, requires  # slow to load
+
+    try:
+        lines = requires("urc") or []
+    except PackageNotFoundError:
+        return []
+    found = []
+    for line in lines:
+        requirement, _, marker = line.partition(";")
+        named = _IN_EXTRA.search(marker)
+        if named and named[1] == extra:
+            found.append(requirement.strip())
+    return found
+
+
+def install_command(extra: str) -> str:
+    """Return the command that adds the packages of an extra to this URC."""
+    quote = '"{}"'.format if os.name == "nt" else "'{}'".format
+    packages = " ".join(quote(one) for one in packages_of(extra) or [f"urc[{extra}]"])
+    if Path(sys.prefix, "pipx_metadata.json").is_file():
+        return f"pipx inject urc {packages}"
+    python = _shown(sys.executable)
+    if find_spec("pip") is None:  # environments of uv have no pip
+        return f"uv pip install --python {python} {packages}"
+    return f"{python} -m pip install {packages}"
+
+
+def _shown(path: str) -> str:
+    """Return a path as a word of a command, relative to the current folder if it is inside."""
+    try:
+        inside = os.path.relpath(path)
+    except (ValueError, OSError):  # another drive; a deleted folder
+        inside = os.pardir
+    shown = path if inside.startswith(os.pardir) else inside
+    if os.name == "nt":
+        return f'"{shown}"' if " " in shown else shown
+    return shlex.quote(shown)

@@ -1,0 +1,26 @@
+"""The warning about emulated robots without cameras and laser scanners.
+
+Layer 6. The packages for them are an extra, because robots in the real world need neither: see
+docs/decisions/0045.
+"""
+
+from collections.abc import Iterable
+
+from urc._extras import install_command
+from urc.cli.output import complain
+from urc.model.profile import Profile
+from urc.simulator.simulated_body import has_rendering, rendered_signals
+
+__all__ = ["warn_without_rendering"]
+
+
+def warn_without_rendering(profiles: Iterable[Profile]) -> None:
+    """Report emulated robots whose cameras or laser scanners show nothing on this machine."""
+    if has_rendering():
+        return
+    blind = [one.name for one in profiles if one.world and rendered_signals(one.world)]
+    if blind:
+        complain(
+            f"urc: no camera and no laser scanner of {', '.join(blind)} works without numpy and"
+            f" Pillow; to install both: {install_command('demo')}"
+        )
