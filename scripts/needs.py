@@ -167,6 +167,12 @@ NEEDS = (
         purpose="tests against a third-party web server",
     ),
     Need(
+        name="nginx",
+        executables=("nginx", "/usr/sbin/nginx"),
+        package="nginx-light",
+        purpose="a test of URC behind a third-party web server",
+    ),
+    Need(
         name="websocketd",
         executables=("websocketd",),
         package="websocketd",
