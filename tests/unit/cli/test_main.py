@@ -267,6 +267,7 @@ def test_doctor_tells_what_is_missing(
 
     monkeypatch.setattr(doctor, "REQUIRED", {"no-such-package-here": "does much"})
     monkeypatch.setattr(doctor, "OPTIONAL", {"nor-this": "does more"})
+    monkeypatch.setattr(doctor, "EXTRAS", {"not-even-this": ("demo", "does most")})
     monkeypatch.setattr(doctor, "shipped", lambda _: tmp_path)
     monkeypatch.setattr(doctor, "_load_robots", broken)
     assert main(["doctor", "--port", "0"]) == 1
@@ -278,7 +279,7 @@ def test_doctor_tells_what_is_missing(
         "MISSING robots                No module named 'yaml'",
     ):
         assert line in output.splitlines()
-    assert errors == "urc doctor: 6 of 13 checks failed\n"
+    assert errors == "urc doctor: 6 of 14 checks failed\n"
 
 
 def test_doctor_shows_the_authority(capsys: Output, tmp_path: Path) -> None:
