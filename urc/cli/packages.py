@@ -2,7 +2,8 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -112,9 +113,25 @@ def planned(
         return plan_file(source, known, store, complain)
     if not known:
         raise Misuse("no repository is configured; add one with 'urc repo add URL'")
-    return plan_requirement(
-        parse_requirement(word), known, store, complain, pinned, takes_withdrawn=takes_withdrawn
-    )
+    required = parse_requirement(word)
+    with _working(f"fetching {word}") as note:
+        return plan_requirement(
+            required, known, store, note, pinned, takes_withdrawn=takes_withdrawn
+        )
+
+
+@contextmanager
+def _working(title: str) -> Iterator[Callable[[str], None]]:
+    """Show a status line; messages to the yielded function appear after the work."""
+    from urc.cli.progress import Progress
+
+    notes: list[str] = []
+    try:
+        with Progress(title):
+            yield notes.append
+    finally:
+        for note in notes:
+            complain(note)
 
 
 def known_entries() -> "list[IndexEntry]":
@@ -267,7 +284,8 @@ def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool =
     from urc.problems import printable
 
     known = known_repositories()
-    found = merged(known, complain)
+    with _working("reading the repositories") as note:
+        found = merged(known, note)
     hits = search([entry for some in found.values() for entry, _ in some], words, kind)
     for entry in hits:
         if is_json:
