@@ -21,6 +21,7 @@ import tarfile
 import zipfile
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -176,7 +177,8 @@ def notices(wheel: Path) -> str:
             if re.fullmatch(r"urc_vendor/.+/LICENSE[^/]*", one)
         }
     parts = [f"Third-party software in URC {__version__}", ""]
-    bundled, needed = [], []
+    bundled: list[tuple[str, str]] = []
+    needed: list[tuple[str, str]] = []
     for one in sbom["components"]:
         line = f"{one['name']} {one['version']}: {one['licenses'][0]['expression']}"
         is_bundled = {"name": "urc:bundled", "value": "true"} in one["properties"]
@@ -202,8 +204,7 @@ def write_completions(folder: Path) -> None:
 
 def pack_site(target: Path, epoch: int) -> None:
     """Build the documentation site, and pack it."""
-    from scripts import site
-
+    site = import_module("scripts.site")  # not in every checkout
     if site.build() != 0:
         raise ReleaseError("the site could not be built")
     files = sorted(path for path in Path(site.HTML).rglob("*") if path.is_file())

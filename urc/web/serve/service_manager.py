@@ -12,6 +12,7 @@ import asyncio
 import logging
 import os
 import socket
+import sys
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from typing import Final
@@ -36,15 +37,14 @@ class ServiceManager:
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         self._place = environment.get("NOTIFY_SOCKET", "")
-        has_sockets = hasattr(socket, "AF_UNIX")  # Windows has none in Python
-        if not has_sockets or not self._place.startswith(("/", "@")):
+        if sys.platform == "win32" or not self._place.startswith(("/", "@")):
             self._place = ""
         self.watchdog_s = _watchdog_s(environment) if self._place else 0.0
         """Interval in which systemd expects a heartbeat, in seconds; 0 without a watchdog."""
 
     def tell(self, *lines: str) -> None:
         """Send assignments such as ``READY=1``; ignore a service manager that does not listen."""
-        if not self._place:
+        if sys.platform == "win32" or not self._place:
             return
         # A leading @ is the notation for the abstract namespace (unix(7)).
         place = "\0" + self._place[1:] if self._place.startswith("@") else self._place
