@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 SCRIPT = '"$0" -m urc.cli.main 8>&1 9>/dev/null >/dev/null'
 
 
@@ -24,7 +22,6 @@ def completed(line: str, folder: Path) -> list[str]:
     return [word.strip() for word in done.stdout.split("\n") if word.strip()]
 
 
-@pytest.mark.skipif(os.name == "nt", reason="bash asks by a descriptor of POSIX")
 def test_bash_completes_subcommands_options_and_robots(tmp_path: Path) -> None:
     (tmp_path / "puzzle.yaml").write_text("")
     (tmp_path / "puzzle.txt").write_text("")

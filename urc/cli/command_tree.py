@@ -8,7 +8,7 @@ from collections.abc import Container
 from importlib import import_module
 
 from urc.cli.arguments import describe
-from urc.cli.main import GROUPS, VERBS, module_of
+from urc.cli.verbs import GROUPS, VERBS, module_of
 
 __all__ = ["command_tree"]
 

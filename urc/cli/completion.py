@@ -33,7 +33,7 @@ def answer() -> None:
     import argcomplete
 
     from urc.cli.command_tree import command_tree
-    from urc.cli.main import VERBS
+    from urc.cli.verbs import VERBS
 
     typed = os.environ.get("COMP_LINE", "").split()[1:]
     verb = next((word for word in typed if word in VERBS), "")

@@ -8,54 +8,9 @@ import os
 import sys
 from collections.abc import Sequence
 
+from urc.cli.verbs import GROUPS, VERBS, module_of
+
 __all__ = ["GROUPS", "VERBS", "main", "module_of"]
-
-VERBS: dict[str, str] = {
-    "demo": "emulate all shipped robots and open the dashboard in a browser",
-    "serve": "serve the dashboard for real robots",
-    "validate": "check documents and run their tests",
-    "explain": "explain a problem code and its correction",
-    "resolve": "print a profile as one document, with the origin of every key",
-    "migrate": "replace old names of keys and values in documents",
-    "docs": "print the manual page of a profile as Markdown",
-    "simulate": "emulate the robot of a profile on its real ports",
-    "watch": "print a robot's signals as JSON lines",
-    "send": "run one command of a robot and print the reply",
-    "record": "record a session to a file, until Ctrl-C",
-    "replay": "replay a recording in the dashboard",
-    "new": "create the files of a new widget",
-    "repo": "manage package repositories, upload tokens and keys",
-    "install": "install a package and its dependencies, after showing the permissions",
-    "update": "update installed packages after showing the changes, or undo an update",
-    "search": "search the repositories for packages",
-    "list": "list the installed packages",
-    "remove": "remove an installed package and its unused dependencies",
-    "bundle": "pack a package and its dependencies into one file",
-    "publish": "publish a package to a repository",
-    "trust": "show the host key of an SSH server, and store it after confirmation",
-    "audit": "print, export or check the audit log",
-    "people": "manage people, their roles and passphrases",
-    "devices": "pair phones, tablets and computers, and manage them",
-    "tokens": "manage the tokens of programs",
-    "sign-ins": "list and end the sign-ins of browsers, devices and programs",
-    "backup": "save people, keys, settings and logs to one file",
-    "restore": "restore a backup of people, keys, settings and logs",
-    "discover": "find robots on the network, serial ports and ROS topics",
-    "schema": "print the JSON Schema of a kind of document",
-    "doctor": "check the features of this machine",
-    "completion": "print the script that completes this command in bash, zsh or fish",
-}
-
-GROUPS: dict[str, tuple[str, ...]] = {
-    "drive": ("demo", "serve", "watch", "send", "record", "replay", "trust", "discover"),
-    "write and check documents": (
-        *("validate", "explain", "simulate", "docs", "resolve", "migrate", "new", "schema"),
-    ),
-    "packages": (*("search", "install", "update", "list", "remove", "bundle", "publish", "repo"),),
-    "people and rights": ("people", "devices", "tokens", "sign-ins", "audit"),
-    "this machine": ("doctor", "backup", "restore", "completion"),
-}
-"""Headings of the help text, each with its subcommands."""
 
 _FIRST_STEPS: dict[str, str] = {
     "urc demo": "drive emulated robots in the browser",
@@ -123,11 +78,6 @@ def _run(verb: str, rest: list[str]) -> int:
     module = import_module(module_of(verb))
     arguments = parse(verb, VERBS[verb], module, rest)
     return arguments if isinstance(arguments, int) else int(module.run(arguments))
-
-
-def module_of(verb: str) -> str:
-    """Return the name of a subcommand's module."""
-    return f"urc.cli.{verb.replace('-', '_')}"
 
 
 def _first_steps() -> str:
