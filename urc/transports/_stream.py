@@ -299,13 +299,11 @@ def unsent_in(line: socket.socket) -> int:
     The result is 0 if the number is unknown. The result is 1 for a closed socket, because its last
     bytes may not have arrived.
     """
-    if sys.platform != "linux":
-        return 0
     number = line.fileno()
-    if number < 0:
-        return 1
-    try:
-        ioctl(number, TIOCOUTQ, _UNSENT)  # SIOCOUTQ has the same number
-    except OSError:
-        return 0
-    return _UNSENT[0]
+    if sys.platform == "linux":
+        if number < 0:
+            return 1
+        with suppress(OSError):
+            ioctl(number, TIOCOUTQ, _UNSENT)  # SIOCOUTQ has the same number
+            return _UNSENT[0]
+    return 0
