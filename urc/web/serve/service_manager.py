@@ -49,7 +49,7 @@ class ServiceManager:
         # A leading @ is the notation for the abstract namespace (unix(7)).
         place = "\0" + self._place[1:] if self._place.startswith("@") else self._place
         try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
                 out.setblocking(False)
                 out.sendto("\n".join(lines).encode(), place)
         except OSError as error:
