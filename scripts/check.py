@@ -56,7 +56,8 @@ STATIC = (
     Step("prose", (PYTHON, "-m", "scripts.prose")),
     Step("format", (PYTHON, "-m", "ruff", "format", "--check", ".")),
     Step("types", (PYTHON, "-m", "mypy")),
-    Step("docs", (PYTHON, "-m", "scripts.docs")),
+    # The tests of the site build it, once.
+    Step("docs", (PYTHON, "-m", "scripts.docs", "--links")),
 )
 PYTEST = (PYTHON, "-m", "pytest")
 

@@ -99,7 +99,7 @@ _NO_ROBOT = "no robot of that name is served here"
 
 @dataclass(frozen=True, slots=True)
 class DashboardOptions:
-    """Options of the application; by default nothing is stored, and nobody has the start key."""
+    """Options of the application; by default nothing is stored, and no start key is shown."""
 
     access: Access | None = None
     """Identities and rights of the server; None to create a key that is never shown."""
