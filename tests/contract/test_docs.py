@@ -1,6 +1,7 @@
 """What the pages show is so: documents load, pieces fit, commands exist, reports are the same."""
 
 import importlib
+import re
 import shlex
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -88,7 +89,7 @@ def test_a_piece_is_part_of_the_whole_file(block: Block) -> None:
 @pytest.mark.parametrize(("block", "command"), COMMANDS, ids=str)
 def test_a_command_of_the_pages_is_understood(block: Block, command: str) -> None:
     """The verb and every option exist, by the parser of the command itself."""
-    program, verb, *words = shlex.split(command.partition(" | ")[0])
+    program, verb, *words = shlex.split(re.split(r" [|>] ", command)[0])
     if program == "./dev":
         verbs = dev_verbs()
         assert verb in verbs, str(block)

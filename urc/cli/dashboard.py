@@ -147,9 +147,7 @@ async def _serve(
             addresses = ready_addresses(url, place.host, access, certificates, place.tls)
             announce(stack, data, addresses)
             on_ready(addresses)
-            manager.tell("READY=1", f"STATUS=dashboard {addresses.url}")
-            watch = asyncio.ensure_future(manager.watch(partial(answers, addresses.url)))
-            stack.callback(watch.cancel)
+            _begin_heartbeats(stack, manager, addresses.url)
 
         factory = RobotFactory(robot_options)
         robots = {
@@ -201,6 +199,13 @@ async def _warn_of(data: Path) -> None:
         complain(f"urc: {warning}")
     if is_interrupted(data):
         complain("urc: 'urc restore' was interrupted; run it again with --replace")
+
+
+def _begin_heartbeats(stack: AsyncExitStack, manager: ServiceManager, url: str) -> None:
+    """Tell systemd that the server is ready, and send heartbeats until the end of `stack`."""
+    manager.tell("READY=1", f"STATUS=dashboard {url}")
+    watch = asyncio.ensure_future(manager.watch(partial(answers, url)))
+    stack.callback(watch.cancel)
 
 
 async def _robot_at_start(

@@ -6,8 +6,9 @@ import sys
 
 import pytest
 
+from urc._environment import REAL_TIME
 from urc.guard import real_time_priority
-from urc.guard.real_time_priority import PAUSE_S, SWITCH, RealTimePriority, why_not
+from urc.guard.real_time_priority import PAUSE_S, RealTimePriority, why_not
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="other systems have none of it")
 
@@ -48,7 +49,7 @@ class System:
 def system(monkeypatch: pytest.MonkeyPatch) -> System:
     """Nothing of this process is changed."""
     made = System()
-    monkeypatch.delenv(SWITCH, raising=False)
+    monkeypatch.delenv(REAL_TIME, raising=False)
     monkeypatch.setattr(os, "sched_setscheduler", made.set)
     monkeypatch.setattr(real_time_priority.resource, "setrlimit", made.bound)
     monkeypatch.setattr(real_time_priority.time, "monotonic", lambda: made.now)
@@ -78,7 +79,7 @@ def test_it_is_not_asked_for_where_nobody_wants_it(
     system: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One word in the environment."""
-    monkeypatch.setenv(SWITCH, "no")
+    monkeypatch.setenv(REAL_TIME, "no")
     assert RealTimePriority().request() == why_not() == "URC_REAL_TIME is no"
     assert system.asked == []
 

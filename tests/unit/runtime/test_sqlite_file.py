@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from urc.runtime import sqlite_file
-from urc.runtime.sqlite_file import open_for_reading, open_for_writing, set_aside
+from urc.runtime.sqlite_file import open_for_writing, opened_for_reading, set_aside
 
 
 @pytest.fixture
@@ -21,7 +21,8 @@ def test_file_is_created_for_its_owner_only_and_can_be_read(file: Path) -> None:
     with closing(open_for_writing(file)) as base:
         base.execute("CREATE TABLE one (number)")
         base.execute("INSERT INTO one VALUES (7)")
-        with closing(open_for_reading(file)) as other:
+        with opened_for_reading(file) as other:
+            assert other is not None
             assert other.execute("SELECT number FROM one").fetchall() == [(7,)]
         modes = [stat.S_IMODE(one.stat().st_mode) for one in file.parent.iterdir()]
     assert len(modes) == 3
