@@ -16,6 +16,7 @@ from scripts.needs import NEEDS, bring
 NAMES = (
     "startup",
     "engine_binary",
+    "ros_messages",
     "driver_poll",
     "driver_flood",
     "fanout",

@@ -20,6 +20,7 @@ __all__ = ["AXE", "NEEDS", "Brought", "Need", "bring"]
 APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
 AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
+ROSMSG = Path(__file__).resolve().parents[1] / "node_modules" / "@foxglove"
 PUPPETEER = Path(__file__).resolve().parents[1] / "node_modules" / "puppeteer-core"
 LANGUAGE_SERVER = (
     Path(__file__).resolve().parents[1]
@@ -248,6 +249,13 @@ NEEDS = (
         package="",
         purpose="tests of the emulated rosbridge against its browser client, roslib",
         other=lambda: os.fspath(ROSLIB) if ROSLIB.is_dir() else None,
+    ),
+    Need(
+        name="rosmsg",
+        executables=(),
+        package="",
+        purpose="tests of ROS messages against the reader of Foxglove",
+        other=lambda: os.fspath(ROSMSG) if ROSMSG.is_dir() else None,
     ),
     Need(
         name="axe",

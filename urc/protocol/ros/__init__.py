@@ -1,0 +1,1 @@
+"""ROS messages in their binary forms: definitions, generated readers and writers. Pure."""
