@@ -40,7 +40,8 @@ urc: 1
 kind: robot
 name: frozen
 transports:
-  wire: { type: ros, host: 127.0.0.1, port: PORT, version: 2, reconnect: { initial: 100ms } }
+  wire:
+    { type: ros, via: VIA, host: 127.0.0.1, port: PORT, version: 2, reconnect: { initial: 100ms } }
 commands:
   go:
     send: { publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }
@@ -85,9 +86,13 @@ async def freeze(
     robot_count: int = 1,
     lasts_s: float = 5.0,
     seed: int = 1,
+    via: str = "rosbridge",
     told: Callable[[Freeze], None] | None = None,
 ) -> Sequence[Freeze]:
-    """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each."""
+    """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
+
+    Over `via` rosbridge, the robot's program is a substitute; over foxglove, the server of its SDK.
+    """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
     done: list[Freeze] = []
@@ -99,14 +104,17 @@ async def freeze(
 
     async with asyncio.TaskGroup() as group:
         for each in moments:
-            group.create_task(_queue(each, lasts_s, take))
+            group.create_task(_queue(each, lasts_s, via, take))
     return done
 
 
-async def _queue(moments: Sequence[float], lasts_s: float, told: Callable[[Freeze], None]) -> None:
-    robots = await asyncio.to_thread(Robots, ["bridge:127.0.0.1:0"])
+async def _queue(
+    moments: Sequence[float], lasts_s: float, via: str, told: Callable[[Freeze], None]
+) -> None:
+    door = "foxglove" if via == "foxglove" else "bridge"
+    robots = await asyncio.to_thread(Robots, [f"{door}:127.0.0.1:0"])
     try:
-        profile = _profile(robots.ports[0])
+        profile = _profile(robots.ports[0], via)
         transports = built_in_catalog().transports
         async with Session(profile, {}, transports, motion="guarded") as session:
             for moment_s in moments:
@@ -116,10 +124,10 @@ async def _queue(moments: Sequence[float], lasts_s: float, told: Callable[[Freez
         await asyncio.to_thread(robots.close)
 
 
-def _profile(port: int) -> Profile:
+def _profile(port: int, via: str) -> Profile:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "frozen.yaml")
-        file.write_text(_DOCUMENT.replace("PORT", str(port)), "utf-8")
+        file.write_text(_DOCUMENT.replace("PORT", str(port)).replace("VIA", via), "utf-8")
         return load_profile(file, built_in_catalog())
 
 

@@ -165,7 +165,9 @@ def peer(script: str, *arguments: object) -> Iterator[int]:
 
 def _script(name: str, *arguments: str) -> list[str]:
     # -P: else its own folder is first on the path, with names of the standard library.
-    return [sys.executable, "-PSE", str(HERE / name), *arguments]
+    # -S: only the server of Foxglove needs installed packages.
+    flags = "-PE" if name == "foxglove_process.py" else "-PSE"
+    return [sys.executable, flags, str(HERE / name), *arguments]
 
 
 class Heard(NamedTuple):
@@ -177,7 +179,7 @@ class Heard(NamedTuple):
 
 
 class Robots(Program):
-    """Robots in one process; see `bench.rig.robot_process`."""
+    """Robots in one process; see `bench.rig.robot_process` and `bench.rig.foxglove_process`."""
 
     def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         self.heard: list[list[Heard]] = [[] for _ in places]
@@ -188,7 +190,9 @@ class Robots(Program):
         """Waits for a processor, by process id: end times, and durations in ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
-        super().__init__(_script("robot_process.py", *places), inside=inside)
+        is_foxglove = any(place.startswith("foxglove:") for place in places)
+        name = "foxglove_process.py" if is_foxglove else "robot_process.py"
+        super().__init__(_script(name, *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
     def take(self, line: str) -> None:

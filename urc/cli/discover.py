@@ -169,7 +169,7 @@ def _places(
 ) -> Iterator[tuple[str, tuple[str, int]]]:
     """Yield the type, host and port of each transport with complete settings."""
     from urc.runtime.settings import options_of
-    from urc.transports.ros.rosbridge import DEFAULT_PORT
+    from urc.transports.ros.choice import PORTS
 
     for spec in profile.driver.transports.values():
         if spec.type not in ("tcp", "ros", "mqtt", "telnet", "ssh") or spec.tunnel:
@@ -178,10 +178,11 @@ def _places(
             options = options_of(spec, settings)
         except UrcError:
             continue  # a setting without a value: the address is unknown
-        default = DEFAULT_PORT if spec.type == "ros" else None
-        host, port = options.get("host"), options.get("port", default)
-        if isinstance(host, str) and host and isinstance(port, int):
-            yield spec.type, (host, port)
+        usual = PORTS.get(str(options.get("via", "rosbridge")), ()) if spec.type == "ros" else ()
+        host, port = options.get("host"), options.get("port")
+        for number in usual if port is None else (port,):
+            if isinstance(host, str) and host and isinstance(number, int):
+                yield spec.type, (host, number)
 
 
 async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[list[Row], str]:

@@ -52,7 +52,8 @@ class KeyRename(NamedTuple):
             return False
         kind = mapping.get("type")
         if self.old == "via":  # `via` of a ROS transport is a new key with a meaning of its own
-            return kind != "ros" and (kind is not None or mapping["via"] != "rosbridge")
+            bridges = ("rosbridge", "foxglove", "auto")
+            return kind != "ros" and (kind is not None or mapping["via"] not in bridges)
         return not self.types or kind is None or kind in self.types
 
 

@@ -112,7 +112,12 @@ def traffic_of(payload: Payload) -> bytes:
     """Return a payload as text for traffic views: ``publish topic=/cmd_vel {"x":1}``."""
     if not isinstance(payload, Envelope):
         return payload
-    words = [f"{name}={value}" for name, value in payload.attributes.items() if value is not None]
+    words = [
+        f"{name}={value}"
+        for name, value in payload.attributes.items()
+        # The bytes of a ROS message are the same message as the body.
+        if value is not None and not isinstance(value, bytes | list)
+    ]
     head = " ".join((payload.verb, *words)).encode()
     if payload.body is None:
         return head

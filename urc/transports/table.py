@@ -14,7 +14,7 @@ TRANSPORTS = Table(
         "telnet": "urc.transports.telnet:from_setup",
         "http": "urc.transports.http:from_setup",
         "websocket": "urc.transports.websocket:from_setup",
-        "ros": "urc.transports.ros.rosbridge:from_setup",
+        "ros": "urc.transports.ros.choice:from_setup",
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )

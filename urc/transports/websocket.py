@@ -69,6 +69,11 @@ class WebSocketTransport:
         place = self._place
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
+    @property
+    def subprotocol(self) -> str | None:
+        """Subprotocol that the server has selected; None without a selection."""
+        return None if self._socket is None else self._socket.subprotocol
+
     async def open(self, timeout_s: float) -> None:
         """Connect and do the handshake, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
@@ -104,16 +109,24 @@ class WebSocketTransport:
             TransportError: the connection sends text, but `data` is not valid UTF-8.
         """
         message = as_bytes(data)
-        if self._socket is None:
-            raise PeerClosed(CLOSED)
         if self._is_text:
             try:
                 message.decode()
             except UnicodeDecodeError as fault:
                 text = "a text message must be valid UTF-8; use send_as: binary for other bytes"
                 raise TransportError(text) from fault
+        await self.write(message, is_text=self._is_text)
+
+    async def write(self, message: bytes, *, is_text: bool) -> None:
+        """Pass one message to the kernel, as text or as binary data.
+
+        Raises:
+            PeerClosed: the connection broke.
+        """
+        if self._socket is None:
+            raise PeerClosed(CLOSED)
         try:
-            await self._socket.send(message, text=self._is_text)
+            await self._socket.send(message, text=is_text)
         except ConnectionClosed as ended:
             raise PeerClosed(_end(ended)) from ended
 

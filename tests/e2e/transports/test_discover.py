@@ -21,7 +21,7 @@ from urc.simulator.server import serve
 from urc.transports.base import ConnectFailed, TransportSetup
 from urc.transports.discover_mdns import ServiceAnnouncement, announced
 from urc.transports.discover_serial import serial_ports
-from urc.transports.ros.rosbridge import from_setup
+from urc.transports.ros.choice import from_setup
 
 pytestmark = pytest.mark.anyio
 

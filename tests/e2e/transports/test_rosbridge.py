@@ -30,7 +30,7 @@ from urc.transports.base import (
     TransportError,
     TransportSetup,
 )
-from urc.transports.ros.rosbridge import from_setup
+from urc.transports.ros.choice import from_setup
 
 pytestmark = pytest.mark.anyio
 

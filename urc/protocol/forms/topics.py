@@ -13,9 +13,10 @@ from urc.model.payload import Envelope, Payload, ReadSpec
 from urc.model.sequence import ExpectStep, all_steps
 from urc.model.values import Value
 from urc.problems import UrcError
+from urc.protocol.ros.wanted import Path, paths_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
 
-__all__ = ["TopicReader", "frame_of", "listened", "matches", "topic_of"]
+__all__ = ["TopicReader", "frame_of", "listened", "matches", "paths_by_topic", "topic_of"]
 
 FEEDBACK = "/feedback"
 """Suffix of the feedback topic of an action."""
@@ -107,6 +108,17 @@ def listened(
             for name, value in read.listen.items():
                 mine.setdefault(name, value)
     return dict(topics)
+
+
+def paths_by_topic(
+    driver: Driver, transport: str, settings: Mapping[str, object]
+) -> dict[str, list[Path]]:
+    """Return the paths that a driver reads in the messages of each topic; see `paths_of`."""
+    found: dict[str, list[Path]] = {}
+    for read in _reads(driver, transport):
+        if read.topic is not None:
+            found.setdefault(topic_of(read, settings), []).extend(paths_of(read))
+    return found
 
 
 def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:

@@ -23,6 +23,7 @@ from urc.protocol.requests.pending_replies import PendingReplies
 from urc.protocol.requests.rate import Counters
 from urc.protocol.requests.reply_match import Matcher
 from urc.protocol.requests.request_queue import RequestQueue, rendered_size
+from urc.protocol.ros.topic_codec import TopicCodec
 
 __all__ = ["Connection"]
 
@@ -46,6 +47,8 @@ class Connection:
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
         """Values of private fields that the login has received, by name."""
+        self.codec: TopicCodec | None = None
+        """Converter of ROS messages in bytes; None on connections without such messages."""
         self.has_motion = False
         """Whether the connection has held commands, which bypass the queue."""
         self._pending_replies = PendingReplies()
@@ -165,6 +168,8 @@ class Connection:
         self._askers.clear()
         if state == "open":
             self.counters.reset()
+            if self.codec is not None:
+                self.codec.reset()
 
     def _read_frames(self, now: float) -> None:
         if self.spec.stale_after_s is not None:

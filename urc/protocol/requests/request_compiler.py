@@ -6,22 +6,25 @@ from functools import partial
 from urc.expressions import COUNTERS, NONCE, NOW
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.exchange import RESENDS, ProvisionalReplies, Stage
-from urc.model.payload import NUMBERED, ReadSpec, WriteSpec
+from urc.model.payload import NUMBERED, Payload, ReadSpec, WriteSpec
 from urc.model.sequence import ExpectStep, SendStep
 from urc.model.values import NOTHING
 from urc.protocol.forms.http_head import LOCATION
 from urc.protocol.forms.table import build_reader
+from urc.protocol.forms.topics import paths_by_topic
 from urc.protocol.framing.table import build_framing
 from urc.protocol.readings.compiled import build_fast_read
 from urc.protocol.readings.readings import Readings
 from urc.protocol.requests.bounds import queue_limit_s
 from urc.protocol.requests.condition_scope import SignalState
 from urc.protocol.requests.conversation import Conversation
-from urc.protocol.requests.encode import build_encode
+from urc.protocol.requests.encode import BadArgument, Encode, build_encode
 from urc.protocol.requests.exchange import CompiledRequest
 from urc.protocol.requests.message_effects import Acknowledgements, Collector, answering, collecting
 from urc.protocol.requests.rate import RANKS, GcraLimiter
 from urc.protocol.requests.reply_match import Aside, CompiledReply, Matcher
+from urc.protocol.ros.topic_codec import TopicCodec
+from urc.protocol.ros.write_source import Unwritable
 from urc.protocol.values.payload import CodecContext
 from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
 
@@ -59,6 +62,14 @@ class RequestCompiler:
                 self._react(spec, messages, matchers, context)
             else:
                 self.lines[name] = Conversation(spec, matchers)
+            self.lines[name].codec = self._codec(spec)
+
+    def _codec(self, spec: TransportSpec) -> TopicCodec | None:
+        """Return the codec of a connection that may carry ROS messages in bytes."""
+        if spec.type != "ros" or spec.options.get("via", "rosbridge") == "rosbridge":
+            return None
+        paths = paths_by_topic(self._driver, spec.name, self._readings.settings)
+        return TopicCodec(paths, is_ros1=spec.options.get("version") == 1)
 
     def _react(
         self,
@@ -144,6 +155,8 @@ class RequestCompiler:
             line.spec.encoding, self._readings.settings, self._fresh, self._is_compiled
         )
         encode = build_encode(send, line.framing, context, arguments)
+        if line.codec is not None:
+            encode = _converting(encode, line.codec)
         has_counters = COUNTERS in send.names
         is_fresh = bool((send.names & {NOW, NONCE}) - arguments.keys())
         learnt = (send.names & self._driver.learnt(transport)) - arguments.keys()
@@ -214,6 +227,18 @@ class RequestCompiler:
 
     def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
         return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
+
+
+def _converting(encode: Encode, codec: TopicCodec) -> Encode:
+    """Return a function that adds the bytes of a ROS message to an envelope."""
+
+    def converted(namespace: Mapping[str, object]) -> Payload:
+        try:
+            return codec.sent(encode(namespace))
+        except Unwritable as problem:
+            raise BadArgument(str(problem)) from None
+
+    return converted
 
 
 def _is_plain(reply: Reply) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias, cast
 
 from urc.model.payload import ReadSpec
 
-__all__ = ["ALL", "EACH", "Wanted", "paths_of", "wanted_of"]
+__all__ = ["ALL", "EACH", "Path", "Wanted", "paths_of", "wanted_of"]
 
 ALL: Final = True
 EACH: Final = "*"

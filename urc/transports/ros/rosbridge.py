@@ -32,25 +32,22 @@ from urc.transports.base import (
     NOTICE,
     ConnectFailed,
     PeerClosed,
-    Transport,
     TransportError,
-    TransportSetup,
 )
 from urc.transports.ros.graph import TopicGraph, version_of
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
-from urc.transports.ros.rosbridge_operations import MAX_BYTES, BadOperation, OperationReader
+from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
 from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.websocket import WebSocketTransport
 
-__all__ = ["RosbridgeTransport", "from_setup"]
+__all__ = ["AUTO", "DEFAULT_PORT", "RosbridgeTransport", "merged", "subscription"]
 
 DEFAULT_PORT = 9090
 AUTO: Final = "auto"
-_WEBSOCKET = ("auth", "headers")
-"""Options that are passed to the WebSocket transport."""
-
 _ANSWER_S = 3.0
 """Maximum wait for a reply of rosapi, in seconds; without a reply, rosapi counts as missing."""
+_PART = 0.5
+"""Maximum part of the timeout of an opening that is spent on that wait."""
 _CONNECTS_S = 1.0
 """Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
@@ -96,10 +93,14 @@ class RosbridgeTransport:
         """Connect and subscribe; raise `ConnectFailed` on failure within `timeout_s` seconds."""
         await self.close()
         await self._wire.open(timeout_s)
+        await self.begin(timeout_s)
+
+    async def begin(self, timeout_s: float) -> None:
+        """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
         session = self._session = _Session(self._wire, self._ros, self._graph)
         try:
             async with asyncio.timeout(timeout_s):
-                await session.start(self._subscriptions)
+                await session.start(self._subscriptions, min(_ANSWER_S, timeout_s * _PART))
         except BaseException as fault:
             self._session = None
             await session.end()
@@ -171,38 +172,13 @@ class RosbridgeTransport:
             self._session.queue.answer(Envelope(NOTICE, {}, fault))
 
 
-def from_setup(setup: TransportSetup) -> Transport:
-    """Return a rosbridge transport for the options of a document; see docs/transports/rosbridge.md.
+def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
+    """Return a subscription with the options of a document.
 
     Raises:
-        TransportError: an option is missing or invalid.
+        TransportError: an option is invalid.
     """
-    options = setup.options
-    if (via := options.get("via", "rosbridge")) != "rosbridge":
-        raise TransportError(f"ros needs rosbridge as via, not {via!r}")
-    host, port = options.get("host"), options.get("port", DEFAULT_PORT)
-    if not isinstance(host, str) or not host.strip():
-        raise TransportError(f"ros needs a host name or address, not {host!r}")
-    if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535:
-        raise TransportError(f"ros needs a port from 1 to 65535, not {port!r}")
-    path, tls = options.get("path", "/"), options.get("tls") or None
-    if not isinstance(path, str) or not path.startswith("/"):
-        raise TransportError(f"ros needs a path that starts with /, not {path!r}")
-    ros = options.get("version")
-    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, AUTO)):
-        raise TransportError(f"ros needs 1, 2 or auto as version, not {ros!r}")
-    host = host.strip()
-    where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-    url = f"{'ws' if tls is None else 'wss'}://{where}{path}"
-    given = {name: options[name] for name in _WEBSOCKET if name in options}
-    wire = WebSocketTransport(
-        setup._replace(options={"url": url, "tls": tls, "max_message": MAX_BYTES, **given})
-    )
-    wanted = [_listening(one.topic, one.attributes) for one in setup.subscriptions]
-    return RosbridgeTransport(wire, where, _merged(wanted), ros)
 
-
-def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
     def number(name: str, factor: float = 1) -> int:
         value = attributes.get(name) or 0
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
@@ -223,7 +199,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
     )
 
 
-def _merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
+def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
     """Return one subscription per topic, because a second one cancels the first one's throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
@@ -257,8 +233,8 @@ class _Session:
         self._fresh: dict[str, None] = {}
         """Topics whose first message may not have arrived yet, in order of publication."""
 
-    async def start(self, subscriptions: tuple[RosSubscription, ...]) -> None:
-        """Query the list of topics, subscribe, and start reading."""
+    async def start(self, subscriptions: tuple[RosSubscription, ...], answer_s: float) -> None:
+        """Query the list of topics, wait up to `answer_s` for it, subscribe, and start reading."""
         self._reader = asyncio.create_task(self._read())
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
@@ -267,7 +243,7 @@ class _Session:
         await self._write(asked)
         if self._is_auto:
             with suppress(TimeoutError):  # without rosapi, type names are sent as written
-                async with asyncio.timeout(_ANSWER_S):
+                async with asyncio.timeout(answer_s):
                     await self._learnt.wait()
         for one in subscriptions:
             await self._write(self._client.listen(one))

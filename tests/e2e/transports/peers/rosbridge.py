@@ -11,7 +11,7 @@ from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import TcpPeer
 from urc.model.payload import Envelope
 from urc.transports.base import TopicSubscription, Transport, TransportSetup
-from urc.transports.ros.rosbridge import from_setup
+from urc.transports.ros.choice import from_setup
 
 __all__ = ["RosbridgePeer"]
 

@@ -1,0 +1,257 @@
+"""Conversion of ROS messages between their binary forms and plain data, for one connection.
+
+Pure. Over the Foxglove protocol, the transport carries messages as bytes. Before the messages of a
+topic, the transport delivers the definition of their type: an envelope with the verb `DEFINITION`.
+The codec then reads the parts of each message that the driver uses. The transport never reads a
+message: for moving robots, the transport runs in the guard, which must not be delayed.
+
+In the other direction, the codec adds the bytes of a message to its envelope. The definition of a
+published type is one of `urc.protocol.ros.common_types`, or comes from a topic of the same type.
+Without a definition, the envelope has no bytes, and the transport sends JSON. An envelope always
+keeps its plain body, so the same envelope also fits rosbridge.
+
+Services have their own definitions, which the transport delivers with the first call: the transport
+returns the call with the verb `UNENCODED`, and the codec sends the call again, in bytes.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, NamedTuple, cast
+
+from urc.model.payload import Envelope, Payload
+from urc.problems import UrcError, printable
+from urc.protocol.ros.common_types import common_types
+from urc.protocol.ros.definition import BadDefinition, Definitions, Record, layout_of, plain_name
+from urc.protocol.ros.idl_text import parse_idl
+from urc.protocol.ros.msg_text import parse_msg
+from urc.protocol.ros.read_source import BadMessage, Read, build_read, read_safely
+from urc.protocol.ros.wanted import ALL, Path, Wanted, wanted_of
+from urc.protocol.ros.write_source import Unwritable, Writer
+
+__all__ = ["DEFINITION", "UNENCODED", "Received", "TopicCodec"]
+
+DEFINITION: Final = "definition"
+"""Verb of a definition: attributes `topic`, `type`, `encoding` and `notation`; the body is text."""
+UNENCODED: Final = "unencoded"
+"""Verb of a returned call: attributes as of the call, and `request` and `response`, each a list of
+type, encoding, notation and text."""
+MAX_COMPILED: Final = 256
+"""Maximum number of compiled types of one connection. A hostile robot could otherwise announce new
+types without end."""
+_SHOWN: Final = 60
+_ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
+"""Byte order and largest alignment, by encapsulation identifier: CDR and plain CDR2."""
+
+
+class Received(NamedTuple):
+    """The result of a received envelope."""
+
+    envelope: Envelope | None = None
+    """Envelope with plain data; None if there is nothing to deliver."""
+    reply: Envelope | None = None
+    """Envelope to send."""
+    fault: str = ""
+    """Reason why the envelope was dropped; ""."""
+
+
+class _Schema(NamedTuple):
+    """A type as a robot describes it."""
+
+    type: str
+    encoding: str
+    notation: str
+    text: str
+
+
+class _Source:
+    """The readers of one type, generated when a byte order is first seen."""
+
+    def __init__(self, layout: Record, wanted: Wanted, *, is_ros1: bool) -> None:
+        self._layout = layout
+        self._wanted = wanted
+        self._is_ros1 = is_ros1
+        self._reads: dict[int, Read] = {}
+
+    def read(self, data: bytes) -> dict[str, Any]:
+        """Return the wanted parts of a message; raise `BadMessage` or `BadDefinition`."""
+        kind = 1 if self._is_ros1 else data[1] if len(data) >= 4 and not data[0] else -1
+        read = self._reads.get(kind)
+        if read is None:
+            if kind not in _ORDERS:
+                raise BadMessage(f"the message begins with {data[:4].hex(' ')}, which is not CDR")
+            order, widest = _ORDERS[kind]
+            read = build_read(
+                self._layout, self._wanted, order=order, is_ros1=self._is_ros1, widest=widest
+            )
+            self._reads[kind] = read
+        return read_safely(read, data)
+
+
+class TopicCodec:
+    """The codec of one connection; definitions are forgotten when the connection is opened."""
+
+    def __init__(
+        self, paths: Mapping[str, Iterable[Path]] | None = None, *, is_ros1: bool = False
+    ) -> None:
+        """Initialise without definitions.
+
+        Args:
+            paths: paths that the driver reads, by topic; of other topics, messages are read whole.
+            is_ros1: whether to write in the format of ROS 1 until a definition tells.
+        """
+        self._wanted = {topic: wanted_of(set(each)) for topic, each in (paths or {}).items()}
+        self._is_ros1 = is_ros1
+        self._sources: dict[str, _Source] = {}
+        self._services: dict[str, tuple[Writer | None, _Source | None, str]] = {}
+        self._compiled: dict[tuple[object, ...], _Source | Writer] = {}
+        self._known: dict[str, Definitions] = {}
+        """Definitions from the robot, by plain name of the type."""
+        self._writers: dict[tuple[str, bool], Writer | None] = {}
+
+    def reset(self) -> None:
+        """Forget the definitions of the last connection."""
+        self._sources.clear()
+        self._services.clear()
+        self._compiled.clear()
+        self._known.clear()
+        self._writers.clear()
+
+    # -- received envelopes
+
+    def received(self, envelope: Envelope) -> Received:
+        """Return the envelope with plain data in place of bytes."""
+        try:
+            if envelope.verb == DEFINITION:
+                self._define(envelope)
+                return Received()
+            if envelope.verb == UNENCODED:
+                return self._encode_call(envelope)
+            return Received(self._plain(envelope))
+        except (BadMessage, BadDefinition) as fault:
+            name = envelope.attributes.get("topic") or envelope.attributes.get("service")
+            return Received(fault=f"{printable(str(name))[:_SHOWN]}: {fault}")
+
+    def _define(self, envelope: Envelope) -> None:
+        said = envelope.attributes
+        topic = str(said.get("topic"))
+        self._sources.pop(topic, None)
+        schema = _Schema(
+            str(said.get("type")),
+            str(said.get("encoding")),
+            str(said.get("notation")),
+            str(envelope.body),
+        )
+        if schema.encoding == "json":
+            return  # the form json reads bytes
+        self._is_ros1 = schema.encoding == "ros1"
+        self._sources[topic] = self._source(schema, self._wanted.get(topic, ALL))
+
+    def _source(self, schema: _Schema, wanted: Wanted) -> _Source:
+        key = (schema, repr(wanted))
+        found = self._compiled.get(key)
+        if not isinstance(found, _Source):
+            found = _Source(self._layout(schema), wanted, is_ros1=schema.encoding == "ros1")
+            self._keep(key, found)
+        return found
+
+    def _keep(self, key: tuple[object, ...], made: "_Source | Writer") -> None:
+        if len(self._compiled) >= MAX_COMPILED:
+            raise BadDefinition(f"the robot has announced more than {MAX_COMPILED} types")
+        self._compiled[key] = made
+
+    def _layout(self, schema: _Schema) -> Record:
+        if schema.encoding not in ("cdr", "ros1"):
+            raise BadDefinition(f"messages in {schema.encoding!r} cannot be read")
+        parse = {"ros2msg": parse_msg, "ros1msg": parse_msg, "ros2idl": parse_idl}.get(
+            schema.notation
+        )
+        if parse is None:
+            raise BadDefinition(f"definitions in {schema.notation!r} cannot be read")
+        found = parse(schema.type, schema.text)
+        self._known[plain_name(schema.type)] = found
+        self._writers.pop((plain_name(schema.type), schema.encoding == "ros1"), None)
+        return layout_of(schema.type, found, is_ros1=schema.encoding == "ros1")
+
+    def _plain(self, envelope: Envelope) -> Envelope:
+        said, body = envelope.attributes, envelope.body
+        encoding = said.get("encoding")
+        if encoding is None or encoding == "json" or not isinstance(body, bytes):
+            return envelope
+        if envelope.verb == "message":
+            source = self._sources.get(str(said.get("topic")))
+        else:
+            source = self._services.get(str(said.get("service")), (None, None, ""))[1]
+        if source is None:
+            raise BadMessage("a message arrived without the definition of its type")
+        return envelope._replace(body=source.read(body))
+
+    # -- calls
+
+    def _encode_call(self, envelope: Envelope) -> Received:
+        """Compile the types of a service, and return the call in bytes."""
+        said = dict(envelope.attributes)
+        parts = [cast("list[str]", said.pop(part)) for part in ("request", "response")]
+        request, response = (_Schema(*part) for part in parts)
+        service = str(said.get("service"))
+        try:
+            if request.encoding == "json":
+                self._services[service] = (None, None, "json")
+            else:
+                key = (request, "writer")
+                writer = self._compiled.get(key)
+                if not isinstance(writer, Writer):
+                    is_ros1 = request.encoding == "ros1"
+                    writer = Writer(self._layout(request), is_ros1=is_ros1)
+                    self._keep(key, writer)
+                source = None if response.encoding == "json" else self._source(response, ALL)
+                self._services[service] = (writer, source, request.encoding)
+            return Received(reply=self._call(Envelope("call", said, envelope.body)))
+        except (BadDefinition, Unwritable) as fault:
+            attributes = {"id": said.get("id"), "ok": False, "reason": str(fault)}
+            return Received(Envelope("response", attributes))
+
+    def _call(self, envelope: Envelope) -> Envelope:
+        found = self._services.get(str(envelope.attributes.get("service")))
+        if found is None:
+            return envelope
+        writer, _, encoding = found
+        data = b"" if writer is None else writer.write(envelope.body).data
+        return envelope._replace(
+            attributes={**envelope.attributes, "encoding": encoding, "data": data}
+        )
+
+    # -- sent envelopes
+
+    def sent(self, payload: Payload) -> Payload:
+        """Return an envelope with the bytes of its message, if the definition is known.
+
+        Raises:
+            Unwritable: the message does not fit its type.
+        """
+        if not isinstance(payload, Envelope):
+            return payload
+        if payload.verb == "call":
+            return self._call(payload)
+        if payload.verb != "publish":
+            return payload
+        writer = self._writer(plain_name(str(payload.attributes.get("type") or "")))
+        if writer is None:
+            return payload
+        written = writer.write(payload.body)
+        added = {
+            "encoding": "ros1" if self._is_ros1 else "cdr",
+            "data": written.data,
+            "stamps": list(written.stamps),
+        }
+        return payload._replace(attributes={**payload.attributes, **added})
+
+    def _writer(self, name: str) -> Writer | None:
+        key = (name, self._is_ros1)
+        if key not in self._writers:
+            common = common_types(is_ros1=self._is_ros1)
+            definitions = self._known.get(name, common)
+            try:
+                layout = layout_of(name, definitions, is_ros1=self._is_ros1)
+                self._writers[key] = Writer(layout, is_ros1=self._is_ros1)
+            except UrcError:
+                self._writers[key] = None
+        return self._writers[key]

@@ -1,0 +1,189 @@
+"""The kinds of bridges of ROS, and the choice among them.
+
+A WebSocket client offers subprotocols, and the server selects one. A server of the Foxglove
+protocol requires one of its own; a rosbridge selects none. With ``via: auto``, the transport
+therefore offers the subprotocols of Foxglove, and follows the selection of the server. Without a
+port, the transport tries the usual ports of both, first the port that worked last.
+"""
+
+from collections.abc import Mapping
+from typing import Final, Protocol
+
+from urc.model.payload import Envelope, Payload
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
+from urc.transports.ros import rosbridge
+from urc.transports.ros.foxglove import DEFAULT_PORT as FOXGLOVE_PORT
+from urc.transports.ros.foxglove import FoxgloveTransport
+from urc.transports.ros.foxglove_frames import SUBPROTOCOLS
+from urc.transports.ros.foxglove_session import TopicWish
+from urc.transports.ros.rosbridge import RosbridgeTransport
+from urc.transports.ros.rosbridge_operations import MAX_BYTES
+from urc.transports.websocket import WebSocketTransport
+
+__all__ = ["PORTS", "AnyBridgeTransport", "from_setup"]
+
+PORTS: Final[Mapping[str, tuple[int, ...]]] = {
+    "rosbridge": (rosbridge.DEFAULT_PORT,),
+    "foxglove": (FOXGLOVE_PORT,),
+    "auto": (FOXGLOVE_PORT, rosbridge.DEFAULT_PORT),
+}
+"""Usual ports by kind of bridge, in the order of attempts."""
+_WEBSOCKET: Final = ("auth", "headers")
+"""Options that are passed to the WebSocket transport."""
+
+
+class _Bridge(Protocol):
+    """A transport that can start on an open WebSocket."""
+
+    @property
+    def address(self) -> str: ...
+    async def begin(self, timeout_s: float) -> None: ...
+    async def receive(self) -> Envelope: ...
+    async def send(self, data: Payload) -> None: ...
+    async def close(self) -> None: ...
+    async def abort(self) -> None: ...
+    async def settle(self) -> str: ...
+    async def probe(self) -> None: ...
+    def unsent(self) -> int: ...
+
+
+class Candidate:
+    """One address of a bridge, with a transport for each kind of bridge."""
+
+    def __init__(
+        self, wire: WebSocketTransport, foxglove: FoxgloveTransport, other: RosbridgeTransport
+    ) -> None:
+        self._wire = wire
+        self._foxglove = foxglove
+        self._rosbridge = other
+
+    async def open(self, timeout_s: float) -> _Bridge:
+        """Connect, and return the transport for the kind of the server."""
+        await self._wire.open(timeout_s)
+        is_foxglove = self._wire.subprotocol in SUBPROTOCOLS
+        bridge: _Bridge = self._foxglove if is_foxglove else self._rosbridge
+        await bridge.begin(timeout_s)
+        return bridge
+
+
+class AnyBridgeTransport:
+    """A transport to the first bridge that answers; may be opened several times."""
+
+    def __init__(self, candidates: list[Candidate], where: str) -> None:
+        """Initialise without connecting; `where` is the target as text to display."""
+        self._candidates = candidates
+        self._where = where
+        self._bridge: _Bridge | None = None
+
+    @property
+    def address(self) -> str:
+        """Target of the transport as text to display, such as ``ros 192.168.1.5``."""
+        return self._bridge.address if self._bridge is not None else f"ros {self._where}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect to a bridge; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        await self.close()
+        faults = []
+        for candidate in tuple(self._candidates):
+            try:
+                self._bridge = await candidate.open(timeout_s / len(self._candidates))
+            except ConnectFailed as fault:
+                faults.append(str(fault))
+                continue
+            # The next attempt begins with this one, because a stop may depend on it.
+            self._candidates.remove(candidate)
+            self._candidates.insert(0, candidate)
+            return
+        raise ConnectFailed("; ".join(faults))
+
+    async def receive(self) -> Envelope:
+        """Return the next message, definition or response; raise `PeerClosed` at the end."""
+        return await self._open_bridge().receive()
+
+    async def send(self, data: Payload) -> None:
+        """Publish or call a service; raise `TransportError` on failure."""
+        await self._open_bridge().send(data)
+
+    async def close(self) -> None:
+        """Close the connection immediately. The method never raises and may be called twice."""
+        bridge, self._bridge = self._bridge, None
+        if bridge is not None:
+            await bridge.close()
+
+    async def abort(self) -> None:
+        """Close the connection immediately and discard unsent data. Never raises."""
+        bridge, self._bridge = self._bridge, None
+        if bridge is not None:
+            await bridge.abort()
+
+    async def settle(self) -> str:
+        """Wait until the first messages have arrived; return a line about lost ones, or ""."""
+        return "" if self._bridge is None else await self._bridge.settle()
+
+    async def probe(self) -> None:
+        """Probe the bridge, and return as soon as the bridge has sent any data."""
+        await self._open_bridge().probe()
+
+    def unsent(self) -> int:
+        """Return the number of bytes that have not been acknowledged."""
+        return 0 if self._bridge is None else self._bridge.unsent()
+
+    def _open_bridge(self) -> _Bridge:
+        if self._bridge is None:
+            raise PeerClosed("the connection is closed")
+        return self._bridge
+
+
+def from_setup(setup: TransportSetup) -> Transport:
+    """Return a transport of ROS for the options of a document; see docs/transports/ros.md.
+
+    Raises:
+        TransportError: an option is missing or invalid.
+    """
+    options = setup.options
+    via = options.get("via", "rosbridge")
+    if not isinstance(via, str) or via not in PORTS:
+        raise TransportError(f"ros needs {', '.join(PORTS)} as via, not {via!r}")
+    host, port = options.get("host"), options.get("port")
+    if not isinstance(host, str) or not host.strip():
+        raise TransportError(f"ros needs a host name or address, not {host!r}")
+    host = host.strip()
+    if port is not None and (
+        isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535
+    ):
+        raise TransportError(f"ros needs a port from 1 to 65535, not {port!r}")
+    ros = options.get("version")
+    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, rosbridge.AUTO)):
+        raise TransportError(f"ros needs 1, 2 or auto as version, not {ros!r}")
+    wanted = rosbridge.merged(
+        [rosbridge.subscription(one.topic, one.attributes) for one in setup.subscriptions]
+    )
+    wishes = tuple(TopicWish(one.topic, one.type, one.throttle_ms / 1000) for one in wanted)
+    declared = ros if isinstance(ros, int) else None
+    candidates = []
+    for number in PORTS[via] if port is None else (port,):
+        where = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
+        wire = _wire(setup, where, offers=via != "rosbridge")
+        foxglove = FoxgloveTransport(wire, where, wishes, declared)
+        other = RosbridgeTransport(wire, where, wanted, ros)
+        if via == "rosbridge":
+            return other
+        if via == "foxglove":
+            return foxglove
+        candidates.append(Candidate(wire, foxglove, other))
+    return AnyBridgeTransport(candidates, host if port is None else where)
+
+
+def _wire(setup: TransportSetup, where: str, *, offers: bool) -> WebSocketTransport:
+    path, tls = setup.options.get("path", "/"), setup.options.get("tls") or None
+    if not isinstance(path, str) or not path.startswith("/"):
+        raise TransportError(f"ros needs a path that starts with /, not {path!r}")
+    options: dict[str, object] = {
+        "url": f"{'ws' if tls is None else 'wss'}://{where}{path}",
+        "tls": tls,
+        "max_message": MAX_BYTES,
+    }
+    if offers:
+        options["subprotocols"] = list(SUBPROTOCOLS)
+    options |= {name: setup.options[name] for name in _WEBSOCKET if name in setup.options}
+    return WebSocketTransport(setup._replace(options=options))

@@ -1,0 +1,226 @@
+"""A transport for ROS robots behind a server of the Foxglove protocol, such as foxglove_bridge.
+
+Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
+protocol is `FoxgloveSession`, whose objects are discarded with the connection, so no data can be
+sent late. A task reads continuously, even if messages are consumed slowly: the bridge drops the
+oldest data of a slow client. Channels come and go; changes are collected for `_SETTLE_S`, because a
+broken robot may announce thousands of channels a second.
+
+A bridge creates a publisher of ROS when the client announces a topic, and ROS connects publishers
+and subscribers later. Stops are therefore repeated, and topics of earlier connections are announced
+again as soon as a connection opens.
+"""
+
+import asyncio
+from contextlib import suppress
+from typing import Final
+
+from urc.model.payload import Envelope, Payload
+from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
+from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession, TopicWish
+from urc.transports.ros.graph import TopicGraph
+from urc.transports.topic_queue import TopicReceiveQueue
+from urc.transports.websocket import WebSocketTransport
+
+__all__ = ["DEFAULT_PORT", "FoxgloveTransport"]
+
+DEFAULT_PORT: Final = 8765
+_GREETS_S: Final = 3.0
+"""Maximum wait for the description of the server, in seconds."""
+_SETTLE_S: Final = 0.1
+_CHECK_S: Final = 2.0
+"""Delay until missing topics are reported, in seconds."""
+_CONNECTS_S: Final = 1.0
+"""Time in which ROS connects a new publisher, in seconds."""
+_TURN_S: Final = 0.005
+"""Maximum time for reading frames in one turn of the event loop, in seconds."""
+
+
+class FoxgloveTransport:
+    """A transport to one server of the Foxglove protocol; may be opened several times."""
+
+    def __init__(
+        self,
+        wire: WebSocketTransport,
+        where: str,
+        wishes: tuple[TopicWish, ...] = (),
+        ros: int | None = None,
+    ) -> None:
+        """Initialise without connecting.
+
+        Args:
+            wire: WebSocket transport that offers the subprotocols, owned by this transport.
+            where: target as text to display, such as ``192.168.1.5:8765``.
+            wishes: topics to subscribe to, each once.
+            ros: ROS version declared in the document; None if undeclared.
+        """
+        self._wire = wire
+        self._where = where
+        self._wishes = wishes
+        self._graph = TopicGraph(self._log, ros)
+        self._published: dict[tuple[str, str], str] = {}
+        self._session: FoxgloveSession | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._greeted = asyncio.Event()
+        self._news = asyncio.Event()
+        """Event that is set after the robot has announced something."""
+        self._check: asyncio.TimerHandle | None = None
+        self._fresh: dict[str, None] = {}
+        """Topics whose first message may not have arrived yet."""
+
+    @property
+    def address(self) -> str:
+        """Target of the transport as text to display, such as ``ros 192.168.1.5:8765``."""
+        return f"ros {self._where}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect and subscribe; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        await self.close()
+        await self._wire.open(timeout_s)
+        await self.begin(timeout_s)
+
+    async def begin(self, timeout_s: float) -> None:
+        """Start the protocol on the open WebSocket; raise `ConnectFailed` on failure."""
+        loop = asyncio.get_running_loop()
+        self._greeted.clear()
+        self._news.clear()
+        self._fresh.clear()
+        session = self._session = FoxgloveSession(
+            TopicReceiveQueue(),
+            self._wishes,
+            self._graph,
+            call_at=loop.call_at,
+            clock=loop.time,
+            published=self._published,
+        )
+        self._tasks = [
+            asyncio.create_task(self._read(session)),
+            asyncio.create_task(self._settle(session)),
+        ]
+        try:
+            async with asyncio.timeout(min(timeout_s, _GREETS_S)):
+                await self._greeted.wait()
+                await self._flush(session)
+        except (TimeoutError, TransportError) as fault:
+            why = session.queue.ended or str(fault) or "it does not describe itself"
+            await self.close()
+            raise ConnectFailed(f"{self._where} is no Foxglove server ({why})") from fault
+        except BaseException:
+            await self.close()
+            raise
+        if self._wishes:
+            self._check = loop.call_later(_CHECK_S, session.check_topics)
+
+    async def receive(self) -> Envelope:
+        """Return the next message, definition or response; raise `PeerClosed` at the end."""
+        if self._session is None:
+            raise PeerClosed("the connection is closed")
+        return await self._session.queue.pop()
+
+    async def send(self, data: Payload) -> None:
+        """Publish or call a service; return when the kernel has the data.
+
+        Raises:
+            PeerClosed: the connection broke.
+            TransportError: the bridge does not support `data`.
+        """
+        session = self._session
+        if session is None:
+            raise PeerClosed("the connection is closed")
+        if not isinstance(data, Envelope):
+            raise TransportError("ros carries messages, not bytes; use publish or call")
+        session.perform(data)
+        if data.verb == "publish" and len(self._fresh) < KNOWN_TOPICS:
+            self._fresh[str(data.attributes.get("topic"))] = None
+        await self._flush(session)
+
+    async def close(self) -> None:
+        """Close the connection immediately, discarding unsent data.
+
+        The method never raises and may be called twice.
+        """
+        try:
+            await self._end()
+        finally:
+            await self._wire.close()
+
+    async def abort(self) -> None:
+        """Close the connection immediately and discard unsent data. Never raises."""
+        try:
+            await self._end()
+        finally:
+            await self._wire.abort()
+
+    async def settle(self) -> str:
+        """Wait until the first message of every topic has reached its subscribers.
+
+        Returns:
+            A line with the topics without subscribers, or "".
+        """
+        topics = list(self._fresh)
+        self._fresh.clear()
+        session = self._session
+        if not topics or session is None:
+            return ""
+        await asyncio.sleep(_CONNECTS_S)
+        lost = [topic for topic in topics if session.listeners(topic) == []]
+        return f"nothing subscribes to {', '.join(lost)}" if lost else ""
+
+    async def probe(self) -> None:
+        """Probe the bridge, and return as soon as the bridge has sent any data."""
+        await self._wire.probe()
+
+    def unsent(self) -> int:
+        """Return the number of bytes that have not been acknowledged."""
+        return self._wire.unsent()
+
+    # -- the reader
+
+    async def _end(self) -> None:
+        session, self._session = self._session, None
+        if self._check is not None:
+            self._check.cancel()
+        if session is not None:
+            session.queue.end("the connection is closed")
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _read(self, session: FoxgloveSession) -> None:
+        """Process received frames until the connection ends."""
+        clock = asyncio.get_running_loop().time
+        began_s = clock()
+        try:
+            while True:
+                frame = await self._wire.receive()
+                session.arrived(frame)
+                if frame[0] == ord("{"):
+                    self._news.set()
+                    if session.is_greeted:
+                        self._greeted.set()
+                # Frames in the buffer need no wait, and some take long to parse.
+                if session.queue.is_filling or clock() - began_s > _TURN_S:
+                    await asyncio.sleep(0)
+                    began_s = clock()
+        except TransportError as ended:
+            session.queue.end(str(ended))
+            self._greeted.set()
+
+    async def _settle(self, session: FoxgloveSession) -> None:
+        """Subscribe to topics after the robot has announced something, until cancelled."""
+        with suppress(TransportError):  # the reader reports the end of the connection
+            while True:
+                await self._news.wait()
+                self._news.clear()
+                session.reconcile()
+                await self._flush(session)
+                await asyncio.sleep(_SETTLE_S)
+
+    async def _flush(self, session: FoxgloveSession) -> None:
+        for frame, is_text in session.written():
+            await self._wire.write(frame, is_text=is_text)
+
+    def _log(self, fault: str) -> None:
+        if self._session is not None:
+            self._session.queue.answer(Envelope(NOTICE, {}, fault))

@@ -1,0 +1,172 @@
+"""Frames of the Foxglove WebSocket protocol. Pure.
+
+A text frame is a JSON object with the key ``op``. A binary frame begins with one byte for its kind;
+all numbers are little-endian. The specification is that of foxglove/ws-protocol, version 1. The
+subprotocol ``foxglove.sdk.v1`` has the same frames.
+"""
+
+import struct
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader, encode_operation
+
+__all__ = [
+    "SUBPROTOCOLS",
+    "BadOperation",
+    "Channel",
+    "FrameReader",
+    "MessageData",
+    "ServiceReply",
+    "ServiceType",
+    "TimeTold",
+    "call_frame",
+    "channel_of",
+    "encode_operation",
+    "publish_frame",
+    "service_of",
+]
+
+SUBPROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+MAX_SCHEMA: Final = 262_144
+"""Maximum length of a definition, in characters; longer definitions are dropped."""
+_MESSAGE, _TIME, _REPLY = 1, 2, 3
+_MESSAGE_HEAD: Final = struct.Struct("<xIQ")
+_TIME_HEAD: Final = struct.Struct("<xQ")
+_REPLY_HEAD: Final = struct.Struct("<xIII")
+
+
+class MessageData(NamedTuple):
+    """A message of a subscribed channel."""
+
+    subscription: int
+    time_ns: int
+    """Time at which the bridge received the message, by the robot's clock."""
+    data: bytes
+
+
+class TimeTold(NamedTuple):
+    """The time of the robot, such as the time of a simulation."""
+
+    time_ns: int
+
+
+class ServiceReply(NamedTuple):
+    """The reply to a call."""
+
+    call: int
+    encoding: str
+    data: bytes
+
+
+class Channel(NamedTuple):
+    """A topic of the robot, with the definition of its type."""
+
+    id: int
+    topic: str
+    encoding: str
+    type: str
+    notation: str
+    schema: str
+
+
+class ServiceType(NamedTuple):
+    """A service of the robot; `request` and `response` are type, encoding, notation and text."""
+
+    id: int
+    name: str
+    type: str
+    request: list[str]
+    response: list[str]
+
+
+class FrameReader:
+    """A decoder of received frames."""
+
+    def __init__(self) -> None:
+        self._operations = OperationReader()
+
+    def read(self, frame: bytes) -> dict[str, Any] | MessageData | TimeTold | ServiceReply | None:
+        """Return the content of a frame; None for an unknown kind.
+
+        Raises:
+            BadOperation: the frame is invalid.
+        """
+        kind = frame[0]
+        try:
+            if kind == _MESSAGE:
+                number, time_ns = _MESSAGE_HEAD.unpack_from(frame)
+                return MessageData(number, time_ns, frame[_MESSAGE_HEAD.size :])
+            if kind == _TIME:
+                return TimeTold(*_TIME_HEAD.unpack_from(frame))
+            if kind == _REPLY:
+                _, call, length = _REPLY_HEAD.unpack_from(frame)
+                start = _REPLY_HEAD.size + length
+                if start > len(frame):
+                    raise BadOperation("a reply ends too early")
+                encoding = frame[_REPLY_HEAD.size : start].decode("ascii", "replace")
+                return ServiceReply(call, encoding, frame[start:])
+        except struct.error as problem:
+            raise BadOperation(f"a frame of {len(frame)} bytes is too short") from problem
+        return self._operations.read(frame) if kind == ord("{") else None
+
+
+def channel_of(said: Mapping[str, Any]) -> Channel:
+    """Return an announced channel; raise `BadOperation` if it is invalid."""
+    number, topic, encoding = _number(said), said.get("topic"), said.get("encoding")
+    if number is None or not isinstance(topic, str) or not isinstance(encoding, str):
+        raise BadOperation("a channel has no id, topic or encoding")
+    schema = _text(said, "schema")
+    if len(schema) > MAX_SCHEMA:
+        raise BadOperation(f"the definition of a channel has {len(schema)} characters")
+    notation = _text(said, "schemaEncoding") or {"cdr": "ros2msg", "ros1": "ros1msg"}.get(
+        encoding, ""
+    )
+    return Channel(number, topic, encoding, _text(said, "schemaName"), notation, schema)
+
+
+def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceType:
+    """Return an announced service; raise `BadOperation` if it is invalid.
+
+    Older servers send only ``requestSchema`` and ``responseSchema``, in the encoding of the server.
+    """
+    number, name, kind = _number(said), said.get("name"), _text(said, "type")
+    if number is None or not isinstance(name, str):
+        raise BadOperation("a service has no id or name")
+    parts = []
+    usual = next((one for one in encodings if one in ("cdr", "ros1")), "cdr")
+    for part in ("request", "response"):
+        inner = said.get(part)
+        if isinstance(inner, Mapping):
+            encoding = _text(inner, "encoding") or usual
+            schema, notation = _text(inner, "schema"), _text(inner, "schemaEncoding")
+            type_name = _text(inner, "schemaName")
+        else:
+            encoding, schema, notation, type_name = usual, _text(said, f"{part}Schema"), "", ""
+        if len(schema) > MAX_SCHEMA:
+            raise BadOperation(f"the definition of a service has {len(schema)} characters")
+        notation = notation or ("ros1msg" if encoding == "ros1" else "ros2msg")
+        parts.append([type_name or f"{kind}_{part.capitalize()}", encoding, notation, schema])
+    return ServiceType(number, name, kind, *parts)
+
+
+def publish_frame(channel: int, data: bytes) -> bytes:
+    """Return the frame of a message on one of the client's channels."""
+    return struct.pack("<BI", 1, channel) + data
+
+
+def call_frame(service: int, call: int, encoding: str, data: bytes) -> bytes:
+    """Return the frame of a service call."""
+    name = encoding.encode()
+    return struct.pack("<BIII", 2, service, call, len(name)) + name + data
+
+
+def _number(said: Mapping[str, Any]) -> int | None:
+    value = said.get("id")
+    is_number = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**32
+    return value if is_number else None
+
+
+def _text(said: Mapping[str, Any], name: str) -> str:
+    found = said.get(name)
+    return found if isinstance(found, str) else ""

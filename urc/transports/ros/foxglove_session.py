@@ -1,0 +1,497 @@
+"""The state of one open connection of the Foxglove protocol: channels, subscriptions, calls.
+
+No I/O: the session writes frames into a list, which the transport sends. Objects serve only one
+connection, so no state is carried over to the next connection.
+
+The robot announces its topics as channels, which come and go. The session subscribes only to the
+topics of the driver. The bridge sends every message, so the session itself drops messages that come
+too soon; the last message of a burst is delivered later. Messages stay bytes: the definition of a
+topic's type precedes its messages (`urc.protocol.ros.topic_codec`).
+
+Some services of rosapi have a counterpart in the protocol, so the session answers them itself, and
+the same document works with rosbridge: the list of topics, and parameters.
+"""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
+
+from urc.model.payload import Envelope
+from urc.transports._faults import one_line
+from urc.transports.base import NOTICE, TransportError
+from urc.transports.ros.foxglove_frames import (
+    BadOperation,
+    Channel,
+    FrameReader,
+    MessageData,
+    ServiceReply,
+    ServiceType,
+    TimeTold,
+    call_frame,
+    channel_of,
+    encode_operation,
+    publish_frame,
+    service_of,
+)
+from urc.transports.ros.graph import TopicGraph
+from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.types import spelled
+from urc.transports.topic_queue import TopicReceiveQueue
+
+__all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
+
+MAX_CHANNELS: Final = 4096
+"""Maximum number of known services, and of known channels; further ones are ignored. Channels of
+the driver's topics are accepted up to twice this number."""
+MAX_PENDING: Final = 256
+"""Maximum number of pending calls; beyond this limit, the oldest is dropped."""
+KNOWN_TOPICS: Final = 256
+"""Maximum number of topics that the client publishes."""
+MAX_STATUS: Final = 64
+"""Maximum number of different status messages of the robot that are reported."""
+_SHOWN: Final = 80
+_ENCODINGS: Final = ("cdr", "ros1", "json")
+PARAMETER: Final = "parameter:"
+"""Beginning of a topic that is a parameter, such as ``parameter:/driver.rate``."""
+
+log = logging.getLogger(__name__)
+
+
+class TopicWish(NamedTuple):
+    """A topic of the driver."""
+
+    topic: str
+    type: str = ""
+    throttle_s: float = 0.0
+
+
+class _Subscription:
+    """A subscribed topic, with the time of its next message."""
+
+    __slots__ = ("channel", "due_s", "late", "number", "wish")
+
+    def __init__(self, wish: TopicWish, channel: Channel, number: int) -> None:
+        self.wish, self.channel, self.number = wish, channel, number
+        self.due_s = float("-inf")
+        self.late: Envelope | None = None
+        """Newest message that came too soon."""
+
+
+class FoxgloveSession:
+    """The protocol of one connection."""
+
+    def __init__(
+        self,
+        queue: TopicReceiveQueue,
+        wishes: tuple[TopicWish, ...],
+        graph: TopicGraph,
+        *,
+        call_at: Callable[[float, Callable[[], None]], object],
+        clock: Callable[[], float],
+        published: dict[tuple[str, str], str],
+    ) -> None:
+        """Initialise the state of a new connection.
+
+        Args:
+            queue: queue for messages and replies.
+            wishes: topics of the driver, each once.
+            graph: checks of topics.
+            call_at: function that calls a function at a time of `clock`.
+            clock: monotonic clock, in seconds.
+            published: type of each published topic, by topic and encoding; kept over connections,
+                so that a new connection announces all of them at once.
+        """
+        self.queue = queue
+        self._wishes = {one.topic: one for one in wishes}
+        self._graph = graph
+        self._call_at = call_at
+        self._clock = clock
+        self._published = published
+        self._reader = FrameReader()
+        self._frames: list[tuple[bytes, bool]] = []
+        self._channels: dict[int, Channel] = {}
+        self._subscriptions: dict[int, _Subscription] = {}
+        self._topics: dict[str, _Subscription] = {}
+        self._services: dict[str, ServiceType] = {}
+        self._own: dict[tuple[str, str], int] = {}
+        self._calls: dict[int, tuple[object, str]] = {}
+        self._asked: dict[str, tuple[object, str]] = {}
+        """Request number and service of each pending question about parameters, by its id."""
+        self._listeners: dict[str, set[object]] = {}
+        self._number = 0
+        self._time = RobotTime()
+        self._told: set[str] = set()
+        self._bad = 0
+        self.capabilities: frozenset[str] = frozenset()
+        self.encodings: tuple[str, ...] = ()
+        self.is_greeted = False
+        """Whether the robot has described itself."""
+        self.has_graph = False
+
+    def written(self) -> list[tuple[bytes, bool]]:
+        """Remove and return the frames to send, each with whether it is text."""
+        frames, self._frames = self._frames, []
+        return frames
+
+    # -- received frames
+
+    def arrived(self, frame: bytes) -> None:
+        """Process one frame; invalid frames are counted and logged."""
+        try:
+            said = self._reader.read(frame)
+            if isinstance(said, MessageData):
+                self._message(said)
+            elif isinstance(said, TimeTold):
+                self._time.told(said.time_ns, time.time_ns())
+            elif isinstance(said, ServiceReply):
+                self._reply(said)
+            elif said is not None:
+                self._operation(said)
+        except BadOperation as problem:
+            self._bad += 1
+            if self._bad & (self._bad - 1) == 0:  # the 1st, 2nd, 4th, 8th …
+                log.warning("foxglove: %s (%d such frames)", problem, self._bad)
+
+    def _operation(self, said: Mapping[str, Any]) -> None:
+        match said["op"]:
+            case "serverInfo":
+                self._server_info(said)
+            case "advertise":
+                self._advertise(said)
+            case "unadvertise":
+                self._unadvertise(said)
+            case "advertiseServices":
+                self._advertise_services(said)
+            case "unadvertiseServices":
+                self._unadvertise_services(said)
+            case "serviceCallFailure":
+                self._call_failed(said)
+            case "parameterValues":
+                self._parameters(said)
+            case "connectionGraphUpdate":
+                self._graph_update(said)
+            case "status":
+                self._status(said)
+
+    def _server_info(self, said: Mapping[str, Any]) -> None:
+        capabilities, encodings = said.get("capabilities"), said.get("supportedEncodings")
+        self.capabilities = frozenset(map(str, capabilities or ()))
+        self.encodings = tuple(map(str, encodings or ()))
+        if self.is_greeted:
+            return
+        self.is_greeted = True
+        if "connectionGraph" in self.capabilities:
+            self._op("subscribeConnectionGraph")
+        for (topic, encoding), kind in self._published.items():
+            self._announce(topic, encoding, kind)
+        names = [topic[len(PARAMETER) :] for topic in self._wishes if topic.startswith(PARAMETER)]
+        if names and "parametersSubscribe" in self.capabilities:
+            self._op("subscribeParameterUpdates", parameterNames=names)
+        if names and "parameters" in self.capabilities:
+            self._op("getParameters", parameterNames=names, id="first")
+
+    def _advertise(self, said: Mapping[str, Any]) -> None:
+        for one in _listed(said, "channels"):
+            try:
+                channel = channel_of(one)
+            except BadOperation as problem:
+                self._notice(str(problem))
+                continue
+            most = 2 * MAX_CHANNELS
+            if channel.topic not in self._wishes:
+                channel, most = channel._replace(schema=""), MAX_CHANNELS
+            if channel.id in self._channels or len(self._channels) < most:
+                self._channels[channel.id] = channel
+
+    def _unadvertise(self, said: Mapping[str, Any]) -> None:
+        for number in said.get("channelIds") or ():
+            if isinstance(number, int):
+                self._channels.pop(number, None)
+
+    def reconcile(self) -> None:
+        """Subscribe to the topics of the driver, after channels have come or gone."""
+        found: dict[str, Channel] = {}
+        for channel in self._channels.values():
+            if channel.topic in self._wishes and channel.encoding in _ENCODINGS:
+                found.setdefault(channel.topic, channel)
+        gone = [one for one in self._topics.values() if found.get(one.wish.topic) != one.channel]
+        for one in gone:
+            del self._topics[one.wish.topic], self._subscriptions[one.number]
+        if gone:
+            numbers = [one.number for one in gone if one.channel.id in self._channels]
+            if numbers:
+                self._op("unsubscribe", subscriptionIds=numbers)
+        new = []
+        for topic, channel in found.items():
+            if topic in self._topics:
+                continue
+            self._number += 1
+            one = _Subscription(self._wishes[topic], channel, self._number)
+            self._topics[topic] = self._subscriptions[one.number] = one
+            self._define(channel)
+            new.append({"id": one.number, "channelId": channel.id})
+        if new:
+            self._op("subscribe", subscriptions=new)
+
+    def _define(self, channel: Channel) -> None:
+        attributes = {
+            "topic": channel.topic,
+            "type": channel.type,
+            "encoding": channel.encoding,
+            "notation": channel.notation,
+        }
+        envelope = Envelope("definition", attributes, channel.schema)
+        self.queue.answer(envelope, len(channel.schema))
+
+    def check_topics(self) -> None:
+        """Report topics of the driver that nobody publishes, or that have another type."""
+        self._graph.learn({one.topic: one.type for one in self._channels.values()})
+        names = {topic for topic in self._wishes if not topic.startswith(PARAMETER)}
+        self._graph.subscribed({topic: self._wishes[topic].type for topic in names})
+
+    def _message(self, said: MessageData) -> None:
+        one = self._subscriptions.get(said.subscription)
+        if one is None:
+            return
+        self._time.told(said.time_ns, time.time_ns())
+        attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
+        envelope = Envelope("message", attributes, said.data)
+        throttle_s = one.wish.throttle_s
+        if not throttle_s:
+            self.queue.message(one.wish.topic, envelope, len(said.data))
+            return
+        now_s = self._clock()
+        if now_s < one.due_s:
+            if one.late is None:
+                self._call_at(one.due_s, lambda: self._deliver_late(one))
+            one.late = envelope
+            return
+        one.due_s = now_s + throttle_s
+        self.queue.message(one.wish.topic, envelope, len(said.data))
+
+    def _deliver_late(self, one: _Subscription) -> None:
+        envelope, one.late = one.late, None
+        if envelope is None or self._subscriptions.get(one.number) is not one:
+            return
+        one.due_s = self._clock() + one.wish.throttle_s
+        data = envelope.body
+        self.queue.message(one.wish.topic, envelope, len(data) if isinstance(data, bytes) else 0)
+
+    # -- services and parameters
+
+    def _advertise_services(self, said: Mapping[str, Any]) -> None:
+        for one in _listed(said, "services"):
+            service = service_of(one, self.encodings)
+            if service.name in self._services or len(self._services) < MAX_CHANNELS:
+                self._services[service.name] = service
+
+    def _unadvertise_services(self, said: Mapping[str, Any]) -> None:
+        gone = {number for number in said.get("serviceIds") or () if isinstance(number, int)}
+        self._services = {n: one for n, one in self._services.items() if one.id not in gone}
+
+    def _reply(self, said: ServiceReply) -> None:
+        number, service = self._calls.pop(said.call, (None, ""))
+        if service:
+            attributes = {"id": number, "ok": True, "service": service, "encoding": said.encoding}
+            self.queue.answer(Envelope("response", attributes, said.data), len(said.data))
+
+    def _call_failed(self, said: Mapping[str, Any]) -> None:
+        call = said.get("callId")
+        number, service = self._calls.pop(call, (None, "")) if isinstance(call, int) else (None, "")
+        if service:
+            text = said.get("message")
+            self._answer(number, one_line(text) if isinstance(text, str) and text else "refused")
+
+    def _answer(self, number: object, reason: str = "", values: object = None) -> None:
+        attributes: dict[str, object] = {"id": number, "ok": not reason}
+        if reason:
+            attributes["reason"] = reason
+        self.queue.answer(Envelope("response", attributes, values))
+
+    def _parameters(self, said: Mapping[str, Any]) -> None:
+        found = {
+            one["name"]: one.get("value") for one in _listed(said, "parameters") if _named(one)
+        }
+        number, service = self._asked.pop(str(said.get("id")), (None, ""))
+        if service == "/rosapi/get_param_names":
+            self._answer(number, values={"names": sorted(found)})
+        elif service == "/rosapi/get_param":
+            value = next(iter(found.values()), None)
+            reason = "" if value is not None else "there is no such parameter"
+            self._answer(number, reason, {"value": json.dumps(value), "successful": not reason})
+        elif service:
+            self._answer(number, values={"successful": True, "reason": ""})
+        for name, value in found.items():
+            topic = PARAMETER + name
+            if topic in self._wishes:
+                self.queue.message(
+                    topic, Envelope("message", {"topic": topic}, {"value": value}), 64
+                )
+
+    # -- the graph and the status of the robot
+
+    def _graph_update(self, said: Mapping[str, Any]) -> None:
+        self.has_graph = True
+        for one in _listed(said, "subscribedTopics"):
+            if _named(one) and len(self._listeners) < MAX_CHANNELS:
+                self._listeners[one["name"]] = set(map(str, one.get("subscriberIds") or ()))
+        for name in said.get("removedTopics") or ():
+            self._listeners.pop(str(name), None)
+
+    def listeners(self, topic: str) -> list[object] | None:
+        """Return the nodes that subscribe to a topic; None if the robot does not tell."""
+        return list(self._listeners.get(topic, ())) if self.has_graph else None
+
+    def _status(self, said: Mapping[str, Any]) -> None:
+        if said.get("level") in (1, 2):
+            self._notice(one_line(str(said.get("message"))))
+
+    def _notice(self, text: str) -> None:
+        if text not in self._told and len(self._told) < MAX_STATUS:
+            self._told.add(text)
+            self.queue.answer(Envelope(NOTICE, {}, f"the bridge reports: {text}"))
+
+    # -- sending
+
+    def perform(self, envelope: Envelope) -> None:
+        """Write the frames of an envelope.
+
+        Raises:
+            TransportError: the robot does not support the operation.
+        """
+        if envelope.verb == "publish":
+            self._publish(envelope)
+        elif envelope.verb == "call":
+            self._call(envelope)
+        elif envelope.verb in ("goal", "cancel"):
+            reason = "the Foxglove protocol has no actions; use via: rosbridge"
+            if envelope.verb == "cancel":
+                raise TransportError(reason)
+            self._answer(envelope.attributes.get("id"), reason)
+        else:
+            raise TransportError(f"this connection cannot {envelope.verb}")
+
+    def _publish(self, envelope: Envelope) -> None:
+        said = envelope.attributes
+        topic, kind = str(said.get("topic") or ""), str(said.get("type") or "")
+        if self.is_greeted and "clientPublish" not in self.capabilities:
+            raise TransportError("the bridge accepts no messages (capability clientPublish)")
+        encoding, data = str(said.get("encoding") or ""), said.get("data")
+        if not isinstance(data, bytes) or (self.encodings and encoding not in self.encodings):
+            if self.encodings and "json" not in self.encodings:
+                known = ", ".join(self.encodings)
+                raise TransportError(
+                    f"the type {kind} of {topic} is unknown; the bridge takes {known}"
+                )
+            encoding, data = "json", self._as_json(envelope.body)
+        elif stamps := said.get("stamps"):
+            data = self._time.stamped(data, stamps, time.time_ns())  # type: ignore[arg-type]
+        number = self._own.get((topic, encoding))
+        if number is None:
+            kind = spelled(kind, "msg", 1 if encoding == "ros1" else 2)
+            number = self._announce(topic, encoding, kind)
+            self._graph.learn({one.topic: one.type for one in self._channels.values()})
+            if self._graph.publishes(topic, kind) and self.has_graph:
+                self._graph.subscribers(topic, self.listeners(topic) or ())
+        self._frames.append((publish_frame(number, data), False))
+
+    def _announce(self, topic: str, encoding: str, kind: str) -> int:
+        while len(self._own) >= KNOWN_TOPICS:
+            oldest = next(iter(self._own))
+            self._op("unadvertise", channelIds=[self._own.pop(oldest)])
+            self._published.pop(oldest, None)
+        self._number += 1
+        self._own[topic, encoding] = self._number
+        self._published[topic, encoding] = kind
+        one = {"id": self._number, "topic": topic, "encoding": encoding, "schemaName": kind}
+        self._op("advertise", channels=[one])
+        return self._number
+
+    def _as_json(self, body: object) -> bytes:
+        seconds, nanos = self._time.now(time.time_ns())
+
+        def timed(value: Any) -> Any:
+            if isinstance(value, Mapping):
+                return {name: timed(inner) for name, inner in value.items()}
+            return {"sec": seconds, "nanosec": nanos} if value == "now" else value
+
+        try:
+            return encode_operation(timed({} if body is None else body))
+        except BadOperation as problem:
+            raise TransportError(str(problem)) from problem
+
+    def _call(self, envelope: Envelope) -> None:
+        said = envelope.attributes
+        name, number = str(said.get("service") or ""), said.get("id")
+        service = self._services.get(name)
+        if service is None:
+            if not self._answer_as_rosapi(name, number, envelope.body):
+                self._answer(number, f"there is no service {one_line(name)[:_SHOWN]}")
+            return
+        encoding, data = said.get("encoding"), said.get("data")
+        if not isinstance(data, bytes):
+            attributes = {"service": name, "id": number, "request": service.request}
+            back = Envelope(
+                "unencoded", {**attributes, "response": service.response}, envelope.body
+            )
+            self.queue.answer(back, len(service.request[3]) + len(service.response[3]))
+            return
+        if encoding == "json":
+            data = self._as_json(envelope.body)
+        self._number += 1
+        while len(self._calls) >= MAX_PENDING:
+            del self._calls[next(iter(self._calls))]
+        self._calls[self._number] = (number, name)
+        frame = call_frame(service.id, self._number, str(encoding), data)
+        self._frames.append((frame, False))
+
+    def _answer_as_rosapi(self, name: str, number: object, body: object) -> bool:
+        """Answer a service of rosapi by the protocol; return False for all other services."""
+        fields = body if isinstance(body, Mapping) else {}
+        if name == "/rosapi/topics":
+            found = {one.topic: one.type for one in self._channels.values()}
+            values = {"topics": list(found), "types": list(found.values())}
+            self._answer(number, values=values)
+            return True
+        if name not in ("/rosapi/get_param", "/rosapi/set_param", "/rosapi/get_param_names"):
+            return False
+        if "parameters" not in self.capabilities:
+            self._answer(number, "the bridge has no parameters")
+            return True
+        self._number += 1
+        while len(self._asked) >= MAX_PENDING:
+            del self._asked[next(iter(self._asked))]
+        self._asked[str(self._number)] = (number, name)
+        # rosapi writes /node:name, the Foxglove bridge /node.name.
+        parameter = str(fields.get("name") or "").replace(":", ".")
+        if name == "/rosapi/set_param":
+            one = {"name": parameter, "value": _of_text(fields.get("value"))}
+            self._op("setParameters", parameters=[one], id=str(self._number))
+        else:
+            names = [parameter] if name == "/rosapi/get_param" else []
+            self._op("getParameters", parameterNames=names, id=str(self._number))
+        return True
+
+    def _op(self, name: str, **fields: object) -> None:
+        self._frames.append((encode_operation({"op": name, **fields}), True))
+
+
+def _listed(said: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    found = said.get(name)
+    return [one for one in found if isinstance(one, Mapping)] if isinstance(found, list) else []
+
+
+def _named(one: Mapping[str, Any]) -> bool:
+    return isinstance(one.get("name"), str)
+
+
+def _of_text(value: object) -> object:
+    """Return the value of a parameter, which rosapi passes as JSON text."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return json.loads(value)
+    except ValueError:
+        return value

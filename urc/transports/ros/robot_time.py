@@ -1,0 +1,40 @@
+"""The clock of a robot, estimated from the times in its messages. No I/O.
+
+The clock of a robot may differ from the clock of this machine, and the clock of a simulation may
+stand still. Messages are delayed, so the largest difference of the last seconds is the best one.
+"""
+
+import struct
+from collections.abc import Iterable
+from typing import Final
+
+__all__ = ["RobotTime"]
+
+_KEPT_NS: Final = 2_000_000_000
+"""Time for which a difference is used, in nanoseconds."""
+
+
+class RobotTime:
+    """An estimate of the robot's time; without messages, the time of this machine."""
+
+    def __init__(self) -> None:
+        self._difference_ns = 0
+        self._taken_ns: int | None = None
+
+    def told(self, robot_ns: int, here_ns: int) -> None:
+        """Record a time of the robot that arrived at `here_ns` of this machine."""
+        difference = robot_ns - here_ns
+        is_old = self._taken_ns is None or here_ns - self._taken_ns > _KEPT_NS
+        if is_old or difference >= self._difference_ns:
+            self._difference_ns, self._taken_ns = difference, here_ns
+
+    def now(self, here_ns: int) -> tuple[int, int]:
+        """Return the robot's time in seconds and nanoseconds; never negative."""
+        return divmod(max(here_ns + self._difference_ns, 0), 1_000_000_000)
+
+    def stamped(self, data: bytes, offsets: Iterable[int], here_ns: int) -> bytes:
+        """Return a message with the robot's time at each offset."""
+        out, (seconds, nanos) = bytearray(data), self.now(here_ns)
+        for offset in offsets:
+            struct.pack_into("<II", out, offset, seconds & 0x7FFFFFFF, nanos)
+        return bytes(out)
