@@ -39,6 +39,7 @@ NAMES = (
     "motion_guard",
     "motion_cuts",
     "motion_freeze",
+    "motion_foxglove",
     "motion_counters",
     "motion_flood",
     "motion_idle",

@@ -32,6 +32,9 @@ HEARD_MS: Final = 500.0
 """Latest allowed send time of received motion, in milliseconds after the start of the freeze."""
 STOP_MS: Final = 200.0
 """Longest allowed time from the end of the freeze to the stop, in milliseconds."""
+REVIVED_MS: Final = 1000.0
+"""Longest allowed time from the start of a new program to the stop, in milliseconds; the limit of
+`bench.rig.kinds` for transports that open slowly."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0
@@ -67,11 +70,13 @@ class Freeze(NamedTuple):
 
     On a slow machine, an expired lease may have stopped the robot before.
     """
+    limit_ms: float = STOP_MS
+    """Longest allowed `stop_ms`."""
 
     @property
     def is_good(self) -> bool:
         """Whether the trial met all limits."""
-        return self.newest_ms <= HEARD_MS and self.stop_ms <= STOP_MS and self.is_last
+        return self.newest_ms <= HEARD_MS and self.stop_ms <= self.limit_ms and self.is_last
 
     @property
     def is_excused(self) -> bool:
@@ -87,11 +92,13 @@ async def freeze(
     lasts_s: float = 5.0,
     seed: int = 1,
     via: str = "rosbridge",
+    is_killed: bool = False,
     told: Callable[[Freeze], None] | None = None,
 ) -> Sequence[Freeze]:
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
     Over `via` rosbridge, the robot's program is a substitute; over foxglove, the server of its SDK.
+    With `is_killed`, the program is killed instead, and a new one starts after `lasts_s` seconds.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
@@ -104,24 +111,70 @@ async def freeze(
 
     async with asyncio.TaskGroup() as group:
         for each in moments:
-            group.create_task(_queue(each, lasts_s, via, take))
+            group.create_task(_queue(each, lasts_s, via, is_killed, take))
     return done
 
 
 async def _queue(
-    moments: Sequence[float], lasts_s: float, via: str, told: Callable[[Freeze], None]
+    moments: Sequence[float],
+    lasts_s: float,
+    via: str,
+    is_killed: bool,
+    told: Callable[[Freeze], None],
 ) -> None:
     door = "foxglove" if via == "foxglove" else "bridge"
     robots = await asyncio.to_thread(Robots, [f"{door}:127.0.0.1:0"])
+    port = robots.ports[0]
     try:
-        profile = _profile(robots.ports[0], via)
         transports = built_in_catalog().transports
-        async with Session(profile, {}, transports, motion="guarded") as session:
+        async with Session(_profile(port, via), {}, transports, motion="guarded") as session:
             for moment_s in moments:
-                told(await _one(session, robots, moment_s, lasts_s))
+                if not is_killed:
+                    told(await _one(session, robots, moment_s, _Pause(robots, lasts_s)))
+                    continue
+                death = _Death(robots, lasts_s, f"{door}:127.0.0.1:{port}")
+                told(await _one(session, robots, moment_s, death))
+                robots = death.robots
     finally:
-        os.kill(robots.pid, signal.SIGCONT)
+        with suppress(ProcessLookupError):
+            os.kill(robots.pid, signal.SIGCONT)
         await asyncio.to_thread(robots.close)
+
+
+class _Pause:
+    """A freeze of the robot's program."""
+
+    limit_ms = STOP_MS
+
+    def __init__(self, robots: Robots, lasts_s: float) -> None:
+        self.robots, self._lasts_s = robots, lasts_s
+
+    async def __call__(self) -> tuple[int, int]:
+        """Return begin and end of the freeze, in nanoseconds."""
+        self.robots.signal(signal.SIGSTOP)
+        frozen_ns = time.monotonic_ns()
+        await asyncio.sleep(self._lasts_s)
+        thawed_ns = time.monotonic_ns()
+        self.robots.signal(signal.SIGCONT)
+        return frozen_ns, thawed_ns
+
+
+class _Death:
+    """The death of the robot's program, and a new program at the same port."""
+
+    limit_ms = REVIVED_MS
+
+    def __init__(self, robots: Robots, lasts_s: float, place: str) -> None:
+        self.robots, self._lasts_s, self._place = robots, lasts_s, place
+
+    async def __call__(self) -> tuple[int, int]:
+        """Return the times of the death and of the new start, in nanoseconds."""
+        self.robots.signal(signal.SIGKILL)
+        killed_ns = time.monotonic_ns()
+        await asyncio.to_thread(self.robots.close)
+        await asyncio.sleep(self._lasts_s)
+        self.robots = await asyncio.to_thread(Robots, [self._place])
+        return killed_ns, time.monotonic_ns()
 
 
 def _profile(port: int, via: str) -> Profile:
@@ -131,8 +184,10 @@ def _profile(port: int, via: str) -> Profile:
         return load_profile(file, built_in_catalog())
 
 
-async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
-    """Drive a robot, freeze and resume its program, and check the received data."""
+async def _one(
+    session: Session, robots: Robots, moment_s: float, trouble: _Pause | _Death
+) -> Freeze:
+    """Drive a robot, freeze or kill its program, and check the received data."""
     backend = session.backend
     assert backend is not None
     ends_s = time.monotonic() + _READY_S
@@ -146,15 +201,13 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
     holding = asyncio.create_task(_hold(session))
     try:
         await asyncio.sleep(moment_s)
-        robots.signal(signal.SIGSTOP)
-        frozen_ns = time.monotonic_ns()
-        await asyncio.sleep(lasts_s)
-        thawed_ns = time.monotonic_ns()
-        robots.signal(signal.SIGCONT)
+        frozen_ns, thawed_ns = await trouble()
         await asyncio.sleep(_AFTERWARDS_S)
     finally:
         holding.cancel()
-    return _judged(robots, frozen_ns, thawed_ns)
+    before = [one for one in robots.since(0, 0) if one.time_ns < frozen_ns]
+    was_moving = bool(before) and before[-1].text != "M 0"
+    return _judged(trouble.robots, frozen_ns, thawed_ns, was_moving, trouble.limit_ms)
 
 
 async def _hold(session: Session) -> None:
@@ -169,17 +222,19 @@ async def _hold(session: Session) -> None:
         await asyncio.sleep(_TICK_S)
 
 
-def _judged(robots: Robots, frozen_ns: int, thawed_ns: int) -> Freeze:
+def _judged(
+    robots: Robots, frozen_ns: int, thawed_ns: int, was_moving: bool, limit_ms: float
+) -> Freeze:
     heard = [(one.time_ns, int(one.text.split()[1])) for one in robots.since(0, frozen_ns)]
     sent_ns = [sent_us * 1000 for _, sent_us in heard if sent_us]
     stops = [at_ns for at_ns, sent_us in heard if not sent_us and at_ns >= thawed_ns]
     late = [ms for at_ns, ms in robots.late if at_ns > thawed_ns + 50_000_000]
-    before = [one for one in robots.since(0, 0) if one.time_ns < frozen_ns]
     return Freeze(
         lasted_s=(thawed_ns - frozen_ns) / 1e9,
         newest_ms=(max(sent_ns, default=frozen_ns) - frozen_ns) / 1e6,
         stop_ms=(stops[0] - thawed_ns) / 1e6 if stops else inf,
         is_last=bool(heard) and not heard[-1][1],
         late_ms=max(late, default=0.0),
-        was_moving=bool(sent_ns) or (bool(before) and before[-1].text != "M 0"),
+        was_moving=bool(sent_ns) or was_moving,
+        limit_ms=limit_ms,
     )

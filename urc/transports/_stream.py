@@ -289,7 +289,7 @@ def as_bytes(payload: Payload) -> bytes:
 
 def forget_unsent(line: socket.socket) -> None:
     """Make the next close of the socket `line` reset the connection and discard unsent data."""
-    with suppress(OSError):  # already closed
+    with suppress(OSError, ValueError):  # already closed; uvloop raises ValueError
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 
 

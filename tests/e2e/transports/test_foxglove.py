@@ -12,7 +12,7 @@ import pytest
 from websockets.asyncio.server import ServerConnection, serve
 
 import urc
-from bench.rig.ros_messages import ROS2, RandomMessages
+from bench.rig.ros_messages import ROS1, ROS2, RandomMessages
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from urc.client.local import ConnectedRobot
 from urc.problems import UrcError
@@ -20,8 +20,16 @@ from urc.problems import UrcError
 pytestmark = pytest.mark.anyio
 
 WAIT_S = 30.0
+ROBOTS = Path(__file__).resolve().parents[3] / "robots"
 ODOMETRY = "nav_msgs/msg/Odometry"
 IMAGE = "sensor_msgs/msg/CompressedImage"
+STATUS = "nifti_robot_driver_msgs/msg/RobotStatusStamped"
+STATUS_TEXT = """\
+float64 battery_level
+int32 battery_status
+bool brake_on
+bool emergency_stop_on
+float64 scanning_speed"""
 ROVER = """
 urc: 1
 kind: robot
@@ -320,3 +328,48 @@ async def test_a_hostile_server_costs_counted_faults(tmp_path: Path) -> None:
         await until(lambda: value(robot, "slow") == 43)
         text = "\n".join(str(line) for line in robot.hub.notes)
         assert "the definition of a channel has 1000000 characters" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "bridge"),
+    [
+        ("generic-ros2", "foxglove"),
+        ("turtlebot4", "auto"),
+        ("turtlebot3", "foxglove"),
+        ("absolem", "auto"),
+    ],
+)
+async def test_shipped_robots_are_driven(name: str, bridge: str) -> None:
+    """The same profiles as over rosbridge; a bridge of ROS 1 has another format."""
+    is_ros1 = name == "absolem"
+    rover = FoxgloveRobot(encodings=("ros1",) if is_ros1 else ("cdr",))
+    store = ROS1 if is_ros1 else ROS2
+    odometry = RandomMessages(store, seed=2).message(ODOMETRY)
+    odometry.pose.pose.position.x = 2.5
+
+    def publish() -> None:
+        if is_ros1:
+            rover.publish_ros1("/odom", ODOMETRY, odometry)
+            rover.publish_ros1("/robot_status", STATUS, bytes(22), STATUS_TEXT)
+        else:
+            rover.publish("/odom", ODOMETRY, odometry)
+
+    def speeds() -> list[float]:
+        kind = "geometry_msgs/msg/Twist"
+        read = store.deserialize_ros1 if is_ros1 else store.deserialize_cdr
+        return [read(data, kind).linear.x for topic, data in rover.heard if topic == "/cmd_vel"]
+
+    try:
+        async with urc.connect(
+            urc.load(ROBOTS / f"{name}.yaml"), port=rover.port, bridge=bridge
+        ) as robot:
+            await until(lambda: value(robot, "x") == 2.5, repeat=publish)
+            if is_ros1:
+                await until(lambda: value(robot, "emergency") is False, repeat=publish)
+            async with asyncio.timeout(WAIT_S), robot.drive("drive") as stick:
+                for _ in range(3):
+                    stick(speed=0.1)
+                    await asyncio.sleep(0.11)
+            await until(lambda: 0.1 in speeds() and speeds()[-1] == 0)
+    finally:
+        rover.close()

@@ -135,7 +135,9 @@ class AnyBridgeTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport of ROS for the options of a document; see docs/transports/ros.md.
+    """Return a transport of ROS for the options of a document.
+
+    See docs/transports/rosbridge.md and docs/transports/foxglove.md.
 
     Raises:
         TransportError: an option is missing or invalid.

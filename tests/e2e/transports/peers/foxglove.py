@@ -18,7 +18,7 @@ from foxglove import (
 )
 from foxglove.websocket import Capability, ServerListener
 
-from bench.rig.ros_messages import ROS2
+from bench.rig.ros_messages import ROS1, ROS2
 
 __all__ = ["FoxgloveRobot", "definition"]
 
@@ -76,6 +76,18 @@ class FoxgloveRobot(ServerListener):
                 topic, message_encoding="cdr", schema=schema, context=self.context
             )
         data = message if isinstance(message, bytes) else bytes(ROS2.serialize_cdr(message, name))
+        channel.log(data, log_time=time.time_ns())
+
+    def publish_ros1(self, topic: str, name: str, message: Any, text: str | None = None) -> None:
+        """Publish a message of ROS 1, as a bridge of ROS 1 does."""
+        channel = self._channels.get(topic)
+        if channel is None:
+            text = text or ROS1.generate_msgdef(name, ros_version=1)[0]
+            schema = Schema(name=name.replace("/msg/", "/"), encoding="ros1msg", data=text.encode())
+            channel = self._channels[topic] = Channel(
+                topic, message_encoding="ros1", schema=schema, context=self.context
+            )
+        data = message if isinstance(message, bytes) else bytes(ROS1.serialize_ros1(message, name))
         channel.log(data, log_time=time.time_ns())
 
     def withdraw(self, topic: str) -> None:
