@@ -1,8 +1,8 @@
 """Random ROS messages and their bytes, made by the library rosbags.
 
 rosbags, by Ternaris, is independent of URC: a type store of ROS 2, and serialization in CDR and in
-the format of ROS 1. The values of a message are compared as plain data, as URC reads them: numbers
-that are not finite are None, and arrays of ``uint8`` are bytes.
+the format of ROS 1. The values of a message are compared as plain data, as URC reads them. Numbers
+that are not finite become None, and arrays of ``uint8`` become bytes.
 """
 
 import math

@@ -7,7 +7,7 @@ from typing import Literal
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload, traffic_of
-from urc.protocol.events import Close, MotionReady, Ready, Violation
+from urc.protocol.events import Close, MotionReady, Ready, Send, Violation
 from urc.protocol.framing.base import Framing
 from urc.protocol.framing.table import build_framing
 from urc.protocol.requests.exchange import (
@@ -187,6 +187,21 @@ class Connection:
         if isinstance(data, Envelope) and number is not None:
             data = data._replace(attributes={**data.attributes, "id": number})
         return data
+
+    def _unpacked(self, envelope: Envelope, now: float) -> list[LineEvent]:
+        """Process an envelope whose body may be bytes of a ROS message."""
+        if self.codec is None:
+            return self._envelope(envelope, now)
+        found = self.codec.received(envelope)
+        if found.fault:
+            return [Violation(self.spec.name, "bad-value", found.fault)]
+        if found.reply is not None:
+            return [Send(self.spec.name, found.reply)]
+        return [] if found.envelope is None else self._envelope(found.envelope, now)
+
+    def _envelope(self, envelope: Envelope, now: float) -> list[LineEvent]:
+        """Process a received envelope with plain data."""
+        raise NotImplementedError
 
     def _pump(self, now: float) -> list[LineEvent]:
         """Send queued requests, if allowed in the current state of the connection."""

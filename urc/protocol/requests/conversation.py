@@ -253,7 +253,7 @@ class Conversation(Connection):
         if self.spec.stale_after_s is not None:
             self._read_frames(now)
         if isinstance(data, Envelope):
-            told = self._envelope(data, now) if self.codec is None else self._converted(data, now)
+            told = self._unpacked(data, now)
             self.is_behind = self.is_open and bool(told)
             return told
         if self._may_recut:
@@ -419,16 +419,6 @@ class Conversation(Connection):
             return self._answer(*answered, frame, now)
         told = self._of_motion(frame, now) if self.held.is_listening(now) else None
         return self.receiver.publish(frame, now) if told is None else told
-
-    def _converted(self, envelope: Envelope, now: float) -> list[LineEvent]:
-        """Process an envelope whose body may be bytes of a ROS message."""
-        assert self.codec is not None  # noqa: S101 - see `receive`
-        found = self.codec.received(envelope)
-        if found.fault:
-            return [Violation(self.spec.name, "bad-value", found.fault)]
-        if found.reply is not None:
-            return [new(Send, (self.spec.name, found.reply, False, None))]
-        return [] if found.envelope is None else self._envelope(found.envelope, now)
 
     def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
         attributes = envelope.attributes

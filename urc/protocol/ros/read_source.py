@@ -3,13 +3,14 @@
 Theory of operation. The source is generated once for a layout, a byte order and the wanted parts.
 Consecutive fields of fixed size become one *run*, which a single `struct.Struct` unpacks or skips.
 CDR aligns each number to its size, relative to the end of the four-byte header. The generator
-therefore tracks the offset modulo a power of two: after a string, the offset is unknown, and the
+therefore tracks the offset modulo a power of two. After a string, the offset is unknown, and the
 next number is aligned at run time. Numbers that are not finite become None, as in JSON from
 rosbridge. Data comes from outside: every length is compared with the remaining bytes before use,
 and the number of elements is limited.
 
-Sources: OMG CDR (formal/02-06-51), DDS-XTypes 1.3 section 7.4 (encapsulation identifiers), and
-rosidl_typesupport_fastrtps_cpp (a wide string is a count and four bytes for each unit of UTF-16).
+Sources: OMG CDR (formal/02-06-51); DDS-XTypes 1.3, section 7.4 (encapsulation identifiers).
+Wide strings are those of rosidl_typesupport_fastrtps_cpp: a count, and four bytes for each unit of
+UTF-16.
 """
 
 import struct

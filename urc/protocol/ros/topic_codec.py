@@ -10,8 +10,8 @@ published type is one of `urc.protocol.ros.common_types`, or comes from a topic 
 Without a definition, the envelope has no bytes, and the transport sends JSON. An envelope always
 keeps its plain body, so the same envelope also fits rosbridge.
 
-Services have their own definitions, which the transport delivers with the first call: the transport
-returns the call with the verb `UNENCODED`, and the codec sends the call again, in bytes.
+Services have their own definitions, which the transport delivers with the first call. The transport
+returns the call with the verb `UNENCODED`; the codec then sends the call again, in bytes.
 """
 
 from collections.abc import Iterable, Mapping

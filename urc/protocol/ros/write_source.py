@@ -225,7 +225,7 @@ class _Generator:
                 if code in "fd":
                     found = self._name()
                     self._emit(f"{found} = {owner}.get({name!r}, {_literal(default, 0.0)})")
-                    return f"(nan if {found} is None else {found})"
+                    return f"({found} if {found} != None else nan)"
                 return f"{owner}.get({name!r}, {_literal(default, 0)})"
             case Text(default=default):
                 return f"{owner}.get({name!r}, {_literal(default, '')})"

@@ -8,8 +8,8 @@ topics of the driver. The bridge sends every message, so the session itself drop
 too soon; the last message of a burst is delivered later. Messages stay bytes: the definition of a
 topic's type precedes its messages (`urc.protocol.ros.topic_codec`).
 
-Some services of rosapi have a counterpart in the protocol, so the session answers them itself, and
-the same document works with rosbridge: the list of topics, and parameters.
+The list of topics and the parameters have a counterpart in the protocol. The session therefore
+answers these services of rosapi itself, so the same document works with rosbridge.
 """
 
 import json
@@ -246,7 +246,7 @@ class FoxgloveSession:
         self.queue.answer(envelope, len(channel.schema))
 
     def check_topics(self) -> None:
-        """Report topics of the driver that nobody publishes, or that have another type."""
+        """Report topics of the driver without publishers, or with another type."""
         self._graph.learn({one.topic: one.type for one in self._channels.values()})
         names = {topic for topic in self._wishes if not topic.startswith(PARAMETER)}
         self._graph.subscribed({topic: self._wishes[topic].type for topic in names})
