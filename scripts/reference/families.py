@@ -79,7 +79,10 @@ FAMILIES: Mapping[str, Family] = {
         "Keys of ros transports",
         "Keys of a connection to ROS 1 or ROS 2.",
         _driver("ros"),
-        {"transports/rosbridge.md": "ROS over rosbridge"},
+        {
+            "transports/rosbridge.md": "ROS over rosbridge",
+            "transports/foxglove.md": "ROS over foxglove_bridge",
+        },
     ),
     "mqtt": Family(
         "Keys of mqtt transports",
