@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Final
 
-from urc.protocol.ros.definition import Definition, Definitions, Field
+from urc.protocol.ros.definition import Definition, Definitions, MessageField
 from urc.protocol.ros.msg_text import parse_msg
 
 __all__ = ["common_types"]
@@ -91,17 +91,17 @@ action_msgs/GoalInfo: unique_identifier_msgs/UUID goal_id, builtin_interfaces/Ti
 unique_identifier_msgs/UUID: uint8[16] uuid
 actionlib_msgs/GoalID: builtin_interfaces/Time stamp, string id
 """
-_ROS1: Final[Mapping[str, tuple[Field, ...]]] = {
+_ROS1: Final[Mapping[str, tuple[MessageField, ...]]] = {
     "std_msgs/Header": (
-        Field("seq", "uint32"),
-        Field("stamp", "time"),
-        Field("frame_id", "string"),
+        MessageField("seq", "uint32"),
+        MessageField("stamp", "time"),
+        MessageField("frame_id", "string"),
     ),
-    "actionlib_msgs/GoalID": (Field("stamp", "time"), Field("id", "string")),
+    "actionlib_msgs/GoalID": (MessageField("stamp", "time"), MessageField("id", "string")),
     "trajectory_msgs/JointTrajectoryPoint": (
-        *(Field(name, "float64", 0) for name in ("positions", "velocities")),
-        *(Field(name, "float64", 0) for name in ("accelerations", "effort")),
-        Field("time_from_start", "duration"),
+        *(MessageField(name, "float64", 0) for name in ("positions", "velocities")),
+        *(MessageField(name, "float64", 0) for name in ("accelerations", "effort")),
+        MessageField("time_from_start", "duration"),
     ),
 }
 """Types with other fields in ROS 1."""

@@ -19,7 +19,7 @@ __all__ = [
     "BadDefinition",
     "Definition",
     "Definitions",
-    "Field",
+    "MessageField",
     "Layout",
     "Primitive",
     "Record",
@@ -45,7 +45,7 @@ class BadDefinition(UrcError):
     """A definition that cannot be read; the message names the line or the type."""
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """One field of a type."""
 
     name: str
@@ -64,7 +64,7 @@ class Definition(NamedTuple):
 
     name: str
     """Name in the short form ``pkg/Type``."""
-    fields: tuple[Field, ...]
+    fields: tuple[MessageField, ...]
     constants: Mapping[str, object]
 
 
@@ -120,10 +120,13 @@ class Array(NamedTuple):
 Layout = Primitive | Text | Record | Array
 
 _STANDARD: Final = {
-    "builtin_interfaces/Time": (Field("sec", "int32"), Field("nanosec", "uint32")),
-    "builtin_interfaces/Duration": (Field("sec", "int32"), Field("nanosec", "uint32")),
-    "time": (Field("secs", "uint32"), Field("nsecs", "uint32")),
-    "duration": (Field("secs", "int32"), Field("nsecs", "int32")),
+    "builtin_interfaces/Time": (MessageField("sec", "int32"), MessageField("nanosec", "uint32")),
+    "builtin_interfaces/Duration": (
+        MessageField("sec", "int32"),
+        MessageField("nanosec", "uint32"),
+    ),
+    "time": (MessageField("secs", "uint32"), MessageField("nsecs", "uint32")),
+    "duration": (MessageField("secs", "int32"), MessageField("nsecs", "int32")),
 }
 """Types that a text may use without their definition: the times of ROS 2 and of ROS 1."""
 _PADDING: Final = (("structure_needs_at_least_one_member", Primitive("B")),)
@@ -168,7 +171,7 @@ class _Expansion:
             made = _PADDING
         return Record(made, name in TIME_TYPES)
 
-    def _field(self, field: Field, owner: str, depth: int) -> Layout:
+    def _field(self, field: MessageField, owner: str, depth: int) -> Layout:
         self._count += 1
         if self._count > MAX_LAYOUTS:
             raise BadDefinition(f"a message has more than {MAX_LAYOUTS} fields")

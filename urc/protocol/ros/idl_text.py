@@ -14,7 +14,7 @@ from urc.protocol.ros.definition import (
     BadDefinition,
     Definition,
     Definitions,
-    Field,
+    MessageField,
     plain_name,
 )
 from urc.protocol.ros.msg_text import split_types
@@ -162,7 +162,7 @@ class _Parser:
 
     def _struct(self, modules: tuple[str, ...]) -> None:
         name = self._take()
-        fields: dict[str, Field] = {}
+        fields: dict[str, MessageField] = {}
         if self._peek() == ":":
             raise BadDefinition(f"{self._owner}: {name} inherits from another structure")
         self._take("{")
@@ -173,7 +173,7 @@ class _Parser:
                 if length is not None and kind.length is not None:
                     raise BadDefinition(f"{self._owner}: {field} is an array of arrays")
                 size = kind.length if length is None else length
-                fields[field] = Field(field, kind.name, size, default, kind.bound)
+                fields[field] = MessageField(field, kind.name, size, default, kind.bound)
         self._take("}")
         package = modules[0] if modules else self._owner.partition("/")[0]
         full = f"{package}/{name}"

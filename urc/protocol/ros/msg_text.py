@@ -16,7 +16,7 @@ from urc.protocol.ros.definition import (
     BadDefinition,
     Definition,
     Definitions,
-    Field,
+    MessageField,
     plain_name,
 )
 
@@ -73,7 +73,7 @@ def parse_msg(name: str, text: str) -> Definitions:
     """
     found: dict[str, Definition] = {}
     for inner, part in split_types(name, text, "MSG:"):
-        fields: dict[str, Field] = {}
+        fields: dict[str, MessageField] = {}
         constants: dict[str, object] = {}
         for line in part.splitlines():
             bare = line.strip()
@@ -84,7 +84,7 @@ def parse_msg(name: str, text: str) -> Definitions:
 
 
 def _read_line(
-    line: str, fields: dict[str, Field], constants: dict[str, object], owner: str
+    line: str, fields: dict[str, MessageField], constants: dict[str, object], owner: str
 ) -> None:
     kind = _TYPE.match(line)
     rest = line[kind.end() :].lstrip() if kind else ""
@@ -104,7 +104,9 @@ def _read_line(
         raise BadDefinition(f"{owner}: the array {name[0]} has {length} elements")
     if name[0] in fields:
         raise BadDefinition(f"{owner} has two fields {name[0]}")
-    fields[name[0]] = Field(name[0], word, length, _default(word, after, length, owner), bound)
+    fields[name[0]] = MessageField(
+        name[0], word, length, _default(word, after, length, owner), bound
+    )
 
 
 def _default(word: str, text: str, length: int | None, owner: str) -> object:

@@ -23,7 +23,7 @@ from urc.protocol.compile.source import function_of
 from urc.protocol.ros.definition import SIZES, Array, BadDefinition, Layout, Primitive, Record, Text
 from urc.protocol.ros.wanted import EACH, Wanted
 
-__all__ = ["MAX_ELEMENTS", "BadMessage", "Read", "build_read", "read_safely"]
+__all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
 MAX_ELEMENTS: Final = 200_000
 """Maximum number of texts and nested messages in the arrays of one message. An element takes a few
@@ -36,7 +36,7 @@ _FAULTS: Final = (struct.error, IndexError, OverflowError, ValueError, MemoryErr
 Read = Callable[[bytes], dict[str, Any]]
 
 
-class BadMessage(ValueError):
+class BadRosMessage(ValueError):
     """A message that does not fit its definition."""
 
 
@@ -64,17 +64,17 @@ def build_read(
 
 
 def read_safely(read: Read, data: bytes) -> dict[str, Any]:
-    """Read a message; raise only `BadMessage`."""
+    """Read a message; raise only `BadRosMessage`."""
     try:
         return read(data)
-    except BadMessage:
+    except BadRosMessage:
         raise
     except _FAULTS as fault:
-        raise BadMessage(f"the message does not fit its definition ({fault})") from fault
+        raise BadRosMessage(f"the message does not fit its definition ({fault})") from fault
 
 
 def _bad(text: str) -> None:
-    raise BadMessage(text)
+    raise BadRosMessage(text)
 
 
 def _finite(value: float) -> float | None:

@@ -23,7 +23,7 @@ from urc.protocol.ros.common_types import common_types
 from urc.protocol.ros.definition import BadDefinition, Definitions, Record, layout_of, plain_name
 from urc.protocol.ros.idl_text import parse_idl
 from urc.protocol.ros.msg_text import parse_msg
-from urc.protocol.ros.read_source import BadMessage, Read, build_read, read_safely
+from urc.protocol.ros.read_source import BadRosMessage, Read, build_read, read_safely
 from urc.protocol.ros.wanted import ALL, Path, Wanted, wanted_of
 from urc.protocol.ros.write_source import Unwritable, Writer
 
@@ -72,12 +72,14 @@ class _Source:
         self._reads: dict[int, Read] = {}
 
     def read(self, data: bytes) -> dict[str, Any]:
-        """Return the wanted parts of a message; raise `BadMessage` or `BadDefinition`."""
+        """Return the wanted parts of a message; raise `BadRosMessage` or `BadDefinition`."""
         kind = 1 if self._is_ros1 else data[1] if len(data) >= 4 and not data[0] else -1
         read = self._reads.get(kind)
         if read is None:
             if kind not in _ORDERS:
-                raise BadMessage(f"the message begins with {data[:4].hex(' ')}, which is not CDR")
+                raise BadRosMessage(
+                    f"the message begins with {data[:4].hex(' ')}, which is not CDR"
+                )
             order, widest = _ORDERS[kind]
             read = build_read(
                 self._layout, self._wanted, order=order, is_ros1=self._is_ros1, widest=widest
@@ -126,7 +128,7 @@ class TopicCodec:
             if envelope.verb == UNENCODED:
                 return self._encode_call(envelope)
             return Received(self._plain(envelope))
-        except (BadMessage, BadDefinition) as fault:
+        except (BadRosMessage, BadDefinition) as fault:
             name = envelope.attributes.get("topic") or envelope.attributes.get("service")
             return Received(fault=f"{printable(str(name))[:_SHOWN]}: {fault}")
 
@@ -181,7 +183,7 @@ class TopicCodec:
         else:
             source = self._services.get(str(said.get("service")), (None, None, ""))[1]
         if source is None:
-            raise BadMessage("a message arrived without the definition of its type")
+            raise BadRosMessage("a message arrived without the definition of its type")
         return envelope._replace(body=source.read(body))
 
     # -- calls

@@ -14,7 +14,7 @@ from urc.transports.ros.rosbridge_operations import BadOperation, OperationReade
 __all__ = [
     "SUBPROTOCOLS",
     "BadOperation",
-    "Channel",
+    "AdvertisedChannel",
     "FrameReader",
     "MessageData",
     "ServiceReply",
@@ -59,7 +59,7 @@ class ServiceReply(NamedTuple):
     data: bytes
 
 
-class Channel(NamedTuple):
+class AdvertisedChannel(NamedTuple):
     """A topic of the robot, with the definition of its type."""
 
     id: int
@@ -111,7 +111,7 @@ class FrameReader:
         return self._operations.read(frame) if kind == ord("{") else None
 
 
-def channel_of(said: Mapping[str, Any]) -> Channel:
+def channel_of(said: Mapping[str, Any]) -> AdvertisedChannel:
     """Return an announced channel; raise `BadOperation` if it is invalid."""
     number, topic, encoding = _number(said), said.get("topic"), said.get("encoding")
     if number is None or not isinstance(topic, str) or not isinstance(encoding, str):
@@ -122,7 +122,7 @@ def channel_of(said: Mapping[str, Any]) -> Channel:
     notation = _text(said, "schemaEncoding") or {"cdr": "ros2msg", "ros1": "ros1msg"}.get(
         encoding, ""
     )
-    return Channel(number, topic, encoding, _text(said, "schemaName"), notation, schema)
+    return AdvertisedChannel(number, topic, encoding, _text(said, "schemaName"), notation, schema)
 
 
 def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceType:

@@ -22,8 +22,8 @@ from urc.model.payload import Envelope
 from urc.transports._faults import one_line
 from urc.transports.base import NOTICE, TransportError
 from urc.transports.ros.foxglove_frames import (
+    AdvertisedChannel,
     BadOperation,
-    Channel,
     FrameReader,
     MessageData,
     ServiceReply,
@@ -72,7 +72,7 @@ class _Subscription:
 
     __slots__ = ("channel", "due_s", "late", "number", "wish")
 
-    def __init__(self, wish: TopicWish, channel: Channel, number: int) -> None:
+    def __init__(self, wish: TopicWish, channel: AdvertisedChannel, number: int) -> None:
         self.wish, self.channel, self.number = wish, channel, number
         self.due_s = float("-inf")
         self.late: Envelope | None = None
@@ -111,7 +111,7 @@ class FoxgloveSession:
         self._published = published
         self._reader = FrameReader()
         self._frames: list[tuple[bytes, bool]] = []
-        self._channels: dict[int, Channel] = {}
+        self._channels: dict[int, AdvertisedChannel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._topics: dict[str, _Subscription] = {}
         self._services: dict[str, ServiceType] = {}
@@ -212,7 +212,7 @@ class FoxgloveSession:
 
     def reconcile(self) -> None:
         """Subscribe to the topics of the driver, after channels have come or gone."""
-        found: dict[str, Channel] = {}
+        found: dict[str, AdvertisedChannel] = {}
         for channel in self._channels.values():
             if channel.topic in self._wishes and channel.encoding in _ENCODINGS:
                 found.setdefault(channel.topic, channel)
@@ -235,7 +235,7 @@ class FoxgloveSession:
         if new:
             self._op("subscribe", subscriptions=new)
 
-    def _define(self, channel: Channel) -> None:
+    def _define(self, channel: AdvertisedChannel) -> None:
         attributes = {
             "topic": channel.topic,
             "type": channel.type,

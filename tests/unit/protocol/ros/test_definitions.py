@@ -7,10 +7,10 @@ import pytest
 from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
 from urc.protocol.ros.common_types import common_types
-from urc.protocol.ros.definition import BadDefinition, Definitions, Field, layout_of
+from urc.protocol.ros.definition import BadDefinition, Definitions, MessageField, layout_of
 from urc.protocol.ros.idl_text import parse_idl
 from urc.protocol.ros.msg_text import parse_msg
-from urc.protocol.ros.read_source import BadMessage, build_read, read_safely
+from urc.protocol.ros.read_source import BadRosMessage, build_read, read_safely
 from urc.protocol.ros.wanted import ALL, wanted_of
 from urc.protocol.ros.write_source import Unwritable, Writer
 
@@ -79,7 +79,7 @@ module pkg { module msg { struct Part { float mass; string name; }; }; };
 """
 
 
-def fields(definitions: Definitions, name: str) -> dict[str, Field]:
+def fields(definitions: Definitions, name: str) -> dict[str, MessageField]:
     return {one.name: one for one in definitions[name].fields}
 
 
@@ -92,15 +92,15 @@ def test_a_msg_text_has_fields_constants_and_defaults() -> None:
         "NAME": "two words # and no comment",
     }
     assert fields(found, "pkg/All") == {
-        "short": Field("short", "string", default="hi"),
-        "flag": Field("flag", "bool", default=True),
-        "fixed": Field("fixed", "float32", 3, [1.0, 2.0, 3.0]),
-        "few": Field("few", "int8", 0, bound=4),
-        "bytes": Field("bytes", "uint8", 0),
-        "points": Field("points", "Point", 0),
-        "thing": Field("thing", "other_pkg/Thing"),
-        "wide": Field("wide", "wstring"),
-        "letter": Field("letter", "char", default=65),
+        "short": MessageField("short", "string", default="hi"),
+        "flag": MessageField("flag", "bool", default=True),
+        "fixed": MessageField("fixed", "float32", 3, [1.0, 2.0, 3.0]),
+        "few": MessageField("few", "int8", 0, bound=4),
+        "bytes": MessageField("bytes", "uint8", 0),
+        "points": MessageField("points", "Point", 0),
+        "thing": MessageField("thing", "other_pkg/Thing"),
+        "wide": MessageField("wide", "wstring"),
+        "letter": MessageField("letter", "char", default=65),
     }
     assert fields(found, "other_pkg/Thing")["name"].default == "it has a # sign"
 
@@ -142,7 +142,7 @@ def test_the_fields_of_both_texts_are_those_of_rosbags() -> None:
 def test_an_idl_text_gives_the_same_bytes_as_the_msg_text_of_the_type() -> None:
     found = parse_idl("pkg/msg/Robot", IDL)
     assert fields(found, "pkg/Robot")["x"].default == 1.5
-    assert fields(found, "pkg/Robot")["few"] == Field("few", "uint8", 0, bound=16)
+    assert fields(found, "pkg/Robot")["few"] == MessageField("few", "uint8", 0, bound=16)
     same = """\
 builtin_interfaces/Time stamp
 float64 x 1.5
@@ -272,16 +272,16 @@ def test_lengths_that_lie_are_faults(wanted: Any) -> None:
             data = good[:place] + struct.pack("<I", length) + good[place + 4 :]
             try:
                 read_safely(read, data)
-            except BadMessage:
+            except BadRosMessage:
                 continue
     for end in range(4, len(good)):
-        with pytest.raises(BadMessage):
+        with pytest.raises(BadRosMessage):
             read_safely(build_read(STRINGS, ALL), good[:end])
 
 
 def test_many_empty_texts_are_refused_before_they_fill_the_memory() -> None:
     count = 300_000
     data = b"\0\1\0\0" + struct.pack("<I", count) + struct.pack("<IB3x", 1, 0) * count + bytes(16)
-    with pytest.raises(BadMessage) as problem:
+    with pytest.raises(BadRosMessage) as problem:
         read_safely(build_read(STRINGS, ALL), data)
     assert str(problem.value) == "the arrays have too many elements"
