@@ -215,7 +215,7 @@ async def test_a_refusal_of_the_provider_is_told(provider: FakeProvider) -> None
     [
         ({"nonce": "other"}, "for another sign-in"),
         ({"aud": "another"}, "for another server"),
-        ({"iss": "https://evil.example"}, "another issuer"),
+        ({"iss": "https://evil.example"}, "a different issuer"),
         ({"exp": NOW - 100}, "check both clocks"),
         ({"sub": None}, "names no account"),
     ],
