@@ -22,6 +22,7 @@ ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
 AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
 ROSMSG = Path(__file__).resolve().parents[1] / "node_modules" / "@foxglove"
 PUPPETEER = Path(__file__).resolve().parents[1] / "node_modules" / "puppeteer-core"
+PYODIDE = Path(__file__).resolve().parents[1] / "node_modules" / "pyodide"
 LANGUAGE_SERVER = (
     Path(__file__).resolve().parents[1]
     / "node_modules"
@@ -270,6 +271,13 @@ NEEDS = (
         package="",
         purpose="tests of the pages in Firefox",
         other=lambda: os.fspath(PUPPETEER) if PUPPETEER.is_dir() else None,
+    ),
+    Need(
+        name="pyodide",
+        executables=(),
+        package="",
+        purpose="tests of the playground",
+        other=lambda: os.fspath(PYODIDE) if PYODIDE.is_dir() else None,
     ),
 )
 

@@ -22,6 +22,11 @@ def main() -> int:
     """Build the site, in the folder of the command line if one is given; return the exit code."""
     folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
     code = build(folder)
+    if code == 0:
+        from scripts.playground import PYODIDE, write
+
+        if PYODIDE.is_dir():  # npm brings it; without it, the site has no playground
+            write(folder / "playground")
     print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
     return code
 
@@ -39,7 +44,6 @@ def build(html: Path = HTML) -> int:
     trees = f"--doctree-dir={html.parent / 'doctrees'}"
     with redirect_stdout(StringIO()):
         code = build_main([*options, "--fresh-env", trees, str(ROOT / "docs"), str(html)])
-    # The playground adds its files here, after a good build: scripts.playground.build(html)
     return int(code)
 
 

@@ -229,18 +229,10 @@ def _parser(text: str) -> Any:
     try:
         from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs hide it
     except ImportError:  # PyYAML without libyaml: seven times slower, same events
-        return _pure_parser(text)
+        from urc._yaml_pure import PureParser
+
+        return PureParser(text)
     return CParser(text)
-
-
-def _pure_parser(text: str) -> Any:
-    class PureParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
-        def __init__(self) -> None:
-            yaml.reader.Reader.__init__(self, text)
-            yaml.scanner.Scanner.__init__(self)
-            yaml.parser.Parser.__init__(self)
-
-    return PureParser()
 
 
 def _decode(content: bytes, file: str) -> str:

@@ -329,12 +329,14 @@ def test_traps_of_yaml_are_told_with_their_remedy(
 def test_both_parsers_of_pyyaml_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without libyaml the reports are the same, though the parser's own words differ."""
     import urc.source
+    from urc._yaml_pure import PureParser
 
     texts = [
         "a: *b?", "a: %x", "a: @x", "a: !x", "a: {{ x }}", "a:\n\tb: 1", "a: b: c", "a: 'x",
         'a: "x', "a: [1", "a: {b: 1", 'a: "\\d"', "a\nb: 1", "a: 1\n  b: 2", "- a\nb: 1", "a: - b",
         "a: &", "%x y", "a: 'x' y", "a: ]", "a: |x", " a: 1\nb: 2", "a: 1\na: 2", "a: &x [*x]",
-        "a: x #y", "? a\n: b", "a: ?", "---\na: 1\n---\nb: 1",
+        "a: x #y", "? a\n: b", "a: ?", "---\na: 1\n---\nb: 1", "a: { b: MODE?, c: d? }",
+        "a: [x?y, ?z]", "a: { b: x:, c: 1 }", "a: { http://h:80/p }", "a: {?b: 1}", "a: [b: c?]",
     ]  # fmt: skip
 
     def outcome(text: str) -> list[str]:
@@ -345,5 +347,5 @@ def test_both_parsers_of_pyyaml_are_understood(monkeypatch: pytest.MonkeyPatch) 
         return [repr(document.data), *map(to_text, document.problems)]
 
     by_c = [outcome(text) for text in texts]
-    monkeypatch.setattr(urc.source, "_parser", urc.source._pure_parser)
+    monkeypatch.setattr(urc.source, "_parser", PureParser)
     assert [outcome(text) for text in texts] == by_c

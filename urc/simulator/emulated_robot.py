@@ -70,10 +70,15 @@ log = logging.getLogger(__name__)
 class EmulatedRobot:
     """One emulated robot. The method `line` creates the robot's side of a connection."""
 
-    def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
+    def __init__(
+        self, profile: Profile, settings: Mapping[str, Value], *, is_plain: bool = False
+    ) -> None:
+        """Prepare the robot; with `is_plain`, numpy and Pillow are not needed (see `World`)."""
         self._transports = profile.driver.transports
         self._rules = profile.simulator
-        self._values = Values(profile.driver, settings, profile.emulated, profile.world)
+        self._values = Values(
+            profile.driver, settings, profile.emulated, profile.world, is_plain=is_plain
+        )
         self._pictures = _pictures(profile.driver, settings, self._values.senses)
         self._robot = DefaultResponder(profile.driver, settings, self._values)
         self._setters = TimedSetters()

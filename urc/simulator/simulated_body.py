@@ -39,6 +39,7 @@ class SimulatedBody:
         driver: driver of the robot.
         evaluate: function that returns the value of a template.
         put: function that sets a value in the robot's state.
+        is_plain: see `World`.
     """
 
     def __init__(
@@ -47,9 +48,13 @@ class SimulatedBody:
         driver: Driver,
         evaluate: Evaluate,
         put: Callable[[str, object], None],
+        *,
+        is_plain: bool = False,
     ) -> None:
         self.spec = spec
-        self.world = World(spec, self._inputs, self._holds, has_rendering=has_rendering())
+        self.world = World(
+            spec, self._inputs, self._holds, has_rendering=has_rendering(), is_plain=is_plain
+        )
         self.failsafe = spec.failsafe or failsafe_of(driver)
         self._evaluate = evaluate
         self._put = put
@@ -126,12 +131,16 @@ class SimulatedBody:
 @cache
 def has_rendering() -> bool:
     """Return whether the packages of cameras and laser scanners are installed (extra `demo`)."""
-    return find_spec("numpy") is not None and find_spec("PIL") is not None
+    try:
+        return find_spec("numpy") is not None and find_spec("PIL") is not None
+    except ModuleNotFoundError:  # hidden, as in browsers
+        return False
 
 
-def rendered_signals(spec: WorldSpec) -> frozenset[str]:
-    """Return the signals of cameras and laser scanners."""
-    return frozenset(name for name, one in spec.senses.items() if _LOOKS.search(one.python))
+def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> frozenset[str]:
+    """Return the signals of cameras and laser scanners, except of the readings `without`."""
+    found = {name: set(_LOOKS.findall(one.python)) for name, one in spec.senses.items()}
+    return frozenset(name for name, readings in found.items() if readings - without)
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:

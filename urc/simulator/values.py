@@ -18,6 +18,7 @@ from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter
 from urc.simulator.faults import Faults
 from urc.simulator.simulated_body import SimulatedBody, has_rendering, rendered_signals
+from urc.simulator.world.world import PLAIN
 
 __all__ = ["Names", "Unsettable", "Values"]
 
@@ -106,6 +107,8 @@ class Values:
         settings: Mapping[str, Value],
         initial: Mapping[str, Reading] = NOTHING,
         world: WorldSpec | None = None,
+        *,
+        is_plain: bool = False,
     ) -> None:
         """Initialise the robot with `initial` signals and state variables, and a world if given."""
         self.driver = driver
@@ -118,14 +121,16 @@ class Values:
         """The simulated body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
         """Signals that the world provides."""
-        missing = rendered_signals(world) if world and not has_rendering() else frozenset[str]()
+        drawn = PLAIN if is_plain else frozenset[str]()
+        is_blind = world is not None and not has_rendering()
+        missing = rendered_signals(world, drawn) if world and is_blind else frozenset[str]()
         self.faults = Faults(missing)
         """Injected faults of the robot."""
         for name, value in initial.items():
             self.set(name, value)
         if world is not None:
             self.body, self.senses = (
-                SimulatedBody(world, driver, self.evaluate, self.set),
+                SimulatedBody(world, driver, self.evaluate, self.set, is_plain=is_plain),
                 world.senses,
             )
 

@@ -43,6 +43,8 @@ _LOW: Final = 12.0
 """Battery level after the fault low-battery, in per cent."""
 _RENDERED: Final = frozenset({"laser", "picture", "panorama", "top"})
 """Readings that need numpy or Pillow."""
+PLAIN: Final = frozenset({"laser", "picture"})
+"""Readings that `urc.simulator.world.plain` draws without them."""
 _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
@@ -60,6 +62,7 @@ class World:
         holds: function that evaluates a condition of the camera, which a document may give as a
             template.
         has_rendering: whether numpy and Pillow are installed.
+        is_plain: whether to draw level cameras and laser scanners without these packages, slowly.
     """
 
     def __init__(
@@ -69,6 +72,7 @@ class World:
         holds: Callable[[Template | bool], bool] = bool,
         *,
         has_rendering: bool = True,
+        is_plain: bool = False,
     ) -> None:
         self.spec = spec
         self.plan = WorldMap(ROOM if spec.map is None else spec.map)
@@ -82,7 +86,9 @@ class World:
         self.time_s: float | None = None
         """End of the last step, in seconds since the epoch; None before the first observation."""
         self.noise = 1.0
-        self.missing = frozenset[str]() if has_rendering else _RENDERED
+        self.is_plain = is_plain and not has_rendering
+        drawn = _RENDERED if has_rendering else PLAIN if is_plain else frozenset[str]()
+        self.missing = _RENDERED - drawn
         """Names of `READINGS` that need a package that is not installed."""
         self.dropped = set(self.missing)
         """Names of failed `READINGS`. Failed readings have no value."""
@@ -139,6 +145,8 @@ class World:
         flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
 
         def draw() -> bytes:
+            if self.is_plain:
+                return self._plain_picture(flip=flip, mirror=mirror)
             from urc.simulator.world.picture import camera_picture, jpeg
 
             spec = self.spec.camera
@@ -169,6 +177,17 @@ class World:
 
             self._faces = EdgeArrays(self.plan)
         return self._faces
+
+    def _plain_picture(self, *, flip: bool, mirror: bool) -> bytes:
+        """Return the image of a level camera as PNG; raise KeyError for any other camera."""
+        from urc.simulator.world.plain import LevelPose, level_picture, png
+
+        spec, motion = self.spec.camera, self.motion
+        if spec.tilt or motion.pitch or motion.roll:
+            raise KeyError("picture")
+        pose = LevelPose(motion.x, motion.y, motion.z + spec.mount_height, motion.yaw)
+        planes = level_picture(self.plan, pose, (spec.width, spec.height), spec.fov)
+        return png(planes, spec.width, flip=flip, mirror=mirror)
 
     def _pose(self) -> "CameraPose":
         from urc.simulator.world.picture import CameraPose
@@ -287,6 +306,10 @@ def _moment(world: World) -> SensorInput:
 
 
 def _laser(world: World) -> Mapping[str, object]:
+    if world.is_plain:
+        from urc.simulator.world.plain import sweep as plain_sweep
+
+        return plain_sweep(world.plan, _moment(world))
     from urc.simulator.world.laser import sweep
 
     return sweep(world.faces(), _moment(world))

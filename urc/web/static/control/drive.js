@@ -8,6 +8,7 @@
  * @typedef {"" | "sending" | "sent" | "failed"} StopPhase State of the last press of STOP, until the
  *   lease reports the latch.
  */
+import { request } from "../core/server.js";
 import { RedundantSocket } from "./redundant_socket.js";
 
 /** Silence of the server after which STOP is also sent by HTTP. */
@@ -187,7 +188,7 @@ export class Drive {
 
   async post() {
     try {
-      const answer = await fetch(this.stopUrl, {
+      const answer = await request(this.stopUrl, {
         method: "POST",
         keepalive: true,
         signal: AbortSignal.timeout(POST_WITHIN_MS),

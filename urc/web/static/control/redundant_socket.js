@@ -6,6 +6,8 @@
  * time, so messages about held controls go over both, and the first copy of each counts.
  */
 
+import { openSocket } from "../core/server.js";
+
 const AGAIN_MS = 1000;
 
 export class RedundantSocket {
@@ -38,7 +40,7 @@ export class RedundantSocket {
   }
 
   open() {
-    const line = new WebSocket(this.url);
+    const line = openSocket(this.url);
     this.line = line;
     line.addEventListener("open", () => {
       if (line === this.line) line.send(JSON.stringify({ t: "spare", key: this.key }));

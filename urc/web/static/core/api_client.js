@@ -2,6 +2,7 @@
 /**
  * Requests to this server's `/api/v1`, each with one reply or a reason of one line.
  */
+import { request } from "./server.js";
 import { t } from "./words.js";
 
 /** Time limit of a request; a test of a robot takes long. */
@@ -23,7 +24,7 @@ export async function ask(path, body) {
   }
   let answer;
   try {
-    answer = await fetch(path, how);
+    answer = await request(path, how);
   } catch {
     throw new Error(t("no connection to URC"));
   }

@@ -11,6 +11,7 @@
  * @property {() => void} leave ends the present interface
  * @property {() => void} enter starts the new interface
  */
+import { fetchPage } from "../core/server.js";
 import { t } from "urc/kit";
 import { part } from "./badge.js";
 
@@ -113,30 +114,17 @@ function addressed() {
 }
 
 /**
- * Fetch a page as a document. Trusted types forbid a parser of text; this one is the browser's own, and
- * runs no script of the page.
- *
  * @param {string} url
  * @returns {Promise<Document>}
  */
-function fetched(url) {
-  const request = new XMLHttpRequest();
+async function fetched(url) {
   const address = new URL(url, location.href);
   address.searchParams.set("part", "");
-  request.open("GET", address);
-  request.responseType = "document";
-  request.timeout = FETCH_MS;
-  return new Promise((resolve, reject) => {
-    const fail = () => reject(new Error(t("no connection to URC")));
-    request.addEventListener("error", fail);
-    request.addEventListener("timeout", fail);
-    request.addEventListener("load", () => {
-      const page = request.responseXML;
-      if (request.status === 200 && page?.querySelector("[data-stage]")) resolve(page);
-      else reject(new Error(page?.querySelector("main p")?.textContent || `HTTP ${request.status}`));
-    });
-    request.send();
+  const { status, page } = await fetchPage(address, FETCH_MS).catch(() => {
+    throw new Error(t("no connection to URC"));
   });
+  if (status === 200 && page?.querySelector("[data-stage]")) return page;
+  throw new Error(page?.querySelector("main p")?.textContent || `HTTP ${status}`);
 }
 
 /**

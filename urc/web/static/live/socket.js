@@ -11,6 +11,8 @@
  * @property {() => void} trip Called after each measurement of the round trip.
  */
 
+import { openSocket } from "../core/server.js";
+
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 const PING_EVERY_MS = 1000;
@@ -90,7 +92,7 @@ export class Socket {
 
   connect() {
     clearTimeout(this.retry);
-    const line = new WebSocket(this.url);
+    const line = openSocket(this.url);
     this.line = line;
     line.binaryType = "arraybuffer";
     this.pingedMs = performance.now(); // a hanging handshake times out like a missing pong

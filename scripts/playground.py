@@ -1,0 +1,262 @@
+"""The build of the playground: one folder of static files, `python -m scripts.playground FOLDER`.
+
+The folder works from any static web server, under any path, without other hosts. It contains:
+
+- the interpreter: Pyodide of npm, with the versions of `package-lock.json`;
+- `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
+- `dash/`: the modules and styles of the dashboard and the widgets, as a server serves them;
+- the page, its worker and its service worker, from `playground/static`.
+
+Packages come from this environment, which has the versions of `requirements/`. `msgspec` is the
+only package with a build for browsers on the package index; pip checks its locked hash.
+"""
+
+import argparse
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterable
+from importlib.metadata import distribution
+from pathlib import Path
+
+from hatch_build import LICENCES, VENDORED
+from scripts.node import node_executable
+from urc.shipped import vendored
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "playground" / "static"
+PYODIDE = ROOT / "node_modules" / "pyodide"
+RUNTIME = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm")
+PACKAGES = (
+    "anycrc", "anyio", "attrs", "idna", "jinja2", "jmespath", "jsonschema",
+    "jsonschema-specifications", "markdown-it-py", "markupsafe", "mdurl", "pyyaml", "referencing",
+    "semver", "sniffio", "starlette", "typing-extensions",
+)  # fmt: skip
+"""Packages of which the pure Python files are enough; `playground.stand_ins` replaces the rest."""
+COMPILED = ("msgspec",)
+"""Packages with a build for browsers on the package index."""
+ABI = "pyemscripten_2026_0_wasm32"
+"""Platform of such builds for this version of Pyodide."""
+PYTHON = "3.14"
+DATA = ("schemas", "robots", "widgets", "templates")
+SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
+CACHE = ROOT / "build" / "playground"
+"""Compiled files, by the hash of their sources."""
+BUILD_TIMEOUT_S = 1800
+_DATED = (1980, 1, 1, 0, 0, 0)
+
+
+class BuildError(Exception):
+    """A failed build; the message is one line."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Build the folder; return the exit code."""
+    parser = argparse.ArgumentParser(description="Build the playground as static files.")
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    folder: Path = parser.parse_args(arguments).folder
+    try:
+        write(folder)
+    except BuildError as fault:
+        print(f"scripts.playground: {fault}", file=sys.stderr)
+        return 1
+    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    print(f"{folder}: {size / 1e6:.1f} MB")
+    return 0
+
+
+def write(folder: Path) -> None:
+    """Write the whole folder; an existing folder is replaced.
+
+    Raises:
+        BuildError: Node or Pyodide is missing, or a package cannot be brought.
+    """
+    if not (PYODIDE / "pyodide.mjs").is_file():
+        raise BuildError("Pyodide is missing; run: npm ci --ignore-scripts")
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(PAGE, folder)
+    for name in RUNTIME:
+        _copy(PYODIDE / name, folder / "pyodide" / name)
+    with tempfile.TemporaryDirectory(prefix="urc-playground-") as work:
+        code, library = Path(work, "code"), Path(work, "library")
+        _stage_code(code)
+        with zipfile.ZipFile(PYODIDE / "python_stdlib.zip") as stdlib:
+            stdlib.extractall(library)
+        _compile(Path(work))
+        _pack(code, folder / "python.zip")
+        _pack(library, folder / "pyodide" / "python_stdlib.zip")
+    _write_dashboard(folder / "dash")
+    _write_licences(folder / "licences")
+    _write_list(folder)
+
+
+def _stage_code(code: Path) -> None:
+    """Copy all Python code and documents, as they lie in the worker."""
+    _copy_tree(ROOT / "urc", code / "urc", ("py", "md", "json"))
+    _copy_tree(ROOT / "playground", code / "playground", ("py",))
+    for name in DATA:
+        _copy_tree(ROOT / name, code / name, ("json", "yaml", "j2", "urdf", "svg"))
+    vendor = vendored()
+    if vendor is None:
+        raise BuildError("the browser modules are missing; run: ./dev run --version")
+    for name in ("__init__.py", "importmap.json"):
+        _copy(vendor / name, code / "urc_vendor" / name)
+    for package in PACKAGES:
+        _copy_distribution(package, code)
+    for package in COMPILED:
+        _unpack_wheel(package, code)
+
+
+def _copy_tree(source: Path, target: Path, kinds: Iterable[str]) -> None:
+    endings = tuple(f".{kind}" for kind in kinds)
+    for file in sorted(source.rglob("*")):
+        place = file.relative_to(source).as_posix()
+        if any(f"/{name}/" in f"/{place}" for name in SKIPPED):
+            continue
+        if file.is_file() and file.name.endswith(endings):
+            _copy(file, target / place)
+
+
+def _copy_distribution(package: str, code: Path) -> None:
+    """Copy the pure Python files and the metadata of an installed package."""
+    for file in distribution(package).files or ():
+        place = file.as_posix()
+        is_metadata = ".dist-info/" in place and file.name in ("METADATA", "entry_points.txt")
+        is_code = file.suffix in (".py", ".json") and ".." not in place
+        if is_metadata or (is_code and not any(f"/{name}/" in f"/{place}" for name in SKIPPED[:3])):
+            _copy(Path(str(file.locate())), code / place)
+
+
+def _unpack_wheel(package: str, code: Path) -> None:
+    """Download the build of a package for browsers, in the locked version, and unpack it."""
+    version = distribution(package).version
+    lock = (ROOT / "requirements" / "dev.txt").read_text("utf-8")
+    found = re.search(rf"^{package}=={re.escape(version)} \\\n((?: +--hash=.*\n)+)", lock, re.M)
+    if found is None:
+        raise BuildError(f"{package} {version} is not the locked version; run: ./dev run --version")
+    with tempfile.TemporaryDirectory(prefix="urc-playground-") as folder:
+        wanted = Path(folder, "wanted.txt")
+        wanted.write_text(found[0], "utf-8")
+        command = [
+            sys.executable, "-m", "pip", "download", "--quiet", "--only-binary=:all:", "--no-deps",
+            "--require-hashes", "--platform", ABI, "--python-version", PYTHON,
+            "--implementation", "cp", "--abi", f"cp{PYTHON.replace('.', '')}",
+            "--dest", folder, "--requirement", str(wanted),
+        ]  # fmt: skip
+        _run(command, f"pip could not download {package} for browsers")
+        with zipfile.ZipFile(next(Path(folder).glob("*.whl"))) as wheel:
+            wheel.extractall(code)
+
+
+def _compile(work: Path) -> None:
+    """Compile all Python files, with the bytecode of unchanged files from earlier builds."""
+    key = (PYODIDE / "package.json").read_bytes()
+    kept = {
+        file: CACHE / hashlib.blake2b(key + file.read_bytes(), digest_size=16).hexdigest()
+        for file in work.rglob("*.py")
+    }
+    for file, made in kept.items():
+        if made.is_file():
+            shutil.copyfile(made, file.with_suffix(".pyc"))
+            file.unlink()
+    if not any(file.is_file() for file in kept):
+        return
+    node = node_executable()
+    if node is None:
+        raise BuildError("Node is missing; ./dev brings it")
+    script = ROOT / "playground" / "compile.mjs"
+    _run([node, str(script), str(PYODIDE), str(work)], "Python files could not be compiled")
+    CACHE.mkdir(parents=True, exist_ok=True)
+    for file, made in kept.items():
+        if file.with_suffix(".pyc").is_file() and not made.is_file():
+            shutil.copyfile(file.with_suffix(".pyc"), made)
+
+
+def _run(command: list[str], fault: str) -> None:
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=BUILD_TIMEOUT_S, check=False
+    )
+    if done.returncode != 0:
+        raise BuildError(f"{fault}: {(done.stderr or done.stdout).strip()[-2000:]}")
+
+
+def _pack(folder: Path, archive: Path) -> None:
+    """Write a ZIP archive with the same bytes at every build."""
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
+        for file in sorted(folder.rglob("*")):
+            if file.is_file():
+                entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), _DATED)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                packed.writestr(entry, file.read_bytes())
+
+
+def _write_dashboard(folder: Path) -> None:
+    """Copy the files that pages load from a server, at the same paths."""
+    web = ("js", "mjs", "css", "svg", "png", "jpg", "webp", "json", "stl", "dae", "urdf")
+    _copy_tree_of(ROOT / "urc" / "web" / "static", folder / "static", web)
+    _copy_tree_of(ROOT / "widgets", folder / "widgets", web)
+    for file in sorted((ROOT / "robots").glob("*.yaml")):
+        _copy(file, folder / "robots" / file.name)
+    vendor = vendored()
+    if vendor is not None:
+        _copy_tree_of(vendor, folder / "vendor", (*web, "LICENSE"))
+
+
+def _copy_tree_of(source: Path, target: Path, kinds: tuple[str, ...]) -> None:
+    for file in sorted(source.rglob("*")):
+        if file.is_file() and file.name.rpartition(".")[2] in kinds:
+            _copy(file, target / file.relative_to(source))
+
+
+def _write_licences(folder: Path) -> None:
+    """Copy the licence texts of everything that the folder contains."""
+    _copy(ROOT / "LICENSE", folder / "urc.txt")
+    _copy(ROOT / "LICENSES" / "MPL-2.0.txt", folder / "pyodide.txt")
+    _copy(ROOT / "LICENSES" / "Python-2.0.txt", folder / "python.txt")
+    for package in (*PACKAGES, *COMPILED):
+        texts = [
+            Path(str(file.locate())).read_text("utf-8")
+            for file in distribution(package).files or ()
+            if re.match(r"(LICEN[CS]E|COPYING|NOTICE)", file.name, re.I)
+        ]
+        if not texts:
+            raise BuildError(f"{package} has no licence text")
+        (folder / f"{package}.txt").write_text("\n\n".join(texts), "utf-8")
+    vendor = vendored()
+    for package in VENDORED if vendor is not None else ():
+        assert vendor is not None  # noqa: S101  # for the type checker
+        text = vendor / package / "LICENSE"
+        if not text.is_file():
+            text = ROOT / LICENCES[package]
+        _copy(text, folder / f"{package.replace('/', '-').removeprefix('@')}.txt")
+
+
+def _write_list(folder: Path) -> None:
+    """Write the list of all files, from which the service worker fills its cache."""
+    files = {
+        file.relative_to(folder).as_posix(): hashlib.blake2b(
+            file.read_bytes(), digest_size=12
+        ).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file()
+    }
+    digest = hashlib.blake2b(json.dumps(files).encode(), digest_size=12).hexdigest()
+    worker = folder / "sw.js"
+    worker.write_text(worker.read_text("utf-8").replace("VERSION", digest, 1), "utf-8")
+    listed = {"version": digest, "files": sorted(files)}
+    (folder / "files.json").write_text(json.dumps(listed, indent=1) + "\n", "utf-8")
+
+
+def _copy(source: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, target)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

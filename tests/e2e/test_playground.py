@@ -1,0 +1,153 @@
+"""The playground in a real browser, from static files under a path, with no other host in reach."""
+
+import json
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+from playwright.async_api import Browser, Locator, Page, expect
+
+from scripts.playground import write
+from tests.contract.test_broken_documents import BROKEN, DOCUMENTS
+from tests.e2e import axe
+from tests.e2e.playground import (
+    WITHIN_MS,
+    all_files,
+    command_report,
+    opened,
+    put,
+    served,
+    shown_report,
+    start,
+)
+
+pytestmark = [
+    pytest.mark.anyio,
+    pytest.mark.needs("node"),
+    pytest.mark.needs("pyodide"),
+    pytest.mark.xdist_group("playground"),
+]
+
+GESTURES = 5
+"""Gestures until the robot has moved: the first one may only take the controls, and a pause of a
+busy machine ends a gesture."""
+SAMPLE = Random(22).sample(DOCUMENTS, 12)  # noqa: S311  # no secret
+"""A browser takes a second for each; `tests/contract/test_stand_ins.py` compares all of them."""
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a built playground, under a path."""
+    root = tmp_path_factory.mktemp("site")
+    write(root / "some" / "path" / "playground")
+    with served(root) as url:
+        yield f"{url}some/path/playground/"
+
+
+async def test_reports_are_those_of_the_command(browser: Browser, address: str) -> None:
+    """Place, severity, code and message of every problem, for a sample of the broken documents."""
+    async with opened(browser, address) as page:
+        found = await put(page, all_files(BROKEN), SAMPLE)
+    mine = {name: shown_report(one) for name, one in zip(SAMPLE, found, strict=True)}
+    assert mine == {name: shown_report(command_report(BROKEN, name)) for name in SAMPLE}
+    assert any(mine.values())
+
+
+async def test_a_turtlebot_is_driven_let_go_and_stopped(browser: Browser, address: str) -> None:
+    """By a hand on the real dashboard: it moves while held, and not after STOP."""
+    async with opened(browser, address) as page:
+        frame = await start(page)
+        place = frame.locator("[data-cell]").filter(has_text="Position")
+        speed = frame.locator("[data-cell]").filter(has_text="Speed").first
+        pad = frame.locator(".joystick-pad")
+        before = await place.inner_text()
+        for _ in range(GESTURES):
+            if await pushed(page, pad, lambda: place.inner_text(), before):
+                break
+        assert await place.inner_text() != before
+        await expect(speed).to_contain_text("0.00")
+        await frame.locator("[data-stop-button]").click()
+        await expect(frame.locator("[data-latched]")).to_be_visible()
+        still = await place.inner_text()
+        assert not await pushed(page, pad, lambda: place.inner_text(), still)
+        await frame.locator("[data-verb='reset']").first.click()
+        await expect(frame.locator("[data-latched]")).to_be_hidden()
+
+
+async def pushed(page: Page, pad: Locator, read: Callable[[], Awaitable[str]], before: str) -> bool:
+    """Push the stick forward and let go; return whether the reading has changed meanwhile."""
+    box = await pad.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x, y - box["height"] / 3, steps=3)
+    for _ in range(20):
+        await page.wait_for_timeout(100)
+        if await read() != before:
+            break
+    await page.mouse.up()
+    return await read() != before
+
+
+async def test_an_edit_changes_the_robot_and_an_error_does_not(
+    browser: Browser, address: str
+) -> None:
+    """The frame shows the newest valid text; a problem is listed with its place."""
+    async with opened(browser, address) as page:
+        frame = await start(page)
+        area = page.locator("textarea")
+        text = await area.input_value()
+        await area.fill(text.replace("title: TurtleBot 4\n", "title: Edited robot\n", 1))
+        title = frame.locator(".urc-bar-title")
+        await expect(title).to_have_text("Edited robot", timeout=WITHIN_MS)
+        await area.fill(text.replace("kind: robot", "kind: robbot", 1))
+        problem = page.locator(".urc-editor-problems li").first
+        await expect(problem).to_contain_text("line 9", timeout=WITHIN_MS)
+        await expect(title).to_have_text("Edited robot")
+
+
+async def test_a_link_carries_the_text_and_the_page_works_offline(
+    browser: Browser, address: str
+) -> None:
+    """The fragment has the whole text; after a start, no server is needed."""
+    text = json.loads('"urc: 1\\nkind: robot\\nname: é😀\\n"')
+    async with opened(browser, address) as page:
+        await start(page)
+        await page.wait_for_function("async () => (await caches.keys()).length > 0")
+        link = await page.evaluate(
+            "async (text) => (await import('./text_link.js')).fragmentOf(text)", text
+        )
+        await page.context.set_offline(True)
+        await page.goto(f"{address}{link}")
+        await page.reload()
+        assert await page.locator("textarea").input_value() == text
+        await expect(page.locator(".urc-editor-problems li").first).to_be_visible(timeout=WITHIN_MS)
+        await page.goto(address)
+        await page.reload()
+        await start(page)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+async def test_the_page_is_accessible(browser: Browser, address: str, theme: str) -> None:
+    """By the rules of axe, with a report in sight."""
+    async with opened(browser, address) as page:
+        await axe.prepare(page)
+        await page.emulate_media(color_scheme=theme)
+        await page.reload()
+        await page.locator("textarea").fill("urc: 1\nkind: robbot\nname: x\n")
+        await expect(page.locator(".urc-editor-problems li").first).to_be_visible(timeout=WITHIN_MS)
+        assert await axe.faults(page) == []
+
+
+def test_the_build_names_no_other_host(
+    address: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Neither the page nor its modules, apart from the interpreter, contain an address."""
+    root = next(Path(tmp_path_factory.getbasetemp()).glob("site*/some/path/playground"))
+    ours = [*root.glob("*.js"), *root.glob("*.html"), *root.glob("*.css")]
+    assert len(ours) > 8
+    assert [
+        file.name for file in ours if "http://" in (said := file.read_text()) or "https://" in said
+    ] == []

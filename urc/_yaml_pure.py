@@ -1,0 +1,54 @@
+"""The parser of PyYAML in pure Python, with the rules of libyaml for text inside braces.
+
+Private to `urc.source`. PyYAML ends an unquoted text at ``?`` inside ``{ }`` and ``[ ]``, so
+``{ send: MODE? }`` would be a syntax error only on machines without libyaml.
+"""
+
+from typing import Any, Final
+
+from yaml.parser import Parser
+from yaml.reader import Reader
+from yaml.scanner import Scanner, ScannerError
+
+__all__ = ["PureParser"]
+
+_LETTER: Final = "\ufffc"
+"""Character without a meaning in YAML, which hides a ``?`` from the scanner."""
+_BLANK: Final = "\0 \t\r\n\x85\u2028\u2029"
+
+
+class PureParser(Reader, Scanner, Parser):
+    """A parser with the events and errors of libyaml."""
+
+    def __init__(self, text: str) -> None:
+        """Begin to read `text`."""
+        self._is_plain = False
+        """Whether the scanner is inside an unquoted text."""
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+
+    def scan_plain(self) -> Any:
+        """Return the token of an unquoted text."""
+        self._is_plain = self.flow_level > 0
+        try:
+            return super().scan_plain()
+        finally:
+            self._is_plain = False
+
+    def peek(self, index: int = 0) -> str:
+        """Return the character at `index` from the current position."""
+        found: str = super().peek(index)
+        if not self._is_plain:
+            return found
+        if found == ":" and super().peek(index + 1) in ",?[]{}":
+            self.forward(index)
+            mark = self.get_mark()
+            raise ScannerError("while scanning a plain scalar", mark, "found unexpected ':'", mark)
+        return _LETTER if found == "?" else found
+
+    def check_plain(self) -> bool:
+        """Return whether an unquoted text starts at the current position."""
+        if self.flow_level and self.peek() == ":":
+            return False
+        return bool(super().check_plain())
