@@ -96,7 +96,7 @@ SLOW = (
         "tests e2e",
         (
             *(*PYTEST, "tests/e2e", "-m", "not alone"),
-            *("-n", "4", "--dist", "loadgroup"),
+            *("-n", "3", "--dist", "loadgroup"),
         ),
     ),
     # They measure the time until a robot stops.
