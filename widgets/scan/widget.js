@@ -12,7 +12,7 @@ import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, rimOf, sideOf,
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
 } from "./rays.js";
 
 /** Largest image in pixels: a slow device fills no more in a frame. */
@@ -247,9 +247,8 @@ class Scan {
 
   /** @param {readonly unknown[]} values */
   measure(values) {
-    const all = measured(values, Number(this.options["range_min"] ?? 0), this.most, this.distances);
-    const isPlan = this.view === "polar" || this.view === "map";
-    this.rim = isPlan ? rimOf(all, this.most, Number(this.options["near"] ?? 0), this.rim) : this.most;
+    measured(values, Number(this.options["range_min"] ?? 0), this.most, this.distances);
+    this.rim = this.most;
   }
 
   paint() {
