@@ -19,12 +19,15 @@
     else delete document.documentElement.dataset["hand"];
   };
 
-  show(kept());
-  document.addEventListener("DOMContentLoaded", () => {
+  const showChoice = () => {
     for (const choice of document.querySelectorAll("[data-hand-choice]")) {
       if (choice instanceof HTMLInputElement) choice.checked = choice.value === kept();
     }
-  });
+  };
+
+  show(kept());
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", showChoice);
+  else showChoice();
   document.addEventListener("change", ({ target }) => {
     if (!(target instanceof HTMLInputElement) || !target.matches("[data-hand-choice]")) return;
     // Held controls are released before they move away under the finger.

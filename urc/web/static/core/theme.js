@@ -33,8 +33,7 @@
 
   const YEAR_S = 365 * 24 * 3600;
 
-  show(kept(KEY));
-  document.addEventListener("DOMContentLoaded", () => {
+  const showChoices = () => {
     const theme = THEMES.has(kept(KEY)) ? kept(KEY) : "";
     for (const choice of document.querySelectorAll("[data-theme-choice]")) {
       if (choice instanceof HTMLInputElement) choice.checked = choice.value === theme;
@@ -47,7 +46,11 @@
     for (const field of document.querySelectorAll("[data-screen-name]")) {
       if (field instanceof HTMLInputElement) field.value = kept(NAME_KEY);
     }
-  });
+  };
+
+  show(kept(KEY));
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", showChoices);
+  else showChoices();
   // On the document, so that a choice before the modules have loaded counts.
   document.addEventListener("change", ({ target }) => {
     if (target instanceof HTMLInputElement && target.matches("[data-theme-choice]")) {
