@@ -59,8 +59,9 @@ LEAST_TITLE_PX = 72
 BAR = """() => {
   const box = (name) => document.querySelector(name).getBoundingClientRect();
   const [title, badge, bar] = [".urc-bar-title", ".urc-badge", ".urc-bar"].map(box);
+  const { scrollWidth, clientWidth } = document.querySelector(".urc-bar-title");
   return {
-    title: title.width, rows: bar.height / title.height,
+    title: title.width, isCut: scrollWidth > clientWidth, rows: bar.height / title.height,
     isSecondRow: badge.top >= title.bottom,
     isWide: document.documentElement.scrollWidth > innerWidth,
   };
@@ -81,7 +82,7 @@ async def test_the_robots_name_keeps_its_room_on_narrow_screens(
         for width in NARROW_PX:
             await turned(page, (width, 900))
             bar = await page.evaluate(BAR)
-            assert bar["title"] >= LEAST_TITLE_PX, width
+            assert not bar["isCut"] or bar["title"] >= LEAST_TITLE_PX, width
             assert not bar["isSecondRow"], width
             assert not bar["isWide"], width
 

@@ -71,7 +71,7 @@
   const sizes = sticks.map(({ width, height }) => Math.min(width, height));
   if (Math.max(0, ...sizes) - Math.min(...sizes) > SLACK) faults.push(`sticks of different sizes: ${sizes.join(", ")}`);
   // A finger must reach the whole stick without scrolling, unless the widgets are below the background.
-  const isOver = document.querySelector('[data-place="ground"]') !== null && innerWidth >= 600;
+  const isOver = document.querySelector('[data-place="ground"]') !== null && matchMedia("(width >= 37.5rem)").matches;
   for (const { bottom } of isOver ? sticks : []) {
     if (bottom > Math.min(innerHeight, room.bottom) + SLACK) faults.push(`a stick is ${Math.round(bottom - innerHeight)} px below the screen`);
   }
