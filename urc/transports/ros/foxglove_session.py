@@ -14,7 +14,9 @@ answers these services of rosapi itself, so the same document works with rosbrid
 
 import json
 import logging
+import re
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -51,6 +53,9 @@ KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
 """Maximum number of different status messages of the robot that are reported."""
+MAX_RETRIES: Final = 5
+"""Maximum number of retries of a refused subscription."""
+_NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
 _ENCODINGS: Final = ("cdr", "ros1", "json")
 PARAMETER: Final = "parameter:"
@@ -70,11 +75,12 @@ class TopicWish(NamedTuple):
 class _Subscription:
     """A subscribed topic, with the time of its next message."""
 
-    __slots__ = ("channel", "due_s", "late", "number", "wish")
+    __slots__ = ("channel", "due_s", "is_heard", "late", "number", "wish")
 
     def __init__(self, wish: TopicWish, channel: AdvertisedChannel, number: int) -> None:
         self.wish, self.channel, self.number = wish, channel, number
         self.due_s = float("-inf")
+        self.is_heard = False
         self.late: Envelope | None = None
         """Newest message that came too soon."""
 
@@ -123,6 +129,7 @@ class FoxgloveSession:
         self._number = 0
         self._time = RobotTime()
         self._told: set[str] = set()
+        self._retries: Counter[str] = Counter()
         self._bad = 0
         self.capabilities: frozenset[str] = frozenset()
         self.encodings: tuple[str, ...] = ()
@@ -255,6 +262,7 @@ class FoxgloveSession:
         one = self._subscriptions.get(said.subscription)
         if one is None:
             return
+        one.is_heard = True
         self._time.told(said.time_ns, time.time_ns())
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
@@ -345,8 +353,23 @@ class FoxgloveSession:
         return list(self._listeners.get(topic, ())) if self.has_graph else None
 
     def _status(self, said: Mapping[str, Any]) -> None:
-        if said.get("level") in (1, 2):
-            self._notice(one_line(str(said.get("message"))))
+        level, text = said.get("level"), one_line(str(said.get("message")))
+        if level in (1, 2):
+            self._notice(text)
+        if level == 2 and "channel" in text.lower():
+            self._forget_refused({int(number) for number in _NUMBERS.findall(text[:_SHOWN])})
+
+    def _forget_refused(self, channels: set[int]) -> None:
+        """Forget the subscriptions of refused channels, so that `reconcile` subscribes again.
+
+        The server of the Foxglove SDK announces a channel before it accepts subscriptions, so a
+        quick client is refused. The refusal is a text with the number of the channel.
+        """
+        for one in list(self._topics.values()):
+            topic, is_refused = one.wish.topic, one.channel.id in channels and not one.is_heard
+            if is_refused and self._retries[topic] < MAX_RETRIES:
+                self._retries[topic] += 1
+                del self._topics[topic], self._subscriptions[one.number]
 
     def _notice(self, text: str) -> None:
         if text not in self._told and len(self._told) < MAX_STATUS:
