@@ -239,9 +239,6 @@ class BrowserClient:
 
     def _handle(self, message: Message, live: LiveSession, group: asyncio.TaskGroup) -> None:
         now_s = self._service.clock.now()
-        if not self._ticks.allow(now_s):
-            self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
-            return
         asked: wire.Inbound | None = None
         fault = ""
         try:
@@ -249,8 +246,14 @@ class BrowserClient:
         except wire.BadMessage as error:
             fault = str(error)
         self.recheck()
-        if isinstance(asked, (Tick, Release, Stop)):
-            self._drive(asked)  # STOP is never counted, so no limit can refuse it
+        if isinstance(asked, Stop):
+            self._drive(asked)  # before the limits, so that no limit refuses STOP
+        if not self._ticks.allow(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
+        elif isinstance(asked, Stop):
+            pass
+        elif isinstance(asked, (Tick, Release)):
+            self._drive(asked)
         elif not self._allowance.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
         elif asked is None:

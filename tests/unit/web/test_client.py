@@ -339,6 +339,19 @@ async def test_a_stop_is_taken_however_much_else_was_said() -> None:
         assert it.service.controls.controller.lease.state.latched_by == "screen 1"
 
 
+async def test_a_stop_beyond_every_limit_still_stops() -> None:
+    """The line closes afterwards."""
+    tick = {"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1}
+    async with scene() as it:
+        for _ in range(TICKS_PER_S):
+            it.line.say(tick)
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
+        assert it.line.closed is not None
+        assert it.line.closed[0] == CLOSE_TOO_FAST
+
+
 @pytest.mark.parametrize(
     "message",
     [
