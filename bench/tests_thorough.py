@@ -6,6 +6,7 @@ Each test function is one step. An interrupted run can be continued.
 import os
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -18,6 +19,7 @@ __all__ = ["run"]
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _SAMPLED: Final = "from tests.effort import"
+_ALL_SAMPLED: Final = "tests/e2e"
 _TESTS_IN_QUICK: Final = 20
 """Number of test functions without `--full`."""
 _COLLECT: Final = (sys.executable, "-m", "pytest", "--collect-only", "-q")
@@ -53,13 +55,18 @@ def _functions() -> list[str]:
     files = [
         str(path.relative_to(_ROOT))
         for path in sorted((_ROOT / "tests").rglob("test_*.py"))
-        if _SAMPLED in path.read_text("utf-8")
+        if _SAMPLED in path.read_text("utf-8") or path.is_relative_to(_ROOT / _ALL_SAMPLED)
     ]
     done = subprocess.run(
         [*_COLLECT, *files], cwd=_ROOT, env=_thorough(), capture_output=True, text=True, check=True
     )
-    found = (line.partition("[")[0] for line in done.stdout.splitlines() if "::" in line)
-    return list(dict.fromkeys(found))
+    found = Counter(line.partition("[")[0] for line in done.stdout.splitlines() if "::" in line)
+    # A test without parameters runs whole in `./dev test`, unless its file samples by itself.
+    return [name for name, count in found.items() if count > 1 or _samples(name)]
+
+
+def _samples(name: str) -> bool:
+    return _SAMPLED in (_ROOT / name.partition("::")[0]).read_text("utf-8")
 
 
 def _passes(name: str) -> bool:

@@ -25,15 +25,15 @@ def examples(thorough: int) -> int:
     return thorough if IS_THOROUGH else max(10, thorough // 12)
 
 
-def sampled(cases: Sequence[_Case], most: int) -> list[_Case]:
+def sampled(cases: Sequence[_Case], most: int, table: str = "") -> list[_Case]:
     """Return at most `most` cases in their order, chosen by the commit; all in a thorough run.
 
     Each commit tries other cases. The same commit tries the same ones on each machine and in each
-    process, so a failure can be repeated.
+    process, so a failure can be repeated. Tables with different names have independent samples.
     """
     if IS_THOROUGH or len(cases) <= most:
         return list(cases)
-    choose = random.Random(seed())  # noqa: S311 - selects tests
+    choose = random.Random(seed() + table)  # noqa: S311 - selects tests
     return [cases[number] for number in sorted(choose.sample(range(len(cases)), most))]
 
 

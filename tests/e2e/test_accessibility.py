@@ -14,7 +14,6 @@ from tests.e2e.dev_pages import served
 from tests.e2e.gallery import THEMES, groups
 from tests.e2e.motion.driving import CALM_LEASE_S, USES, Wire, commands
 from tests.e2e.processes import UrcProcess
-from tests.effort import sampled
 from urc.model.driver import Command
 from urc.model.exchange import Confirm
 from urc.model.interface import Interface, Layout, Slot, Tab, WidgetUse
@@ -199,7 +198,7 @@ async def test_a_robot_that_is_driven_asks_stops_and_is_lost_without_such_faults
     await check(page, "URC is lost", *themes)
 
 
-@pytest.mark.parametrize("group", sampled(GALLERY, 3))
+@pytest.mark.parametrize("group", GALLERY)
 async def test_every_widget_is_for_everybody_in_every_state(
     new_page: PageMaker, group: str
 ) -> None:

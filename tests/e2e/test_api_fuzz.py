@@ -72,7 +72,8 @@ def is_sound(server: ApiServer) -> bool:
     )
 
 
-@pytest.mark.parametrize("name", sampled([*OPERATIONS], 20))
+@pytest.mark.cases(20)
+@pytest.mark.parametrize("name", OPERATIONS)
 def test_no_request_of_an_administrator_breaks_the_server(
     name: str, server: ApiServer, administrator: FuzzVisitor
 ) -> None:
@@ -100,6 +101,7 @@ def visitors(server: ApiServer) -> dict[str, FuzzVisitor]:
     return found
 
 
+@pytest.mark.cases(30)
 @pytest.mark.parametrize(("who", "name"), pairs())
 def test_no_visitor_gets_an_answer_beyond_its_right(
     who: str, name: str, server: ApiServer, visitors: dict[str, FuzzVisitor]

@@ -106,7 +106,8 @@ def test_modules_that_belong_together_are_run_by_one_process() -> None:
     several = command[command.index("-n") :]
     done = subprocess.run(
         [*command[:3], str(HERE / "test_editor.py"), "-k", "shipped", "-v", *several],
-        cwd=HERE.parents[1], capture_output=True, text=True, timeout=100, check=True,
+        cwd=HERE.parents[1], env=os.environ | {"URC_THOROUGH": "1"},
+        capture_output=True, text=True, timeout=200, check=True,
     )  # fmt: skip
     ran = re.findall(r"^\[(gw\d+)\].* PASSED", done.stdout, re.MULTILINE)
     assert len(ran) > 2

@@ -16,6 +16,7 @@ from tests.e2e.operator_input import OperatorInput, Told
 from tests.e2e.operator_tasks import Hand, Keys, Touch
 from tests.e2e.robots.recording import alive
 from urc.model.interface import WidgetUse
+from urc.model.world import PlanSpec, Wall
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -55,6 +56,10 @@ def within(hand: Hand, *, touches: int, keys: int) -> None:
         assert (done.keys, done.touches <= touches) == (0, True), done.account()
 
 
+YARD = PlanSpec(walls=(Wall(90, -90, 90, 90), Wall(-90, -90, -90, 90)))
+"""A busy machine takes a minute for the tasks: the robot would meet a wall of the usual room."""
+
+
 @ON_EACH
 async def test_a_robot_with_an_alarm_is_found_and_stopped(
     size: Size, kind: type[Hand], new_page: PageMaker
@@ -89,6 +94,7 @@ async def test_views_speeds_stop_and_control_while_driving(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The emulated TurtleBot 4 measures its own speed."""
+    monkeypatch.setattr("urc.simulator.world.world.ROOM", YARD)
     async with alive("turtlebot4", tmp_path, monkeypatch, lease_s=CALM_LEASE_S) as robot:
         hand = await hand_on(new_page, size, kind)
         address = f"{robot.address}robots/turtlebot4/"

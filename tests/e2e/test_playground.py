@@ -26,7 +26,6 @@ pytestmark = [
     pytest.mark.anyio,
     pytest.mark.needs("node"),
     pytest.mark.needs("pyodide"),
-    pytest.mark.xdist_group("playground"),
 ]
 
 GESTURES = 5

@@ -28,7 +28,6 @@ from tests.e2e.gallery import (
     show,
     states_of,
 )
-from tests.effort import sampled
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -100,7 +99,7 @@ async def faults_of(page: Page) -> list[str]:
     return [f"{key} ({first})" for key, first in faults.items()]
 
 
-@pytest.mark.parametrize("group", sampled(groups(), 4))
+@pytest.mark.parametrize("group", groups())
 async def test_widgets_are_whole_and_look_as_they_did(
     new_page: PageMaker, group: str, request: pytest.FixtureRequest
 ) -> None:
@@ -133,7 +132,7 @@ async def test_widgets_are_whole_and_look_as_they_did(
     assert not faults, "\n".join(faults)
 
 
-@pytest.mark.parametrize("widget", sampled(LOW, 6))
+@pytest.mark.parametrize("widget", LOW)
 async def test_widgets_are_whole_in_low_cells(new_page: PageMaker, widget: str) -> None:
     """Whatever the shape of a cell, no drawing, control or text of it is cut."""
     async with running_dashboard(FakeRobot(dashboard_profile())) as address:

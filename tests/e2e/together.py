@@ -23,6 +23,7 @@ TOGETHER = {
     "test_wheel": "wheel",
     "test_other_browsers": "other browsers",
     "test_site": "site",
+    "test_playground": "playground",
 }
 """Module → the group that it is in. Not by the marks of ``pytest-xdist``, which adds its groups to
 the names of tests in a way that pytest 9.2 does not see: then all are scattered, without a word."""

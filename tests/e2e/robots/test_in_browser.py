@@ -27,7 +27,6 @@ from tests.e2e.robots.sheets import (
     samples,
     stopped,
 )
-from tests.effort import sampled
 from urc.model.values import Reading
 
 pytestmark = pytest.mark.anyio
@@ -100,7 +99,8 @@ READY: dict[str, dict[str, Mapping[str, Reading]]] = {
 """What must be given last, so that it can be driven."""
 
 
-@pytest.mark.parametrize("name", sampled(NAMES, 9))
+@pytest.mark.cases(4)
+@pytest.mark.parametrize("name", NAMES)
 async def test_a_robot_is_connected_seen_commanded_driven_and_left(
     name: str, new_page: PageMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
