@@ -74,6 +74,7 @@ class PipeChannel:
         self._started_s = 0.0
         self._short_lives = 0
         self._reaping: set[asyncio.Task[None]] = set()
+        self._ending: asyncio.Task[None] | None = None
 
     @property
     def pid(self) -> int:
@@ -154,8 +155,13 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     async def finish(self) -> None:
-        """Stop all controls and end the guard within 3 s."""
+        """Stop all controls and end the guard within 3 s, even if the caller is cancelled."""
         self._is_finishing = True
+        if self._ending is None or self._ending.done():
+            self._ending = asyncio.get_running_loop().create_task(self._end())
+        await asyncio.shield(self._ending)
+
+    async def _end(self) -> None:
         if self._look is not None:
             self._look.cancel()
         if self._entering is not None and not self._entering.done():

@@ -357,6 +357,24 @@ async def test_guard_that_does_not_end_is_killed(
     assert process.is_killed
 
 
+async def test_a_cancelled_end_still_ends_the_guard(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A server that stops cancels a session that is just closing."""
+    monkeypatch.setattr(pipe_channel, "_FINISH_S", 0.01)
+    process = house.begin()
+    process.is_stubborn = True
+    house.guard.arm("drive", TERMS)
+    house.guard.tick("drive", b"go")
+    await process.hears(3)
+    finishing = asyncio.ensure_future(house.guard.finish())
+    await settle()
+    finishing.cancel()
+    await asyncio.wait({finishing})
+    assert finishing.cancelled()
+    await house.until(lambda: process.is_killed)
+
+
 async def test_deaf_guard_is_killed(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
     """It does not see the end of the pipe, and still has its time."""
     monkeypatch.setattr(pipe_channel, "_FINISH_S", 0.01)
