@@ -246,14 +246,12 @@ class BrowserClient:
         except wire.BadMessage as error:
             fault = str(error)
         self.recheck()
-        if isinstance(asked, Stop):
-            self._drive(asked)  # before the limits, so that no limit refuses STOP
         if not self._ticks.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
-        elif isinstance(asked, Stop):
-            pass
-        elif isinstance(asked, (Tick, Release)):
-            self._drive(asked)
+            if not isinstance(asked, Stop):
+                return
+        if isinstance(asked, (Tick, Release, Stop)):
+            self._drive(asked)  # no limit refuses STOP
         elif not self._allowance.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
         elif asked is None:

@@ -26,6 +26,7 @@
   };
 
   show(kept());
+  // The playground runs this script in a document that is already complete.
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", showChoice);
   else showChoice();
   document.addEventListener("change", ({ target }) => {

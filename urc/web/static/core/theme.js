@@ -49,6 +49,7 @@
   };
 
   show(kept(KEY));
+  // The playground runs this script in a document that is already complete.
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", showChoices);
   else showChoices();
   // On the document, so that a choice before the modules have loaded counts.
