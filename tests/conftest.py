@@ -31,7 +31,7 @@ BROWSERS = {"browser": ("headless-shell", "chromium"), "whole_browser": ("chromi
 """Fixture → the programs that it starts: the first that is there."""
 
 # Well below the limit in pyproject.toml, which ends the whole run: here only the one test fails.
-TEST_TIMEOUT_S = int(os.environ.get("URC_TEST_TIMEOUT_S", "240"))
+TEST_TIMEOUT_S = int(os.environ.get("URC_TEST_TIMEOUT_S", "120"))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -42,7 +42,7 @@ CASES = 2
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sample the parameter sets of each function, but of tests of stopping and of named tests."""
+    """Sample the parameter sets of each function; keep all of stopping and named tests."""
     if any("::" in argument for argument in config.args):
         return
     functions: dict[str, list[pytest.Item]] = {}
