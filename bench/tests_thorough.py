@@ -1,6 +1,7 @@
 """All tests that `./dev test` samples: every case, and twelve times as many examples.
 
-Each test function is one step. An interrupted run can be continued.
+A function with several cases is one step, and so are all other functions of a file. An interrupted
+run can be continued.
 """
 
 import os
@@ -19,21 +20,22 @@ __all__ = ["run"]
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _SAMPLED: Final = "from tests.effort import"
-_ALL_SAMPLED: Final = "tests/e2e"
-_TESTS_IN_QUICK: Final = 20
-"""Number of test functions without `--full`."""
+_FOLDERS: Final = ("tests/contract", "tests/e2e")
+"""Folders whose tests `tests/sampling.py` samples."""
+_STEPS_IN_QUICK: Final = 20
+"""Number of steps without `--full`."""
 _COLLECT: Final = (sys.executable, "-m", "pytest", "--collect-only", "-q")
 _RUN: Final = (sys.executable, "-m", "pytest", "-q", "-x", "--no-header")
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Run the tests with full counts, or without `full` only the first test functions."""
+    """Run the tests with full counts, or without `full` only the first steps."""
     kept = Kept(f"tests_thorough-{full}")
     done = {str(row["test"]) for row in kept.rows}
-    functions = _functions()
-    for name in functions if full else functions[:_TESTS_IN_QUICK]:
+    steps = list(_steps().items())
+    for name, tests in steps if full else steps[:_STEPS_IN_QUICK]:
         if name not in done:
-            kept.add({"test": name, "passed": _passes(name)})
+            kept.add({"test": name, "passed": _pass(tests)})
     rows = kept.end()
     failed = [str(row["test"]) for row in rows if not row["passed"]]
     tell({"figure": "tests_thorough", "tests": len(rows), "failed": failed})
@@ -50,28 +52,30 @@ def run(*, full: bool) -> Sequence[Result]:
     ]
 
 
-def _functions() -> list[str]:
-    """Return the node IDs of the test functions in files that sample, without parameters."""
+def _steps() -> dict[str, list[str]]:
+    """Return the name of each step and the node IDs of its test functions, without parameters."""
     files = [
         str(path.relative_to(_ROOT))
         for path in sorted((_ROOT / "tests").rglob("test_*.py"))
-        if _SAMPLED in path.read_text("utf-8") or path.is_relative_to(_ROOT / _ALL_SAMPLED)
+        if _SAMPLED in path.read_text("utf-8") or _is_in_sampled_folder(path)
     ]
     done = subprocess.run(
         [*_COLLECT, *files], cwd=_ROOT, env=_thorough(), capture_output=True, text=True, check=True
     )
     found = Counter(line.partition("[")[0] for line in done.stdout.splitlines() if "::" in line)
-    # A test without parameters runs whole in `./dev test`, unless its file samples by itself.
-    return [name for name, count in found.items() if count > 1 or _samples(name)]
+    steps: dict[str, list[str]] = {}
+    for name, cases in found.items():
+        steps.setdefault(name if cases > 1 else name.partition("::")[0], []).append(name)
+    return steps
 
 
-def _samples(name: str) -> bool:
-    return _SAMPLED in (_ROOT / name.partition("::")[0]).read_text("utf-8")
+def _is_in_sampled_folder(path: Path) -> bool:
+    return any(path.is_relative_to(_ROOT / folder) for folder in _FOLDERS)
 
 
-def _passes(name: str) -> bool:
+def _pass(tests: Sequence[str]) -> bool:
     done = subprocess.run(
-        [*_RUN, name], cwd=_ROOT, env=_thorough(), capture_output=True, text=True, check=False
+        [*_RUN, *tests], cwd=_ROOT, env=_thorough(), capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         print(done.stdout, file=sys.stderr)

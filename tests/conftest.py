@@ -21,6 +21,7 @@ from hypothesis import settings
 
 from scripts.needs import NEEDS
 from tests.effort import examples, seed
+from tests.sampling import left_out
 
 # Properties that name no number of their own; a busy machine is no failure.
 settings.register_profile("urc", max_examples=examples(100), deadline=None)
@@ -98,14 +99,21 @@ def needs_of(item: pytest.Item) -> set[str]:
     return named | {names[0] for names in found}
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what was left out by name; refuse a name that nobody knows how to bring."""
-    left_out = set(os.environ.get("URC_LEFT_OUT", "").split(",")) - {""}
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect what this run does not try; skip what was left out by name.
+
+    A program that nobody knows how to bring is refused.
+    """
+    is_named = any("::" in argument for argument in config.args)
+    if not is_named and (deselected := left_out(items)):
+        config.hook.pytest_deselected(items=list(deselected))
+        items[:] = [item for item in items if item not in deselected]
+    missing_here = set(os.environ.get("URC_LEFT_OUT", "").split(",")) - {""}
     for item in items:
         needs = needs_of(item)
         if unknown := needs - PROGRAMS.keys():
             raise pytest.UsageError(f"{item.nodeid} needs {unknown}, not in scripts/needs.py")
-        if missing := needs & left_out:
+        if missing := needs & missing_here:
             item.add_marker(pytest.mark.skip(reason=f"left out: no {', '.join(sorted(missing))}"))
 
 

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from scripts.structure import every_statement
+
 __all__ = ["MODULES", "ROOT", "imports_of", "tree_of"]
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,7 +22,7 @@ def tree_of(path: Path) -> ast.Module:
 def imports_of(path: str, tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield line and absolute dotted name of all imports, those in functions and for types too."""
     package = Path(path).parts[:-1]
-    for node in ast.walk(tree):
+    for node in every_statement(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

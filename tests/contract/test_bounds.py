@@ -19,6 +19,7 @@ ROBOTS = sorted(shipped("robots").glob("*.yaml"))
 TOP = shipped("robots").parent
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("document", ROBOTS, ids=lambda one: one.stem)
 def test_every_robot_is_looked_at_with_half_of_the_memory_and_time(
     document: Path, monkeypatch: pytest.MonkeyPatch

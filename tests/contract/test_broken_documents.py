@@ -34,6 +34,7 @@ def expected_file(document: str) -> Path:
     return BROKEN / document.replace(".yaml", ".expected.txt")
 
 
+@pytest.mark.cases(150)
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_broken_document_gives_exactly_this_report(
     document: str, monkeypatch: pytest.MonkeyPatch

@@ -184,6 +184,7 @@ CASES = [
 ]
 
 
+@pytest.mark.cases(60)
 @pytest.mark.parametrize(("code", "text", "is_fault"), CASES)
 def test_example_shows_its_code_and_the_other_does_not(
     code: str, text: str, is_fault: bool, tmp_path: Path

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from scripts.structure import every_statement
+from tests.contract.modules import MODULES, tree_of
+
 ROOT = Path(__file__).resolve().parents[2]
 GLOSSARY = (ROOT / "docs" / "glossary.md").read_text("utf-8")
 TERMS, _, REPLACED = GLOSSARY.partition("## Words that URC does not use")
@@ -26,8 +29,8 @@ def names_of_code() -> set[str]:
     """Return the name of every class of URC and of every key of the documents."""
     found = {
         node.name
-        for file in (ROOT / "urc").rglob("*.py")
-        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        for file in MODULES
+        for node in every_statement(tree_of(file))
         if isinstance(node, ast.ClassDef)
     }
     waiting: list[object] = [

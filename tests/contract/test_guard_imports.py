@@ -36,6 +36,7 @@ def modules_with(kind: str) -> list[str]:
     return list(json.loads(done.stdout))
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("kind", ["", *TRANSPORTS])
 def test_guard_has_no_template_pattern_or_parser(kind: str) -> None:
     """Whatever the robot's lines are."""

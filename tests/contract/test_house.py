@@ -8,29 +8,30 @@ from pathlib import Path
 
 import pytest
 
-from scripts.structure import modules, structure
+from scripts.structure import Module, long_functions, repeated_names
+from tests.contract.modules import MODULES, tree_of
 
 ROOT = Path(__file__).resolve().parents[2]
 NOT_OURS = {
-    ".git", ".venv", "node_modules", "dist", "build", "__pycache__",
+    ".git", ".venv", "node_modules", "dist", "build", ".site", "__pycache__",
     ".hypothesis", ".mutate", ".mypy_cache", ".pytest_cache", ".ruff_cache",
 }  # fmt: skip
 MAX_LINES = 600
 MAX_BYTES = 1_000_000
 
-# Written in pieces, so that this file does not find itself.
-FORBIDDEN = re.compile(
-    "|".join(
-        [
-            r"(?<![\w.])/" + r"(?:work|root|home/\w+|Users/\w+|opt)/",
-            r"(?<![\w.])/" + r"tmp/",
-            "registry" + r"\.npmjs\.org",
-            "files" + r"\.pythonhosted\.org",
-            "pypi" + r"\.org/simple",
-            "deb" + r"\.debian\.org",
-        ]
+# Written in pieces, so that this file does not find itself. Each begins with a letter of its own:
+# Python's search is ten times as fast as for one pattern of several beginnings.
+FORBIDDEN = [
+    re.compile(pattern)
+    for pattern in (
+        r"/(?<![\w.]/)" + r"(?:work|root|home/\w+|Users/\w+|opt)/",
+        r"/(?<![\w.]/)" + r"tmp/",
+        "registry" + r"\.npmjs\.org",
+        "files" + r"\.pythonhosted\.org",
+        "pypi" + r"\.org/simple",
+        "deb" + r"\.debian\.org",
     )
-)
+]
 
 
 def our_files() -> list[Path]:
@@ -58,7 +59,8 @@ def test_no_file_names_a_machine_or_a_registry() -> None:
     found = [
         f"{path}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}"
         for path, text in texts()
-        for match in FORBIDDEN.finditer(text)
+        for pattern in FORBIDDEN
+        for match in pattern.finditer(text)
     ]
     assert found == []
 
@@ -71,9 +73,10 @@ def test_python_files_stay_short() -> None:
 
 def test_classes_and_functions_have_one_meaning_each() -> None:
     """No public name of a class stands for two things, and no function outgrows 60 lines."""
-    found = structure(modules(ROOT, "urc"))
-    assert found.public_twice == {}
-    assert found.long_functions == []
+    found = [Module(str(path.relative_to(ROOT)), path.stem, "", tree_of(path)) for path in MODULES]
+    public_twice, _ = repeated_names(found)
+    assert public_twice == {}
+    assert long_functions(found) == []
 
 
 @pytest.mark.parametrize("lock", ["package-lock.json", "scripts/chromium/package-lock.json"])

@@ -107,6 +107,7 @@ def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
             assert cells == [""] * len(interface.shown), name
 
 
+@pytest.mark.cases(6)
 def test_its_emulated_robot_says_all_that_there_is(file: Path) -> None:
     """Greetings, polls and messages without a fault on either side; every signal gets a value."""
     profile = profile_of(file)

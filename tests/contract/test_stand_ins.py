@@ -9,7 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.contract.test_broken_documents import BROKEN, DOCUMENTS, expected_file
+from tests.contract.test_broken_documents import DOCUMENTS, expected_file
+from tests.effort import sampled
 
 ROOT = Path(__file__).resolve().parents[2]
 _START = """
@@ -19,9 +20,9 @@ from playground.stand_ins import HIDDEN, install
 install()
 """
 _REPORTS = f"""{_START}
-from tests.contract.test_broken_documents import BROKEN, DOCUMENTS, report
+from tests.contract.test_broken_documents import BROKEN, report
 os.chdir(BROKEN)
-found = {{document: report(document) for document in DOCUMENTS}}
+found = {{document: report(document) for document in sys.argv[1:]}}
 loaded = sorted(HIDDEN & sys.modules.keys())
 print(json.dumps([found, loaded, sys.modules["rpds"].__file__]))
 """
@@ -52,13 +53,14 @@ def run(script: str, *arguments: str) -> object:
 
 
 def test_every_broken_document_gives_the_same_report() -> None:
-    """All of them, to the last letter, and without any of the compiled modules."""
-    found, loaded, rpds = run(_REPORTS)  # type: ignore[misc]
+    """To the last letter, and without any of the compiled modules."""
+    documents = sampled(DOCUMENTS, 60)
+    found, loaded, rpds = run(_REPORTS, *documents)  # type: ignore[misc]
     assert loaded == []
     assert Path(rpds).parent.name == "stand_ins"
-    expected = {one: expected_file(one).read_text("utf-8") for one in DOCUMENTS}
-    assert {one for one in DOCUMENTS if found[one] != expected[one]} == set()
-    assert len(found) == len(list(BROKEN.rglob("*.expected.txt")))
+    assert len(found) == len(documents) > 0
+    expected = {one: expected_file(one).read_text("utf-8") for one in documents}
+    assert {one for one in documents if found[one] != expected[one]} == set()
 
 
 def test_the_dialogues_of_the_turtlebot_pass(tmp_path: Path) -> None:

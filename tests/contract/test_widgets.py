@@ -98,6 +98,7 @@ def test_a_widget_folder_is_complete(folder: Path) -> None:
     assert {"normal", "stale", "none", "hostile"} <= set(demo["states"])
 
 
+@pytest.mark.cases(60)
 @pytest.mark.parametrize(("folder", "state"), STATES, ids=lambda part: getattr(part, "name", part))
 def test_a_template_renders_in_each_state_without_values(folder: Path, state: str) -> None:
     """What stands there before the module has loaded makes sense, and texts are texts."""

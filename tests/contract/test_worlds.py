@@ -63,6 +63,7 @@ def pose(world: World) -> tuple[float, float, float]:
     return world.motion.x, world.motion.y, world.motion.yaw
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", sorted(DRIVES))
 def test_it_goes_ahead_and_to_the_left_and_stops_when_it_is_let_go(name: str) -> None:
     """By the bytes of its own driver, over the framing of its own line."""
@@ -92,6 +93,7 @@ def test_it_goes_ahead_and_to_the_left_and_stops_when_it_is_let_go(name: str) ->
     assert pose(world) == pytest.approx(there, abs=1e-3), "it did not stop"
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", sorted(DRIVES))
 def test_when_commands_stop_it_does_what_the_real_one_does(name: str) -> None:
     """Its fail-safe, or nothing at all: then it goes on until something is in its way."""

@@ -24,7 +24,6 @@ from tests.e2e.processes import UrcProcess
 from tests.e2e.together import Together
 from tests.e2e.transports.packets import sweep
 from tests.e2e.unhurried import unhurried
-from tests.effort import sampled
 
 LOG = logging.getLogger(__name__)
 
@@ -35,28 +34,6 @@ expect.set_options(timeout=PAGE_TIMEOUT_MS)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together | None:
     """Keep what belongs together in one process."""
     return Together(config, log) if config.getvalue("dist") == "loadgroup" else None
-
-
-CASES = 2
-"""Parameter sets of a test function in an everyday run; the mark `cases` sets another number."""
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sample the parameter sets of each function; keep all of stopping and named tests."""
-    if any("::" in argument for argument in config.args):
-        return
-    functions: dict[str, list[pytest.Item]] = {}
-    for item in items:
-        if "/e2e/" in item.path.as_posix() and not item.get_closest_marker("alone"):
-            functions.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    left_out: set[pytest.Item] = set()
-    for name, cases in functions.items():
-        mark = cases[0].get_closest_marker("cases")
-        chosen = sampled(cases, mark.args[0] if mark else CASES, name)
-        left_out.update(set(cases) - set(chosen))
-    if left_out:
-        config.hook.pytest_deselected(items=list(left_out))
-        items[:] = [item for item in items if item not in left_out]
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -10,8 +10,10 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import argon2
 import pytest
 
+from urc.access import passphrases
 from urc.config.parse.widget import WidgetFolder
 from urc.model.widget import Widget
 from urc.shipped import shipped
@@ -37,6 +39,16 @@ def never_wait_for_the_disk() -> Iterator[None]:
     """Let ``os.fsync`` only see that the file is open: three thousand of them take seconds."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("os.fsync", seen_to_be_open)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def hash_passphrases_quickly() -> Iterator[None]:
+    """Hash with the least that argon2 allows: its full price is a tenth of a second for each."""
+    hasher = argon2.PasswordHasher(time_cost=1, memory_cost=8, parallelism=1)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(passphrases, "_HASHER", hasher)
+        patched.setattr(passphrases, "_NEVER", hasher.hash("no passphrase"))
         yield
 
 

@@ -132,6 +132,13 @@ def test_function_and_closures_agree(form: str, lines: list[str]) -> None:
         assert plain(found) == plain(expected), line
 
 
+def test_negative_zero_keeps_its_sign_in_both() -> None:
+    """Found by the property above: only the closures added an offset of zero, which loses it."""
+    oracle, fast = both("json: { tenths: v.a, amps: v.b }")
+    frame = Frame(b'{"v":{"a":-0.0,"b":null},"n":["BAT",3]}', "utf-8")
+    assert plain(fast(frame, 0.0)) == plain(oracle.take(frame, 0.0))
+
+
 def plain(taken: Taken | None) -> Any:
     """Return what was taken in a form that can be compared: order aside, nothing is equal to it."""
     if taken is None:

@@ -2,12 +2,21 @@
 
 import time
 
+import argon2
 import pytest
 
+from urc.access import passphrases
 from urc.access.grants import AccessError
 from urc.access.passphrases import _NEVER, hash_of, is_stale, matches
 
 GOOD = "correct horse battery"
+
+
+@pytest.fixture(autouse=True)
+def hash_at_the_full_price(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a server does; the other unit tests hash quickly."""
+    monkeypatch.setattr(passphrases, "_HASHER", argon2.PasswordHasher())
+    monkeypatch.setattr(passphrases, "_NEVER", _NEVER)
 
 
 def test_a_passphrase_matches_its_hash_alone() -> None:

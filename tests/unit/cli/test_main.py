@@ -282,8 +282,13 @@ def test_doctor_tells_what_is_missing(
     assert errors == "urc doctor: 6 of 14 checks failed\n"
 
 
-def test_doctor_shows_the_authority(capsys: Output, tmp_path: Path) -> None:
+def test_doctor_shows_the_authority(
+    capsys: Output, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its fingerprint and its end, to compare with a device; a damaged file is a note."""
+    from urc.cli import doctor
+
+    monkeypatch.setattr(doctor, "_load_robots", lambda: "not looked at here")
 
     def line() -> str:
         main(["doctor", "--port", "0", "--data-dir", str(tmp_path)])

@@ -19,11 +19,19 @@ from urc.packages.install import plan_file
 from urc.packages.package import Package, pack_folder
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
+from urc.runtime import isolation
+from urc.runtime.package_preview import look
 from urc.testing.entry import OPEN
 
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "rover"
 BEFORE = (ATTACK / "driver.yaml").read_text(encoding="utf-8").replace("-speed", "speed")
 DOCUMENT = BEFORE.partition("name: rover\n")[2]
+
+
+@pytest.fixture(autouse=True)
+def preview_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """tests/unit/runtime/test_isolation.py starts the process; here it would start forty times."""
+    monkeypatch.setattr(isolation, "look_apart", look)
 
 
 def stock(data: Path) -> Store:

@@ -96,7 +96,12 @@ def test_a_blocked_interface_is_taken_from_a_stopped_robot(tmp_path: Path, anna:
         know(tmp_path, anna, 1, Block(WHY, "interfaces/wide"))
         until(lambda: latched(client).startswith("URC: interfaces/wide 1.0.0 is blocked by Anna"))
         # The stop comes first, and the interface goes after it.
-        until(lambda: "wide" not in fleet_of(client).robots["rover"].profile.interfaces)
+        until(
+            lambda: (
+                "rover" in (robots := fleet_of(client).robots)
+                and "wide" not in robots["rover"].profile.interfaces
+            )
+        )
         assert client.get("/robots/rover/").status_code in (200, 303)
 
 

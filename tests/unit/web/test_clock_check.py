@@ -10,6 +10,7 @@ import pytest
 from urc.access.authority import AUTHORITY_FOLDER, CertificateAuthority
 from urc.access.store import FILE, AccessStore
 from urc.access.wrong_clock import RELEASED
+from urc.cli import doctor
 from urc.cli.main import main
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
@@ -60,7 +61,10 @@ def test_damaged_files_prove_nothing(tmp_path: Path) -> None:
     assert clock_warning(tmp_path, NOW) == ""
 
 
-def test_the_doctor_tells_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_doctor_tells_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "_load_robots", lambda: "not looked at here")
     with AuditLog(tmp_path / "audit.sqlite") as log:
         log.add(AuditEntry(datetime(2999, 1, 1, tzinfo=UTC).timestamp(), "cart", "moved"))
         assert log.settle()

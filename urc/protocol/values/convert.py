@@ -238,6 +238,8 @@ def _line(offset: float, scale: float) -> Step:
     if divisor:
         # Adding before dividing keeps decimals exact: (2512 - 4000) / 100 is -14.88.
         shift = _tidy(offset * divisor)
+        if shift == 0:  # adding zero would lose the sign of -0.0
+            return lambda raw: number_of(raw) / divisor
         if isinstance(shift, int):
             return lambda raw: (number_of(raw) + shift) / divisor
         return lambda raw: number_of(raw) / divisor + offset
