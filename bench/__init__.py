@@ -1,1 +1,1 @@
-"""Benchmarks: each result is a ratio to a baseline that is measured in the same run."""
+"""Benchmarks. Each result is a ratio to a baseline measured in the same run."""

@@ -58,7 +58,7 @@ PROGRAMS = {
     "page_layouts": ("chromium",),
     "motion_input": ("chromium",),
 }
-"""Required programs of each benchmark in addition to Python, by their names in `scripts.needs`."""
+"""Programs that each benchmark needs besides Python, by their names in `scripts.needs`."""
 
 
 def main() -> int:
@@ -87,7 +87,7 @@ def main() -> int:
 
 
 def bring_programs(names: Sequence[str]) -> set[str]:
-    """Install the programs for these benchmarks; return the benchmarks without their program."""
+    """Install the programs for these benchmarks; return the benchmarks that still lack one."""
     wanted = {program for name in names for program in PROGRAMS.get(name, ())}
     brought = bring([need for need in NEEDS if need.name in wanted])
     os.environ.update(brought.environment)

@@ -10,12 +10,12 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""Smallest share of the robot's values that the page must show in a valid measurement."""
+"""A valid measurement shows at least this share of the robot's values."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
-# The text in the layout of a frame counts, because a page that writes outside of frames may change
-# it before it is read. An observer of sizes runs after the callbacks of a frame and before drawing.
-# Its message arrives after drawing; then the age is measured.
+# The text in a frame's layout counts, because a page that writes outside of frames may change it
+# before it is read. A resize observer runs after a frame's callbacks and before drawing. Its
+# message arrives after drawing; then the age is measured.
 WATCH = """
 async (seconds) => {
   const isClock = (text) => /^[0-9]{10}$/.test(text);
@@ -80,7 +80,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
         rate_hz: rate at which the robot sends its clock.
 
     Raises:
-        TooFew: the page showed less than the share `LEAST_SHARE` of the values.
+        TooFew: the page showed fewer values than `LEAST_SHARE` requires.
     """
     try:
         async with asyncio.timeout(FIRST_S + seconds * 4):
@@ -97,5 +97,5 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
 
 def _age_ms(now_ms: float, told_ms: float) -> float:
-    """Return the age of a value that states its time only modulo the clock's period."""
+    """Return the age of a value whose timestamp wraps at the clock's period."""
     return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

@@ -1,4 +1,4 @@
-"""The pages in Firefox; see `bench.other_browsers`."""
+"""Check the pages in Firefox; see `bench.other_browsers`."""
 
 from collections.abc import Sequence
 

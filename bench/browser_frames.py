@@ -1,8 +1,8 @@
 """Frame rate of every shipped robot's page in a WebKit without a graphics processor.
 
-Without a graphics processor, Mesa composes the page in software, so layers and large repaints cost
-frames. An empty page is measured before each page: its rate shows how busy the machine is. A page
-that misses the goal is measured again, because another program may have caused it.
+Without a graphics processor, Mesa composes the page in software, so layers and large repaints lower
+the frame rate. An empty page is measured before each page: its rate shows how busy the machine is.
+A page that misses the goal is measured again, because another program may have slowed the page.
 """
 
 import tempfile
@@ -41,14 +41,14 @@ RATE = """new Promise((done) => {
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """Frames per second of an empty page, and of a robot's page just after."""
+    """Frames per second of an empty page, then of a robot's page."""
 
     empty: float
     page: float
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Count the frames of all pages, or of those with large pictures only."""
+    """Count the frames of all pages, or only of pages with large pictures."""
     robots = ROBOTS if full else WITH_PICTURES
     with (
         webkit_window() as window,

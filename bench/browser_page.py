@@ -1,7 +1,7 @@
 """Measurements of a page in a real Chromium: ages of values, frames, processor time.
 
-Ages are measured by a single clock, the machine's monotonic clock. Robots send the time of this
-clock (``peers/robot.py``), and the browser reports the start of the page by the same clock.
+All ages are measured with the machine's monotonic clock. Robots send this clock's time
+(``peers/robot.py``), and the browser reports the page's start time on the same clock.
 """
 
 import asyncio
@@ -41,7 +41,7 @@ transports:
   wire:
     {{ type: tcp, host: 127.0.0.1, port: {port}, framing: {{ type: delimiter, tx: LF, rx: LF }} }}
 """
-# A page that is opened twice already counts: a second counter would count each frame again.
+# A page that is opened twice already has a counter; a second one would count each frame again.
 COUNT = """
 () => {
   if (window.benchFrames !== undefined) return;
@@ -68,7 +68,7 @@ class Cost:
 
     fps: float
     frame_ms: float
-    """Processor time of the main thread for each frame, in milliseconds."""
+    """Processor time of the main thread per frame, in milliseconds."""
 
 
 @contextmanager
@@ -77,7 +77,7 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
 
     Args:
         robot_port: port of the robot.
-        document: text of the profile without name and transport.
+        document: text of the profile without its name and transport.
         work: working folder of the server.
     """
     file = work / "bench.yaml"
@@ -162,5 +162,5 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
 
 
 def at_share(ordered: Sequence[float], share: float) -> float:
-    """Return the value at a quantile of the values."""
+    """Return a quantile of the values."""
     return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)

@@ -1,6 +1,6 @@
 """Ages of shown values: URC compared with a hand-written page, Node-RED and NiceGUI.
 
-One robot sends its clock 50 times a second, over TCP, to each of the four dashboards. A real
+One robot sends its clock over TCP to each of the four dashboards, 50 times a second. A real
 Chromium opens one dashboard after another. After each drawn frame, the page measures the age of a
 new value on the screen. Node-RED and NiceGUI are installed from npm and PyPI at first use. A
 dashboard that can't be installed is skipped with a message.
@@ -104,7 +104,7 @@ async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
     """Return the ages of one measurement; repeat the measurement if too few values were shown."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
-            await ages(one, SETTLE_S, 0.0)  # it shows values: what it does at its start is over
+            await ages(one, SETTLE_S, 0.0)  # it shows values, so its start is over
             try:
                 return await ages(one, seconds, RATE_HZ)
             except TooFew:

@@ -29,7 +29,7 @@ from bench.rig.programs import Server, peer
 __all__ = ["run"]
 
 Row = dict[str, Any]
-"""Share of a core, and number of shown images a second, for each page."""
+"""Share of a core and images shown per second, for each page."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 5.0, 15.0
@@ -118,7 +118,7 @@ OURS, THEIRS = "URC", "roslibjs"
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the processor times of the two pages; the result of each round is stored."""
+    """Compare the two pages' processor times; store the result of each round."""
     look_s, rounds = (LOOK_IF_FULL_S, ROUNDS_IF_FULL) if full else (LOOK_S, ROUNDS)
     kept = Kept("browser_roslibjs-full" if full else "browser_roslibjs")
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
@@ -146,7 +146,7 @@ async def _round(ours: str, theirs: str, look_s: float) -> Row:
 
 
 async def _cost(browser: Browser, page: Page, look_s: float) -> tuple[float, float]:
-    """Return the processor time of Chromium as a share of a core, and the shown images a second."""
+    """Return Chromium's processor time as a share of one core, and the images shown per second."""
     await asyncio.sleep(SETTLE_S)
     line = await browser.new_browser_cdp_session()
     images, before, began_s = await _images(page), await _cpu_s(line), time.monotonic()
@@ -162,7 +162,7 @@ async def _images(page: Page) -> int:
 
 
 async def _cpu_s(line: CDPSession) -> dict[int, float]:
-    """Return the processor time of each process of the browser."""
+    """Return the processor time of each browser process."""
     answer = await line.send("SystemInfo.getProcessInfo")
     return {each["id"]: float(each["cpuTime"]) for each in answer["processInfo"]}
 

@@ -1,8 +1,8 @@
 """Processor time of a browser: the gallery's TurtleBot page compared with two plain pages.
 
-The emulated robot sends its camera, map, laser and battery over rosbridge. One plain page shows the
-same images at the same size, and nothing else. The other one, written by hand with roslib, has the
-same widgets at the same places. The processor time is that of the renderer and the GPU process.
+The emulated robot sends its camera, map, laser and battery over rosbridge. One plain page shows
+only the same images, at the same size. The other plain page is hand-written with roslib and has the
+same widgets in the same places. The processor time includes the renderer and the GPU process.
 Rounds of the pages alternate, in one Chromium without a graphics processor.
 """
 
@@ -30,7 +30,7 @@ from bench.rig.programs import Program, Server, peer
 __all__ = ["run"]
 
 Costs = dict[str, Any]
-"""Share of a core, and number of shown images a second, for each page."""
+"""Share of a core and images shown per second, for each page."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 10.0, 20.0
@@ -39,12 +39,12 @@ ROOT = Path(__file__).resolve().parents[1]
 PROFILE = ROOT / "robots/turtlebot4.yaml"
 TOPIC = "/oakd/rgb/preview/image_raw/compressed"
 THROTTLE_MS = "100"
-"""Shortest interval of odometry, as in the robot's profile; camera and laser send more rarely."""
+"""Shortest odometry interval, as in the robot's profile; camera and laser send less often."""
 OURS, PICTURE, ROS = "URC", "picture alone", "roslib"
 MEASURED = ("renderer", "GPU")
 """Types of the measured processes, as Chromium names them."""
 SLOTS = {"map": "map", "laser": "laser", "stick": "stick", "camera": "camera", "battery": "value"}
-"""Slot of URC's page → cell of the page with roslib."""
+"""Slot of URC's page → cell of the roslib page."""
 LIVE = """
 (count) => document.querySelectorAll(".urc-grid [data-state=live]").length >= count
 """
@@ -74,7 +74,7 @@ window.createImageBitmap = (...given) => {
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the processor times of the pages; the result of each round is stored."""
+    """Compare the pages' processor times; store the result of each round."""
     look_s, rounds = (LOOK_IF_FULL_S, ROUNDS_IF_FULL) if full else (LOOK_S, ROUNDS)
     kept = Kept("browser_turtlebot-full" if full else "browser_turtlebot")
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
@@ -114,7 +114,7 @@ async def _round(ours: str, pages: str, robot: int, look_s: float) -> Costs:
 
 
 async def _cost(browser: Browser, page: Page, look_s: float) -> tuple[float, float]:
-    """Return the processor time as a share of a core, and the shown images a second."""
+    """Return the processor time as a share of one core, and the images shown per second."""
     await asyncio.sleep(SETTLE_S)
     line = await browser.new_browser_cdp_session()
     answer = await line.send("SystemInfo.getProcessInfo")

@@ -1,4 +1,4 @@
-"""The pages in WebKit; see `bench.other_browsers`."""
+"""Check the pages in WebKit; see `bench.other_browsers`."""
 
 from collections.abc import Sequence
 

@@ -1,9 +1,9 @@
 """Frame rate of a page with sixty widgets that receive ten thousand values a second.
 
-Real widgets show values from a real server. A second measurement slows the page's processor six
-times, like an old phone. If all sixty widgets don't fit into a frame, widgets take turns
-(``static/widgets/draw_scheduler.js``). Each widget is drawn with its newest value at least once in
-twenty frames.
+Real widgets show values from a real server. A second measurement slows the page's processor by a
+factor of six, to simulate an old phone. If one frame is too short to draw all sixty widgets, the
+widgets take turns (``static/widgets/draw_scheduler.js``). Each widget is drawn with its newest
+value at least once in twenty frames.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ LOOK_S, LOOK_IF_FULL_S = 3.0, 8.0
 ROUNDS, ROUNDS_IF_FULL = 2, 9
 COLUMNS, ROWS = 10, 6
 EVERY = 3
-"""Step between shown signals: the page shows and receives every third signal."""
+"""The page receives and shows every third signal."""
 KINDS = (
     ("value", "value", ""),
     ("gauge", "value", "V"),

@@ -4,7 +4,7 @@ The code is tidy and, like URC, has the features that every driver of a real rob
 
 - A speed is clamped, and NaN is refused, because `max` and `min` would turn NaN into full speed.
 - The driver accepts readings at any time, and stores the newest reading of every signal.
-  Values that are out of range or not finite are dropped, and invalid lines are counted.
+  Out-of-range and non-finite values are dropped, and invalid lines are counted.
 - A request has a timeout. A late reply is not assigned to the next request, and after a missing
   reply, later replies are still assigned correctly.
 - Every buffer has a limit: unterminated lines, pending requests, and output.

@@ -46,7 +46,7 @@ async def _by_hand(port: int) -> float:
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Compare the processor times of a command and its reply."""
+    """Compare the drivers' processor times for a command and its reply."""
     loaded = profile()
 
     async def ours(port: int) -> float:

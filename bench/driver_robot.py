@@ -1,4 +1,4 @@
-"""The robot of `driver_poll` and `driver_flood`, in a separate process that is not measured.
+"""The robot for `driver_poll` and `driver_flood`, in a separate, unmeasured process.
 
 ``python -m bench.driver_robot`` prints its port. The robot answers ``VEL …`` with an odometry line,
 and ``FLOOD n`` with n mixed lines and ``OK n``. The process ends when its standard input closes.

@@ -1,4 +1,4 @@
-"""The driver of `bench.driver_hand` as a URC profile, run in the same way as for an operator."""
+"""The driver of `bench.driver_hand` as a URC profile, run as it would be for an operator."""
 
 import tempfile
 from collections.abc import AsyncIterator

@@ -1,9 +1,9 @@
 """Processor time of a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
-back. URC uses a declaration as in a normal profile. The hand-written code is typical for a careful
-author without URC. The hand-written code uses one precompiled `struct.Struct` and the standard
-library's CRC, which is written in C.
+back. URC uses the same kind of declaration as an ordinary profile. The hand-written code is typical
+of a careful author without URC. It uses one precompiled `struct.Struct` and the standard library's
+CRC, which is written in C.
 """
 
 import platform

@@ -1,7 +1,7 @@
 """Effect of slow pages on other pages: two of twenty pages read nothing.
 
-A third page reads only a quarter of its data. The baseline is a server with an unbounded queue for
-each page. In the baseline, the data's age at the third page grows with the queue.
+Another page reads only a quarter of its data. The baseline is a server with an unbounded queue for
+each page. In the baseline, the slow page's data ages as its queue grows.
 """
 
 import asyncio
@@ -53,7 +53,7 @@ class Look(NamedTuple):
 
 
 class Naive:
-    """A baseline with an unbounded queue for each page."""
+    """The baseline server, with an unbounded queue for each page."""
 
     def __init__(self) -> None:
         self.queues: set[asyncio.Queue[str]] = set()

@@ -52,7 +52,7 @@ def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
 
 
 def write_docs(pages: Sequence[Path] = PAGES) -> None:
-    """Write the results of this run into the pages; results of other benchmarks stay."""
+    """Write this run's results into the docs pages; leave other benchmarks' results unchanged."""
     texts = {page: page.read_text("utf-8") for page in pages}
     for kind in sorted({str(one["figure"]) for one in told if "figure" in one}):
         rows = [one for one in told if one.get("figure") == kind]

@@ -1,6 +1,6 @@
 """Measurement of ratios: baseline and subject alternate; the result is the median ratio.
 
-Times vary with the load of a machine, but the ratio of two times in one run is stable.
+Times vary with the machine's load, but the ratio of two times in one run is stable.
 """
 
 import json
@@ -31,7 +31,7 @@ class Result:
 
     name: str
     ratio: float
-    """Median of the ratios of all pairs of rounds."""
+    """Median ratio over all pairs of rounds."""
     goal: float
     baseline_ms: float
     subject_ms: float
@@ -73,7 +73,7 @@ def compare(
     rounds: int = 11,
     versions: Mapping[str, str] | None = None,
 ) -> Result:
-    """Measure baseline and subject alternately, after one warm-up round."""
+    """Measure the baseline and the subject alternately, after one warm-up round."""
     return compare_all([(goal, baseline)], subject, rounds=rounds, versions=versions)[0]
 
 

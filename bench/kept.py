@@ -1,7 +1,7 @@
 """Stored rows of a long run, so that an interrupted run can continue.
 
 Each benchmark stores rows in one file in the user's cache. A complete run deletes this file. Rows
-of other versions of the code are ignored.
+from other versions of the code are ignored.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ class Kept:
     """The stored rows of one benchmark."""
 
     def __init__(self, name: str) -> None:
-        """Load the rows of an interrupted run of the same code."""
+        """Load the rows of an interrupted run with the same code."""
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "urc-bench")
         cache.mkdir(parents=True, exist_ok=True)
         self._file = cache / f"{name}-{_code()}.jsonl"
@@ -40,7 +40,7 @@ class Kept:
 
 
 def _code() -> str:
-    """Return an identifier of the measured version of the code."""
+    """Return an identifier of the measured code version."""
     total = hashlib.sha256()
     for file in sorted((_ROOT / "urc").rglob("*.py")):
         total.update(file.read_bytes())

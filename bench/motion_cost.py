@@ -23,7 +23,7 @@ from bench.rig.programs import Robots, Server
 __all__ = ["run"]
 
 GOAL = 0.02
-"""Goal: largest share of a processor for each driven robot."""
+"""The goal: at most this share of a processor per driven robot."""
 ROBOTS = 6
 FINGERS = {"at rest": 20, "moving": 60}
 """Ticks a second for each state of the finger, as in ``static/control/input.js``."""
@@ -48,7 +48,7 @@ commands:
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure a resting and a moving finger; the result of each round is stored."""
+    """Measure a resting and a moving finger; store the result of each round."""
     look_s, rounds = (LOOK_IF_FULL_S, ROUNDS_IF_FULL) if full else (LOOK_S, ROUNDS)
     kept = Kept("motion_cost-full" if full else "motion_cost")
     for _ in range(rounds - len(kept.rows)):
@@ -58,7 +58,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
-    """Return the processor times of server and guards for one robot in one second."""
+    """Return the server's and the guards' processor time per robot and second."""
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
         robots = stack.enter_context(Robots(["tcp:127.0.0.1:0"] * ROBOTS))
         files = [Path(folder, f"cost{number}.yaml") for number in range(ROBOTS)]
@@ -87,7 +87,7 @@ def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
 def _spent(
     server: Server, pages: Sequence[TimedPage], rate_hz: int, look_s: float
 ) -> tuple[float, float]:
-    """Return the processor times of server and guards, with or without ticks of all pages."""
+    """Return the server's and the guards' processor time, with or without ticks from all pages."""
     _drive(pages, rate_hz, SETTLE_S)
     before = cpu_s([server.pid]), cpu_s(server.guards)
     _drive(pages, rate_hz, look_s)
@@ -96,7 +96,7 @@ def _spent(
 
 
 def _drive(pages: Sequence[TimedPage], rate_hz: int, seconds: float) -> None:
-    """Send ticks from each page at a rate, at staggered times; with rate 0, only listen."""
+    """Send staggered ticks from each page at this rate; with a rate of 0, only receive."""
     step_ns = int(1e9 / (rate_hz or FINGERS["at rest"]) / len(pages))
     next_ns = time.monotonic_ns()
     end_ns = next_ns + int(seconds * 1e9)

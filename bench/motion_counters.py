@@ -22,7 +22,7 @@ SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Run gestures until enough gestures are valid."""
+    """Run gestures until enough of them are valid."""
     wanted, robot_count = (GESTURES_IF_FULL, ROBOTS_IF_FULL) if full else (GESTURES, ROBOTS)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run

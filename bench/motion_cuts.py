@@ -3,8 +3,7 @@
 Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
 guards, and robots, brokers and login servers. The link of each robot is cut at different moments.
 The lengths of the cuts are evenly distributed on a logarithmic scale. Every second control is
-released during the cut. The benchmark needs root and /dev/net/tun; otherwise, the benchmark is
-skipped with a message.
+released during the cut. Without root and /dev/net/tun, the benchmark is skipped with a message.
 """
 
 import json
@@ -32,7 +31,7 @@ BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Cut the links; compare the worst result of each kind of transport with its limits."""
+    """Cut the links; compare each transport's worst result with its limits."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
         return []
@@ -53,7 +52,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return cuts in random order: the length of each cut, and its share before the release."""
+    """Return random cuts: each cut's length in seconds, and its fraction before the release."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)
@@ -61,7 +60,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
 
 
 def _cut_one(rig: CutRig, index: int, plan: list[tuple[float, float]]) -> list[Cut]:
-    """Run the remaining cuts of the plan, in one of several threads; repeat invalid cuts."""
+    """Run the plan's remaining cuts in one of several threads; repeat invalid cuts."""
     cuts: list[Cut] = []
     while True:
         try:

@@ -3,7 +3,7 @@
 In short windows, the benchmark measures the latency from the driving page's socket to its robot.
 The windows alternate between a normal page, a page that floods another server, and a page that
 floods the same server. Any flood uses processor time of the machine, in the flooding page and in
-its server. The goal therefore compares the two floods, and the result with the normal page is only
+its server. The goal therefore compares the two floods. The result with the normal page is only
 printed.
 """
 

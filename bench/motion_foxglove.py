@@ -1,6 +1,6 @@
 """Data received after the server of a driven robot's Foxglove SDK was frozen or killed.
 
-Signals freeze and resume the real server for 5 s, or kill it, and a new server starts after 1 s.
+Signals either freeze the real server for 5 s, or kill it. A new server starts 1 s after a kill.
 Several robots are driven in parallel, each with its own server, session and guard. An interrupted
 run can continue.
 """

@@ -1,6 +1,6 @@
 """Time until a driven robot stops after its guard is killed.
 
-A new guard replaces the killed guard within half a second, and first sends the stop.
+A new guard replaces the killed one within half a second. The new guard sends the stop first.
 """
 
 import tempfile

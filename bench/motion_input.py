@@ -1,9 +1,9 @@
-"""Time from a release to the stop at the robot, for each of the twelve ways to release.
+"""Time from a release until the robot receives the stop, for each of the twelve ways to release.
 
 A real Chromium drives through a real ``urc serve`` with its guard. The robot timestamps received
-data. Each time is measured from the page's event to the first byte of the stop at the robot, by the
-machine's monotonic clock. The lease is one second, so a stop by the lease would be visible. A late
-trial is repeated if the machine caused the delay.
+data. Each time runs from the page's event until the stop's first byte arrives at the robot, on the
+machine's monotonic clock. The lease is one second, so a stop after its expiry would be obvious. A
+late trial is repeated if the machine caused the delay.
 """
 
 import asyncio
@@ -68,7 +68,7 @@ EVENTS = {
     "pad lost": "gamepaddisconnected",
 }
 """Event that the page receives, for each way to release."""
-# Before any script of the page: its own listeners run after these.
+# Before the page's scripts, so that the page's own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};
 for (const kind of {list(EVENTS.values())}) {{
@@ -97,7 +97,7 @@ class Scene(NamedTuple):
     one: Opened
     robots: Robots
     witness: Robots
-    """A program that measures its late wake-ups, and the waits of server, guard and browser."""
+    """Measures its own late wake-ups, and the processor waits of the server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
@@ -167,7 +167,7 @@ def _told(way: str, trials: Sequence[Trial], each: int) -> Result:
     figures = {"way": way, "trials": len(times_ms), "broken": broken}
     figures["excused"] = len(trials) - len(times_ms)
     spread = distribution(times_ms, MOST_MS)
-    spread.pop("histogram_ms", None)  # nearly all of it would be one bar
+    spread.pop("histogram_ms", None)  # nearly all values would be in one bar
     tell({"figure": "motion_input", **figures, **spread})
     slowest = max(times_ms) if len(times_ms) >= each else inf
     return Result(

@@ -25,18 +25,18 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Smallest delay that can cause a stop, in ms; longest time until this stop, in nanoseconds."""
+"""Smallest delay that can cause a stop, in ms; longest time until that stop, in nanoseconds."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
-"""Largest allowed number of stops a minute, for each loss in percent.
+"""Largest allowed number of stops per minute, by packet loss in percent.
 
-For a limit of None, only stops caused by the machine are allowed.
+With None, there is no limit.
 """
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
-"""Duration of the run with all robots in parallel, in seconds, for each loss in percent."""
+"""Duration of the run with all robots in parallel, in seconds, by packet loss in percent."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Drive robots at each rate of loss."""
+    """Drive robots at each packet loss rate."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_loss: needs root and /dev/net/tun"}))
         return []
@@ -63,7 +63,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _calm(rig: Rig) -> None:
-    """Wait until the server has forgotten the last pages; their stops must not count later."""
+    """Wait until all robots have stopped, so that these stops do not count in the next run."""
     for index in rig.indexes:
         rig.robots.wait_until(partial(_is_still, rig, index), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
@@ -74,9 +74,9 @@ def _is_still(rig: Rig, index: int) -> bool:
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Drive every robot; return the duration of motion, in minutes, and three numbers of stops.
+    """Drive every robot; return the minutes of motion, the stops, and the excused stops.
 
-    The third number counts the stops after a delay of the machine.
+    A stop is excused if a delay of the machine preceded it.
     """
     until_s = time.monotonic() + seconds
     pages = {index: rig.drive(index, has_spare=has_spare) for index in rig.indexes}

@@ -1,6 +1,6 @@
 """Latency of a tick from the page's socket to the robot's socket, compared with a Python relay.
 
-One clock timestamps each tick before the page's socket accepts the tick, and after the robot has
+One clock timestamps each tick twice: before the page's socket accepts it, and after the robot has
 read its line. URC and the relay alternate in one run. URC's path includes the checks of the motion
 contract, the engine, and the pipe to the guard.
 """
@@ -23,11 +23,11 @@ from bench.rig.programs import Program, Robots, Server
 __all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 
 TIMES_RELAY = 1.5
-"""Largest allowed ratio of the median and of the 99th percentile."""
+"""Largest allowed ratio for the median and the 99th percentile."""
 TICKS, TICKS_IF_FULL = 150, 600
 ROUNDS, ROUNDS_IF_FULL = 3, 7
 TICK_NS = 20_000_000
-"""Interval between ticks in nanoseconds: shorter than a page's, longer than the profile's limit."""
+"""Tick interval in nanoseconds: shorter than a page's, longer than the profile's limit."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
 """Smallest share of ticks that must arrive, because a busy machine drops some ticks."""
@@ -53,7 +53,7 @@ class TimedPage(Page):
     """A page that timestamps each tick."""
 
     def begin_anew(self) -> None:
-        """Release, and take the controls for a new gesture, like an operator after a stop."""
+        """Release control and take it again for a new gesture, like an operator after a stop."""
         self.let_go()
         self.has_let_go = False
         self.say({"t": "drive", "verb": "leave"})
@@ -123,8 +123,8 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
         with Server([file], folder / "data") as server:
 
             def one_round() -> list[float]:
-                # The page gets a connection of its own: a page that waits for other rounds would
-                # answer no ping, and would be closed.
+                # The page gets a separate connection. A page that waits for other rounds would not
+                # answer pings, and would be disconnected.
                 page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0, key=server.key))
                 try:
                     page.take_controls()

@@ -1,4 +1,4 @@
-"""Time from the loss of an operator to the stop at the robot, for each kind of loss.
+"""Time from the loss of an operator until the robot receives the stop, by kind of loss.
 
 Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
 time is measured from the last effective tick to the first byte of the stop. With root, a relay
@@ -25,7 +25,7 @@ BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Let pages vanish in every way; compare the slowest stop with the limit."""
+    """Make pages vanish in every way; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
     has_relay = can_relay()

@@ -1,7 +1,7 @@
-"""The pages in a browser other than Chromium: every shipped robot, and a rover that is driven.
+"""Checks in browsers other than Chromium: every shipped robot's page, and driving a rover.
 
-Each page must be live with all widgets, fit on the narrowest screen, and follow each theme, with no
-error in the console. Each release must stop the rover before its lease ends.
+Each page must be live, show all widgets, fit the narrowest screen, and apply each theme, without
+console errors. Each release must stop the rover before its lease ends.
 """
 
 import tempfile
@@ -24,17 +24,17 @@ RELEASES, RELEASES_IF_FULL = 3, 20
 STOPS, STOPS_IF_FULL = 1, 5
 RESTARTS, RESTARTS_IF_FULL = 1, 3
 HARMLESS = ("WebGL context", "ResizeObserver loop completed")
-"""Parts of messages that are no faults.
+"""Parts of harmless console messages.
 
-Firefox draws no WebGL without a graphics processor; the widgets then draw flat, or say so. WebKit
-reports a size that it will tell a widget in the next frame.
+Without a graphics processor, Firefox has no WebGL. The widgets then draw in 2D or show a message.
+WebKit reports each size change that a widget receives only in the next frame.
 """
 
 
 def checked(
     opened: Callable[[], AbstractContextManager[Window]], *, full: bool
 ) -> Sequence[Result]:
-    """Check all pages in one browser, or a few of them, and drive."""
+    """Check all or a few pages in one browser, and drive the rover."""
     with opened() as window, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
         window.resize(*DESKTOP)
         faults = _pages(window, Path(folder) / "demo", ROBOTS if full else FEW)

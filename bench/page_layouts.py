@@ -1,4 +1,4 @@
-"""Layout of every page of the robots that ship: screens, languages and sizes of text.
+"""Layout of every shipped robot's page, on all screens, in all languages and text sizes.
 
 The test `tests/e2e/robots/test_page_layout.py` measures a sample of these pages. An interrupted run
 can be continued.
@@ -20,7 +20,7 @@ __all__ = ["run"]
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure all pages, or without `full` only the pages with usual English text."""
+    """Measure all pages; without `full`, only the pages with English text of the default size."""
     languages, sizes = (LANGUAGES, TEXT_PX) if full else (LANGUAGES[:1], TEXT_PX[:1])
     kept = Kept(f"page_layouts-{len(languages)}-{len(sizes)}")
     done = {str(row["page"]) for row in kept.rows}

@@ -56,7 +56,7 @@ _COMMANDS = 5
 
 
 def write_profiles(folder: Path, count: int) -> list[str]:
-    """Write `count` different profiles into `folder`, and return the paths of the profiles."""
+    """Write `count` different profiles into `folder`, and return their paths."""
     paths = []
     for number in range(count):
         path = folder / f"robot-{number:03}.yaml"

@@ -1,4 +1,4 @@
-"""A robot that sends a fixed text at a rate: ``python -m bench.robot LINE TICKS RATE``.
+"""A robot that sends a fixed text at a fixed rate: ``python -m bench.robot LINE TICKS RATE``.
 
 `LINE` is the file descriptor of an inherited socket. The robot starts when it receives data, and
 closes the socket at the end.

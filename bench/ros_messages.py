@@ -1,8 +1,8 @@
-"""Time of reading a ROS message, and random messages against the library rosbags.
+"""Time to read a ROS message, and a check of random messages against the library rosbags.
 
-The time is that of five fields of an Odometry, compared with rosbags, which always reads the whole
-message. With ``--full``, 10 000 random messages of each type are read in both byte orders, and must
-equal the values of rosbags.
+URC reads five fields of an Odometry message; rosbags always reads the whole message. With
+``--full``, URC reads 10 000 random messages of each type in both byte orders. The values must equal
+those from rosbags.
 """
 
 import sys
@@ -31,7 +31,7 @@ READS = 2000
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare times, and the values of random messages."""
+    """Compare the times, and the values of random messages."""
     count = MESSAGES_IF_FULL if full else MESSAGES
     wrong = sum(_differences(name, count) for name in TYPES)
     values = Result(

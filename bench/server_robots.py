@@ -2,9 +2,9 @@
 
 Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
 receives each change. Robots and pages run in two other processes, which only send or count bytes.
-Additional rows show the growth with the number of robots, signals and pages, and the share of lines
-that reach no page. Robots that can be driven have guards in separate processes; the guards are
-measured separately.
+Additional rows show how the costs grow with the number of robots, signals and pages, and the share
+of lines that reach no page. Drivable robots have guards in separate processes, which are measured
+separately.
 """
 
 import json
@@ -83,7 +83,7 @@ LOADS = (
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure the load of the goal, or all loads with `full`; each row is stored."""
+    """Measure the goal's load, or all loads with `full`; store each row."""
     kept = Kept("server_robots-full" if full else "server_robots")
     rounds, loads = (ROUNDS_IF_FULL, LOADS) if full else (ROUNDS, (GOAL,))
     wanted = [load for _ in range(rounds) for load in loads]
@@ -96,7 +96,7 @@ def run(*, full: bool) -> Sequence[Result]:
     return [
         _result("processor time of the server / half a core", "server_core", CORE_SHARE, goal),
         _result(f"memory of the server / {RESIDENT_MB:g} MB", "server_mb", RESIDENT_MB, goal),
-        # A server that a busy machine holds up takes less processor time.
+        # A server that is delayed by a busy machine uses less processor time.
         _result("lines that did not reach a page / a tenth", "lost", LOST, goal),
     ]
 
@@ -131,7 +131,7 @@ def _measured(load: Load, look_s: float) -> Row:
 
 
 def _settle(pages: Sequence[Program]) -> None:
-    """Wait until each page has received the values of one second."""
+    """Wait until each page has received one second's values."""
     end_s = time.monotonic() + START_S
     time.sleep(SETTLE_S)
     while min((each for program in pages for each in _counts(program)), default=RATE_HZ) < RATE_HZ:
@@ -176,7 +176,7 @@ def _counts(pages: Program) -> list[int]:
 
 
 def _middle(rows: Sequence[Row]) -> Row:
-    """Return the median of each measured value of one load."""
+    """Return the median of each value measured for one load."""
     figures = {name: median(row[name] for row in rows) for name in rows[0] if name not in FIELDS}
     return {"figure": "server_robots", **{name: rows[0][name] for name in FIELDS}, **figures}
 

@@ -10,7 +10,7 @@ from bench.rig.deaths import Trial
 __all__ = ["repeated", "said"]
 
 MOST_BOUTS = 3
-"""Maximum number of rounds of trials on a busy machine, as a multiple of the required number."""
+"""Maximum number of trial rounds on a busy machine, as a multiple of the required number."""
 
 
 def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:

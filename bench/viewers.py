@@ -1,7 +1,7 @@
 """Pages that only watch: the program opens WebSockets, selects channels, and counts received data.
 
-``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. ``{}`` in PATH is replaced
-by the number of the client. After each line on standard input, and at its end, the program prints a
+``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. The client's number
+replaces ``{}`` in PATH. After each line on standard input, and when it closes, the program prints a
 JSON list with the messages and bytes of each client. Frames are counted but not decoded, because
 only the server is measured.
 """

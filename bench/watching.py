@@ -96,8 +96,8 @@ class Robot:
 async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
     """Start a robot, which waits until it receives data.
 
-    Like a real robot, the process wakes the server by a readable socket. A timer in the server's
-    process would take several times the processor time, and would be included in the measurement.
+    Like a real robot, the process wakes the server through a readable socket. A timer in the
+    server's process would use several times as much processor time and distort the measurement.
     """
     ours, theirs = socket.socketpair()
     with ours, theirs:

@@ -28,8 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PYTHON = sys.executable
 NODE_MODULES = ROOT / "node_modules"
 HANGS_AFTER_S = 3600
-"""Time after which a step hangs for certain, in seconds. Busy machines need several times as long
-as idle ones."""
+"""Timeout of a step, in seconds. A busy machine needs several times as long as an idle machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +46,7 @@ class Outcome:
 
     name: str
     fault: str
-    """Reason of the failure; empty if the step passed."""
+    """Reason for the failure; empty if the step passed."""
     seconds: float
 
 
@@ -65,8 +64,8 @@ PYTEST = (PYTHON, "-m", "pytest")
 def halves(tests: str, *half: str) -> tuple[Step, Step]:
     """Return two test steps: one for the folders of `tests` in `half`, one for all other tests.
 
-    The processes of the two steps do not communicate. A third process that distributes thousands of
-    small tests would take a fifth of the processor time.
+    The processes of the two steps do not communicate. A third process that distributed thousands of
+    small tests would use a fifth of the processor time.
     """
     name = f"tests {tests.rpartition('/')[2]}"
     chosen = tuple(f"{tests}/{one}" for one in half)
@@ -77,7 +76,7 @@ def halves(tests: str, *half: str) -> tuple[Step, Step]:
     )
 
 
-# The longest first: at the end, few are left to wait for.
+# Longest first, so that few steps are still running at the end.
 QUICK = (
     *halves(
         "tests/contract",
@@ -91,7 +90,8 @@ QUICK = (
 )
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
 SLOW = (
-    # Most of them wait for a server or for silence, so a few in parallel need no more processor.
+    # Most of these tests wait for a server or for silence, so a few in parallel need no more
+    # processor time.
     Step(
         "tests e2e",
         (
@@ -99,7 +99,7 @@ SLOW = (
             *("-n", "3", "--dist", "loadgroup"),
         ),
     ),
-    # They measure the time until a robot stops.
+    # These tests measure the time until a robot stops.
     Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),
 )
 
@@ -130,7 +130,7 @@ def main() -> int:
 
 
 def javascript_step() -> tuple[Step | None, str]:
-    """Return the type check of URC's JavaScript, or None and the reason for its absence."""
+    """Return the step that checks the types in URC's JavaScript, or None and the reason."""
     node = node_executable()
     if node is None:
         return None, "the type check of the JavaScript: no Node"
@@ -162,10 +162,10 @@ def install_checkers() -> None:
 
 
 def run(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
-    """Run the steps in parallel, one for each processor, and kill all processes left by the steps.
+    """Run the steps in parallel, one per processor, and kill all processes left by the steps.
 
-    A single step shows its output immediately; with several steps, each shows its output when it
-    ends.
+    A single step shows its output immediately. With several steps, each step shows its output when
+    it ends.
     """
     return asyncio.run(_run_all(steps, environment))
 
@@ -193,7 +193,7 @@ async def _run_all(steps: Sequence[Step], environment: Mapping[str, str]) -> lis
 async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes] | None) -> Outcome:
     """Run a step; `output` replaces standard output and standard error."""
     start = time.monotonic()
-    # A session of its own, so that processes of a killed test can be ended too.
+    # A separate session, so that the processes of a killed test can also be ended.
     process = await asyncio.create_subprocess_exec(
         *step.command,
         cwd=ROOT,

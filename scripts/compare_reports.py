@@ -1,18 +1,18 @@
-"""A comparison of two commits' results for the same documents; renamed words count as equal.
+"""Compare two commits' results for the same documents; renamed words count as equal.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
 
 The old commit's code reads the old commit's documents. This tree's code reads the same documents
-after their migration. Later changes of a document, such as new comments, therefore make no
-difference. The script compares:
+after their migration. Later changes to a document, such as new comments, therefore have no effect.
+The script compares:
 
-- reports: file, line, column, severity and code of every problem of the broken documents. A renamed
-  key shifts the columns after the key, but no lines;
+- reports: file, line, column, severity and code of every problem in the broken documents. A renamed
+  key shifts the columns after it, but not the lines;
 - resolved profiles: the output of `urc resolve` for each robot; the old commit's output is migrated
   first.
 
-The exit code is 1 if a difference is not explained by a rename.
+The exit code is 1 if any difference is not due to a rename.
 """
 
 import argparse
@@ -75,14 +75,14 @@ for path in sorted(Path("robots").glob("*.yaml")):
     resolved[path.name] = resolve(path.as_posix(), shelf, profile).text
 print(json.dumps({"reports": reports, "resolved": resolved}))
 """
-"""Source of a program that runs in the old commit's tree with the old commit's code."""
+"""Source of a program that runs in the old commit's tree, with that commit's code."""
 
 Problem = tuple[str, int, int, str, str]
 """A problem: file, line, column, severity and code."""
 
 
 def main() -> int:
-    """Compare a commit with this tree; return 1 if a difference is not explained by a rename."""
+    """Compare a commit with this tree; return 1 if any difference is not due to a rename."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -209,7 +209,7 @@ class Comparison:
         return self._migrated[file]
 
     def moved(self, problem: Problem) -> Problem:
-        """Return a problem of the old tree with its expected new column and code.
+        """Return a problem from the old tree with its expected new column and code.
 
         Renames never change lines.
         """

@@ -1,7 +1,7 @@
-"""The Debian package, made by debhelper from a folder of wheels; part of `./dev release --debian`.
+"""Build the Debian package with debhelper from a folder of wheels, for `./dev release --debian`.
 
-The program runs on the Debian release that the package is for: the package contains a virtual
-environment of that release's Python. It needs the packages `debhelper`, `dpkg-dev` and
+This script must run on the package's target Debian release, because the package contains a virtual
+environment of that release's Python. The script needs the packages `debhelper`, `dpkg-dev` and
 `python3-venv`, and no network.
 
     python -m scripts.debian_package RELEASE WHEELS
@@ -28,12 +28,12 @@ _BUILD_S = 1800
 
 
 def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
-    """Fill the folder `source` with all that dpkg-buildpackage needs.
+    """Fill the folder `source` with all input for dpkg-buildpackage.
 
     Args:
         source: an empty folder.
-        release: folder of the release: wheel, manual page, completions and notices.
-        wheels: folder of the wheels of all packages that URC needs.
+        release: the release's folder with wheel, manual page, completions and notices.
+        wheels: folder with the wheels of all packages that URC needs.
         epoch: time of the release, in seconds since the epoch.
     """
     debian = source / "debian"
@@ -58,14 +58,14 @@ def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
 
 
 def packaged_service() -> str:
-    """Return the unit of systemd with the path of the package, without its steps by hand."""
+    """Return the systemd unit with the package's path, without the manual installation steps."""
     text = SERVICE.read_text("utf-8")
     text = re.sub(r"(?m)^ExecStart=\S+", f"ExecStart={IN_PACKAGE}", text)
     return text[text.index("[Unit]") :]
 
 
 def build_package(release: Path, wheels: Path, epoch: int) -> Path:
-    """Build the package into the folder of the release; return its path.
+    """Build the package in the release's folder; return the package's path.
 
     Raises:
         SystemExit: a program is missing, or the build failed.

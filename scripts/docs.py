@@ -23,7 +23,7 @@ SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
 def main() -> int:
-    """Print each broken link, and build the site; return 1 if a link is broken or a page is bad.
+    """Print each broken link, and build the site; return 1 after a broken link or a failed build.
 
     With ``--links``, the site is not built.
     """
@@ -74,7 +74,7 @@ def anchors_of(page: Path) -> set[str]:
 
 
 def term_anchors(cell: str) -> list[str]:
-    """Return the anchors of a cell of the glossary with one term or several terms."""
+    """Return the anchors of a glossary cell, which may contain several terms."""
     plain = [re.sub(r"[^\w-]+", "-", term.lower()).strip("-") for term in cell.split(",")]
     return [f"term-{term}" for term in plain]
 

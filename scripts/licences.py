@@ -1,4 +1,4 @@
-"""The program that writes docs/licences.md from the lock files.
+"""Write docs/licences.md from the lock files.
 
 python -m scripts.licences           write the page
 python -m scripts.licences --check   exit 1 if the page is outdated
@@ -32,7 +32,7 @@ Packages marked with “extra” are needed for cameras and laser scanners of em
 
 
 def page() -> str:
-    """Return the text of the page."""
+    """Return the page's text."""
     modules = hatch_sbom.npm_packages(ROOT, sorted(hatch_build.VENDORED))
     packages = hatch_sbom.python_packages(ROOT)
     parts = [
@@ -57,7 +57,7 @@ def _named(one: hatch_sbom.LockedPackage) -> str:
 
 
 def _version(one: hatch_sbom.LockedPackage) -> str:
-    """Return the version, with its range of Python versions if there are several."""
+    """Return the version; if there are several, add the range of Python versions."""
     if not one.marker.startswith("python_full_version") or " and " in one.marker:
         return one.version
     return f"{one.version} (Python {one.marker.removeprefix('python_full_version ')})"

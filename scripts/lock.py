@@ -1,11 +1,11 @@
-"""The program that locks the dependencies of `./dev` with hashes, for all systems at once.
+"""Lock the dependencies of `./dev` with hashes, for all systems.
 
     python -m scripts.lock            keep the locked versions; add and remove dependencies
     python -m scripts.lock --upgrade  lock the newest versions
 
-The program needs `uv`, which resolves for every system and Python version without running on them:
-`pip install uv`. `tests/contract/test_locked_dependencies.py` compares the locks with
-`pyproject.toml`.
+The script needs `uv` (`pip install uv`), which resolves dependencies for every system and Python
+version on any single machine. `tests/contract/test_locked_dependencies.py` compares the lock files
+with `pyproject.toml`.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def lock(uv: str, name: str, *, is_upgrade: bool) -> int:
-    """Write one lock file; return the exit code of uv. The locks agree in their versions."""
+    """Write one lock file; return uv's exit code. A package has the same version in all files."""
     file = FOLDER / f"{name}.txt"
     command = [
         uv, "pip", "compile", *LOCKS[name], "--universal", "--python-version", OLDEST,
@@ -64,7 +64,7 @@ def lock(uv: str, name: str, *, is_upgrade: bool) -> int:
     done = subprocess.run(command, cwd=ROOT, timeout=_TIMEOUT_S, check=False)
     if done.returncode == 0:
         text = file.read_text("utf-8").removeprefix(_HEADER)
-        # True wherever `./dev` reads a lock, and repeated by uv in every line.
+        # True wherever `./dev` reads a lock file, and repeated by uv in every line.
         text = text.replace(f" and {SYSTEMS}", "").replace(f" ; {SYSTEMS}", "")
         file.write_text(_HEADER + text, "utf-8")
     return done.returncode

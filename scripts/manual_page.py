@@ -1,4 +1,4 @@
-"""The manual page urc(1), made from the parsers of the subcommands by argparse-manpage."""
+"""Generate the manual page urc(1) from the subcommands' parsers with argparse-manpage."""
 
 import os
 
@@ -12,11 +12,11 @@ COLUMNS = "80"
 
 
 def manual_page(date: str) -> str:
-    """Return the page in the language of man(7).
+    """Return the page in man(7) markup.
 
     Args:
-        date: date of the release, such as ``2026-11-28``. The same sources and the same date give
-            the same page.
+        date: date of the release, such as ``2026-11-28``. The same sources and the same date
+        produce the same page.
     """
     from argparse_manpage.manpage import Manpage
 

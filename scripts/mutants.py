@@ -1,4 +1,4 @@
-"""Mutants with their results, as stored by mutmut, and the explanations of surviving mutants."""
+"""Mutants and results as stored by mutmut, and the explanations for surviving mutants."""
 
 import json
 import re
@@ -28,13 +28,13 @@ _STATUS = {
     152: "timeout",
     255: "timeout",
 }
-"""Status of a mutant for each exit code of mutmut; the status for any other exit code is `odd`."""
+"""Status of a mutant for each exit code of mutmut; other exit codes mean `odd`."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
 """Statuses of detected mutants: a test failed or timed out."""
 _COMMENT = re.compile(r"  # .*")
 Change = tuple[str, str]
-"""Removed and inserted code of a mutant."""
+"""The removed and inserted code of a mutant."""
 
 
 class Mutant:
@@ -56,7 +56,7 @@ class Mutant:
 
     @cached_property
     def change(self) -> Change:
-        """Removed and inserted code, without indentation and comments at the end of a line."""
+        """Removed and inserted code, without indentation and trailing comments."""
         before, after = [], []
         for line in self._diff():
             if line.startswith("-"):
@@ -100,10 +100,10 @@ class Kind(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """Explanations of surviving mutants: the reason why no test needs to kill each mutant."""
+    """Explanations of surviving mutants: for each one, why no test needs to kill it."""
 
     reasons: dict[tuple[str, Change], str]
-    """Reason for each combination of function and change."""
+    """Reason by function and change."""
     kinds: tuple[Kind, ...] = ()
 
     def covers(self, mutant: Mutant) -> bool:

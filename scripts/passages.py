@@ -1,6 +1,6 @@
-"""The extraction of prose from the tree: documentation, docstrings, and strings for people.
+"""Extract the prose from the tree: documentation, docstrings, and strings for people.
 
-`scripts/sentences.py` and `scripts/prose.py` use this module, so both have the same definition of
+`scripts/sentences.py` and `scripts/prose.py` use this module, so they share one definition of
 prose. Generated pages (docs/reference, docs/robots, docs/gallery), tests, code blocks and licences
 are excluded.
 """
@@ -19,17 +19,17 @@ GENERATED = ("docs/reference/", "docs/robots/", "docs/gallery/")
 CODE_FOLDERS = ("urc/", "bench/", "scripts/")
 YAML_FOLDERS = ("robots/", "widgets/")
 PROSE_KEYS = ("title", "summary", "description", "help", "notes", "why")
-"""Keys of schemas and documents with prose as values."""
+"""Keys of schemas and documents whose values are prose."""
 FEWEST_WORDS = 4
-"""Minimum number of words of a sentence in code; a shorter string is a name or a label."""
+"""Minimum number of words in a sentence from code; a shorter string is a name or a label."""
 
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
 _SECTIONS = ("Args:", "Attributes:", "Raises:", "Returns:", "Yields:")
 _ENTRY = re.compile(r"^\s+\*{0,2}\w+(?: \([^)]*\))?: ")
-"""Pattern of the start of an entry under `Args:` or `Raises:`."""
+"""Pattern that matches the start of an entry under `Args:` or `Raises:`."""
 _QUERY = re.compile(r"(?:CREATE TABLE|DELETE FROM|INSERT INTO|PRAGMA|SELECT|WHERE)\b")
-"""Pattern of the start of an SQL statement, which is not prose."""
+"""Pattern that matches the start of an SQL statement, which is not prose."""
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 _MARKED = re.compile(r"""\b(?:t|mark|phrase)\(\s*(?:"((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)')""")
 _WORD = re.compile(
@@ -59,7 +59,7 @@ class Sentence(NamedTuple):
 
 
 def is_read(path: str) -> bool:
-    """Return whether a file is searched for prose."""
+    """Return whether a file can contain prose."""
     if path.startswith(GENERATED):
         return False
     if path.endswith(".md"):
@@ -131,7 +131,7 @@ def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[P
 def _of_python(path: str, text: str) -> Iterator[Passage]:
     tree = ast.parse(text)
     apart: set[ast.AST] = set()
-    """Nodes of strings that were already yielded as part of another node."""
+    """String nodes that were already yielded as part of another node."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             apart.add(node.value)

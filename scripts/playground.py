@@ -1,14 +1,15 @@
-"""The build of the playground: one folder of static files, `python -m scripts.playground FOLDER`.
+"""Build the playground as one folder of static files: `python -m scripts.playground FOLDER`.
 
-The folder works from any static web server, under any path, without other hosts. It contains:
+Any static web server can serve the folder, under any path. The pages use no other hosts. It
+contains:
 
-- the interpreter: Pyodide of npm, with the versions of `package-lock.json`;
+- the interpreter: Pyodide from npm, in the version of `package-lock.json`;
 - `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
-- `dash/`: the modules and styles of the dashboard and the widgets, as a server serves them;
+- `dash/`: the modules and styles of the dashboard and the widgets, with a server's paths;
 - the page, its worker and its service worker, from `playground/static`.
 
-Packages come from this environment, which has the versions of `requirements/`. `msgspec` is the
-only package with a build for browsers on the package index; pip checks its locked hash.
+Packages are copied from this environment, which has the versions of `requirements/`. `msgspec` is
+the only package with a browser build on the package index; pip checks its locked hash.
 """
 
 import argparse
@@ -37,11 +38,11 @@ PACKAGES = (
     "jsonschema-specifications", "markdown-it-py", "markupsafe", "mdurl", "pyyaml", "referencing",
     "semver", "sniffio", "starlette", "typing-extensions",
 )  # fmt: skip
-"""Packages of which the pure Python files are enough; `playground.stand_ins` replaces the rest."""
+"""Packages whose pure Python files are sufficient; `playground.stand_ins` replaces other parts."""
 COMPILED = ("msgspec",)
-"""Packages with a build for browsers on the package index."""
+"""Packages with a browser build on the package index."""
 ABI = "pyemscripten_2026_0_wasm32"
-"""Platform of such builds for this version of Pyodide."""
+"""Platform of browser builds for this version of Pyodide."""
 PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
@@ -52,7 +53,7 @@ _DATED = (1980, 1, 1, 0, 0, 0)
 
 
 class BuildError(Exception):
-    """A failed build; the message is one line."""
+    """The build failed; the message is one line."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -71,10 +72,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write(folder: Path) -> None:
-    """Write the whole folder; an existing folder is replaced.
+    """Write the whole folder, and replace an existing one.
 
     Raises:
-        BuildError: Node or Pyodide is missing, or a package cannot be brought.
+        BuildError: Node or Pyodide is missing, or a package cannot be downloaded.
     """
     if not (PYODIDE / "pyodide.mjs").is_file():
         raise BuildError("Pyodide is missing; run: npm ci --ignore-scripts")
@@ -96,7 +97,7 @@ def write(folder: Path) -> None:
 
 
 def _stage_code(code: Path) -> None:
-    """Copy all Python code and documents, as they lie in the worker."""
+    """Copy all Python code and documents to their paths in the worker."""
     _copy_tree(ROOT / "urc", code / "urc", ("py", "md", "json"))
     _copy_tree(ROOT / "playground", code / "playground", ("py",))
     for name in DATA:
@@ -133,7 +134,7 @@ def _copy_distribution(package: str, code: Path) -> None:
 
 
 def _unpack_wheel(package: str, code: Path) -> None:
-    """Download the build of a package for browsers, in the locked version, and unpack it."""
+    """Download and unpack a package's browser build, in the locked version."""
     version = distribution(package).version
     lock = (ROOT / "requirements" / "dev.txt").read_text("utf-8")
     found = re.search(rf"^{package}=={re.escape(version)} \\\n((?: +--hash=.*\n)+)", lock, re.M)
@@ -154,7 +155,7 @@ def _unpack_wheel(package: str, code: Path) -> None:
 
 
 def _compile(work: Path) -> None:
-    """Compile all Python files, with the bytecode of unchanged files from earlier builds."""
+    """Compile all Python files; reuse the bytecode of unchanged files from earlier builds."""
     key = (PYODIDE / "package.json").read_bytes()
     kept = {
         file: CACHE / hashlib.blake2b(key + file.read_bytes(), digest_size=16).hexdigest()

@@ -1,4 +1,4 @@
-"""A check of the English in docs, docstrings and strings for people.
+"""Check the English in docs, docstrings and strings for people.
 
     python -m scripts.prose                 fail where a file has more hits than its baseline
     python -m scripts.prose docs urc/motion list every hit below these paths
@@ -6,9 +6,8 @@
 
 The rules keep sentences short and plain: subject and verb first, nouns instead of relative clauses,
 and the words of docs/glossary.md. The baseline contains the number of remaining hits, by file and
-rule. The baseline can only shrink: `--update` refuses a larger total of a rule, so hits may move
-between files, but the total can't grow. `--update` also repairs the baseline after a merge
-conflict.
+rule. `--update` refuses a larger total for a rule, so hits can move between files, but the total
+can't grow. `--update` also repairs the baseline after a merge conflict.
 """
 
 import argparse
@@ -80,7 +79,7 @@ def main() -> int:
 
 
 def read_files() -> dict[str, str]:
-    """Return path and text of every file with prose."""
+    """Return the path and text of every file with prose."""
     found = [*ROOT.glob("*.md"), *ROOT.glob("*.py"), ROOT / "dev"]
     found += [file for folder in FOLDERS for file in (ROOT / folder).rglob("*") if file.is_file()]
     paths = {file.relative_to(ROOT).as_posix(): file for file in found}
@@ -110,7 +109,7 @@ def hits(files: Mapping[str, str], replaced: Iterable[str]) -> Iterator[Hit]:
 
 
 def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
-    """Print the files with more hits than in the baseline; return the exit code."""
+    """Print the files that exceed their hits in the baseline; return the exit code."""
     counted = counts(found)
     over = {key for key, count in counted.items() if count > allowed[key]}
     for hit in found:

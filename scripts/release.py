@@ -3,8 +3,9 @@
     ./dev release                      everything, into dist/
     ./dev release --debian WHEELS      also the Debian package, from a folder of wheels
 
-The command publishes nothing. Each build runs twice, in different folders; different bytes are an
-error. The files have the time of the last commit, so that other people get the same bytes.
+The command publishes nothing. Each build runs twice, in different folders; the results must have
+the same bytes. All files have the time of the last commit, so other people's builds produce the
+same bytes.
 """
 
 import argparse
@@ -35,12 +36,12 @@ DIST = ROOT / "dist"
 NOTICES = "THIRD-PARTY-NOTICES.txt"
 SUMS = "SHA256SUMS"
 SHELLS = {"bash": "urc", "zsh": "_urc", "fish": "urc.fish"}
-"""Names of the completion scripts, as the shells look for them."""
+"""File names under which the shells find their completion scripts."""
 _BUILD_S = 600
 
 
 class ReleaseError(Exception):
-    """A check of the release failed; the message is one line."""
+    """A release check failed; the message is one line."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -120,7 +121,7 @@ def commit_time() -> int:
 
 
 def build_twice(out: Path, epoch: int) -> None:
-    """Build wheel and sdist here and in a copy of the sources; compare the bytes."""
+    """Build the wheel and the sdist here and in a copy of the sources; compare the bytes."""
     build(ROOT, out, epoch)
     with TemporaryDirectory(prefix="urc-release-") as folder:
         copy, second = Path(folder, "elsewhere"), Path(folder, "dist")
@@ -142,7 +143,7 @@ def copy_sources(target: Path) -> None:
 
 
 def build(source: Path, out: Path, epoch: int) -> None:
-    """Build wheel and sdist of a folder with sources."""
+    """Build the wheel and the sdist from a folder with sources."""
     command = [sys.executable, "-m", "hatchling", "build", "-d", str(out.absolute())]
     environment = os.environ | {"SOURCE_DATE_EPOCH": str(epoch)}
     done = subprocess.run(
@@ -154,7 +155,7 @@ def build(source: Path, out: Path, epoch: int) -> None:
 
 
 def check_sbom(wheel: Path, out: Path) -> None:
-    """Write the SBOM of the wheel next to it, after a check by its official schema."""
+    """Check the wheel's SBOM against the official schema, and write it next to the wheel."""
     from cyclonedx.schema import SchemaVersion
     from cyclonedx.validation.json import JsonStrictValidator
 
@@ -203,7 +204,7 @@ def write_completions(folder: Path) -> None:
 
 
 def pack_site(target: Path, epoch: int) -> None:
-    """Build the documentation site, and pack it."""
+    """Build the documentation site, and pack it into an archive."""
     site = import_module("scripts.site")  # not in every checkout
     if site.build() != 0:
         raise ReleaseError("the site could not be built")
@@ -212,7 +213,7 @@ def pack_site(target: Path, epoch: int) -> None:
 
 
 def write_tar(target: Path, files: Iterable[tuple[str, Path]], epoch: int) -> None:
-    """Write a compressed archive whose bytes depend on names, contents and time alone."""
+    """Write a compressed archive whose bytes depend only on names, contents and time."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w") as archive:
         for name, path in files:
@@ -224,7 +225,7 @@ def write_tar(target: Path, files: Iterable[tuple[str, Path]], epoch: int) -> No
 
 
 def write_sums(folder: Path) -> None:
-    """Write the checksums of all files, in the form of ``sha256sum --check``."""
+    """Write the checksums of all files, in the format of ``sha256sum --check``."""
     (folder / SUMS).unlink(missing_ok=True)
     (folder / SUMS).write_text("".join(_sums(folder)), "utf-8")
 

@@ -1,11 +1,11 @@
-"""The generator of the robots' pictures and manual pages.
+"""Generate the robots' pictures and manual pages.
 
     python -m scripts.robot_pictures             all shipped robots
     python -m scripts.robot_pictures NAME ...    only these
     python -m scripts.robot_pictures --text      only the pages, with the existing pictures
 
-``docs/images/robots/NAME.png`` shows the default interface on a tablet. ``docs/robots/NAME.md`` is
-the output of `urc docs` with the robot's picture below its first lines.
+``docs/images/robots/NAME.png`` shows the robot's default interface on a tablet.
+``docs/robots/NAME.md`` is the output of `urc docs` with the robot's picture below its first lines.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""The generator of the README's picture of the dashboard: `python -m scripts.screenshot`.
+"""Take the README's picture of the dashboard: `python -m scripts.screenshot`.
 
 The demo runs in a separate process. A real Chromium takes the picture when the battery shows the
 charge that the README mentions. `scripts.page_pictures` takes pictures of all pages.

@@ -1,4 +1,4 @@
-"""A random sample of sentences from the prose of a commit, for a reader who judges the English.
+"""Print a random sample of sentences from a commit's prose, so that a reader can judge the English.
 
     python -m scripts.sentences             60 sentences of HEAD
     python -m scripts.sentences COMMIT      of another commit
@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def candidates(files: dict[str, str]) -> list[Sentence]:
-    """Return all sentences that can be sampled, sorted by file."""
+    """Return all sentences to sample from, sorted by file."""
     found: dict[str, Sentence] = {}
     for passage in passages(files):
         for one in sentences(passage):
@@ -54,7 +54,7 @@ def draw(found: list[Sentence], seed: str, count: int = COUNT) -> list[Sentence]
 
 
 def files_of(commit: str) -> dict[str, str]:
-    """Return path and text of every file with prose in a commit."""
+    """Return the path and text of every file with prose in a commit."""
     with tarfile.open(fileobj=io.BytesIO(_git("archive", "--format=tar", commit))) as archive:
         return {
             member.name: file.read().decode("utf-8")

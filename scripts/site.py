@@ -1,7 +1,7 @@
-"""The builder of the documentation site: `python -m scripts.site`, part of `./dev docs`.
+"""Build the documentation site: `python -m scripts.site`, part of `./dev docs`.
 
-Sphinx reads docs/ and writes .site/html. A warning is an error: a dead reference, a page in no
-table of contents, a heading that skips a level. The build needs no network.
+Sphinx reads docs/ and writes .site/html. Warnings are errors: for example, a broken reference, a
+page without a table of contents entry, or a heading that skips a level. The build needs no network.
 """
 
 import shutil
@@ -19,25 +19,25 @@ PROCESSES = "2"
 
 
 def main() -> int:
-    """Build the site, in the folder of the command line if one is given; return the exit code."""
+    """Build the site, by default in .site/; return the exit code."""
     folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
     code = build(folder)
     if code == 0:
         from scripts.playground import PYODIDE, write
 
-        if PYODIDE.is_dir():  # npm brings it; without it, the site has no playground
+        if PYODIDE.is_dir():  # npm installs it; without it, the site has no playground
             write(folder / "playground")
     print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
     return code
 
 
 def build(html: Path = HTML) -> int:
-    """Build the site from nothing; print the warnings; return the exit code of Sphinx.
+    """Build the site without a cache; print the warnings; return the exit code of Sphinx.
 
-    A cache of pages would hide warnings about a page that did not change, such as a link to a
-    heading that another page lost.
+    A cache would hide warnings about unchanged pages, such as a link to a heading that no longer
+    exists on another page.
     """
-    from sphinx.cmd.build import build_main  # a second that the check of links does not need
+    from sphinx.cmd.build import build_main  # takes a second, which the link check does not need
 
     shutil.rmtree(html, ignore_errors=True)
     options = ("--builder=html", "--fail-on-warning", "--keep-going", f"--jobs={PROCESSES}")

@@ -23,7 +23,7 @@ MADE_BY = (
     (("robots/",), "python -m scripts.robot_pictures"),
     (("licences",), "python -m scripts.licences"),
 )
-"""Starts of the names of generated pages, with the command that writes them."""
+"""Prefixes of generated pages' names, with the command that writes the pages."""
 LABELS = {
     '<aside class="sidebar-drawer"': '<aside aria-label="Chapters" class="sidebar-drawer"',
     '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
@@ -32,9 +32,9 @@ LABELS = {
         'class="content-icon-container" role="navigation" aria-label="Page"'
     ),
 }
-"""Parts of the theme's markup, with what axe misses."""
+"""Parts of the theme's markup, with the corrections that axe requires."""
 DOCUMENT = "urc-document"
-"""The class of a block with a whole document; the playground adds its button there."""
+"""Class of a code block with a whole document, to which the playground adds its button."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def mark_documents(_: Sphinx, tree: nodes.document) -> None:
-    """Give each fenced block with a whole document its class."""
+    """Add the class to each fenced block with a whole document."""
     texts = [block.astext() for block in tree.findall(nodes.literal_block)]
     for block in tree.findall(nodes.literal_block):
         text = block.astext()
@@ -59,7 +59,7 @@ def mark_documents(_: Sphinx, tree: nodes.document) -> None:
 
 
 def anchor_terms(app: Sphinx, tree: nodes.document) -> None:
-    """Give each term of the glossary an anchor: `#term-signal`."""
+    """Add an anchor to each glossary term, such as `#term-signal`."""
     if app.env.docname != GLOSSARY:
         return
     slugs = app.env.metadata[GLOSSARY].setdefault("myst_slugs", {})
@@ -89,7 +89,7 @@ def link_names(app: Sphinx, tree: nodes.document, name: str) -> None:
 
 
 def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
-    """Return whether a node is inside a node of one of the kinds."""
+    """Return whether a node has an ancestor of one of these kinds."""
     while (node := node.parent) is not None:
         if isinstance(node, kinds):
             return True
@@ -99,9 +99,10 @@ def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
 def shorten_navigation(
     app: Sphinx, name: str, _template: str, context: dict[str, Any], _tree: nodes.document | None
 ) -> None:
-    """Give the theme the chapters, with the pages of the current chapter only.
+    """Pass the chapters to the theme, with only the current chapter's pages.
 
-    Sphinx resolves the whole table of contents for each page: two minutes for 270 pages.
+    Otherwise, Sphinx would resolve the whole table of contents for each page, which takes two
+    minutes for 270 pages.
     """
     here = {name, *ancestors(app, name)}
 
@@ -122,7 +123,7 @@ def shorten_navigation(
 
 
 def source_line(context: dict[str, Any], name: str) -> str:
-    """Return the line at the end of a page that says where to correct the page."""
+    """Return the page's last line, which explains where to correct the page."""
     for starts, command in MADE_BY:
         if name.startswith(starts):
             return f'<p class="urc-source">Made by <code>{command}</code> from the code.</p>'
@@ -162,7 +163,7 @@ def write_llms(app: Sphinx, fault: Exception | None) -> None:
 
 
 def label_pages(app: Sphinx, fault: Exception | None) -> None:
-    """Give landmarks of the theme their names, and let keys scroll wide blocks of code."""
+    """Label the theme's landmarks, and make wide code blocks scrollable by keyboard."""
     if fault is not None or app.builder.name != "html":
         return
     for name in app.env.all_docs:

@@ -1,4 +1,4 @@
-"""The names in code style that pages link to the reference: commands, variables, codes, keys."""
+"""The names in code style that link to the reference: commands, variables, codes, keys."""
 
 import re
 from collections import Counter
@@ -16,8 +16,8 @@ KEYS = (
     *("hold", "hysteresis", "idempotent", "retries", "coalesce", "reconnect", "timeouts"),
     *("keepalive", "duplex", "baud", "overrides", "failsafe", "requires", "confirm", "extends"),
 )
-"""Keys without an underscore that mean nothing else on the pages. Others, such as `speed` and
-`open`, are also arguments, widgets or words of other languages."""
+"""Keys without an underscore that have no other meaning on the pages. Other keys, such as `speed`
+and `open`, are also arguments, widgets or words of other languages."""
 _COMMAND = re.compile(r"urc ([a-z-]+)\b")
 
 
@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 def place_of(literal: str) -> Place | None:
-    """Return the place in the reference of a literal; None for any other text."""
+    """Return a literal's place in the reference; None if it has no place."""
     found = names().get(literal.rstrip(":"))
     if found is None and (command := _COMMAND.match(literal)):
         found = names().get(f"urc {command[1]}")
@@ -38,7 +38,7 @@ def place_of(literal: str) -> Place | None:
 
 @cache
 def names() -> Mapping[str, Place]:
-    """Return the place of each name. A key that several definitions share has none."""
+    """Return the place of each name. A key that several definitions share has no place."""
     found: dict[str, Place] = {}
     for page in ("cli", "environment", "codes"):
         found |= {one: Place(f"reference/{page}", make_id(one)) for one in headings(page, "##+")}
@@ -54,6 +54,6 @@ def names() -> Mapping[str, Place]:
 
 
 def headings(page: str, level: str) -> list[str]:
-    """Return the headings of a page of the reference."""
+    """Return the headings of a reference page."""
     text = (REFERENCE / f"{page}.md").read_text("utf-8")
     return re.findall(rf"^{level} (.+)$", text, re.MULTILINE)

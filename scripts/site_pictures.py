@@ -1,7 +1,8 @@
-"""The generator of the site's pictures: `python -m scripts.site_pictures [drive] [tutorials]`.
+"""Take the site's pictures: `python -m scripts.site_pictures [drive] [tutorials]`.
 
-``drive`` films the real dashboard: an emulated TurtleBot 4 is driven, let go, stopped and reset.
-``tutorials`` takes the pictures of the tutorials, from the documents on their pages.
+``drive`` films the real dashboard: an operator drives an emulated TurtleBot 4, releases the stick,
+presses STOP and resets it. ``tutorials`` takes the tutorials' pictures from the documents on their
+pages.
 """
 
 import argparse
@@ -31,7 +32,7 @@ __all__ = ["main"]
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 LOOP = DOCS / "_static" / "drive.webp"
 STILL = DOCS / "_static" / "drive-still.webp"
-"""One picture of the film, for people who want no motion."""
+"""One still picture of the film, for people who prefer no motion."""
 STILL_QUALITY = 70
 SCREEN = (1120, 700)
 LOOP_SIZE = (960, 600)
@@ -41,7 +42,7 @@ LEAST_WAY_M = 0.5
 FRAME_S = 0.12
 """Shortest time between two frames of the film, in seconds."""
 STEERING = ((0.0, -0.9, 2.5), (-0.6, -0.7, 1.8), (0.7, -0.6, 2.2), (0.0, -0.8, 1.2))
-"""Places of the knob as fractions of the radius, right and down, with their durations in s."""
+"""Positions of the knob, as fractions of the radius to the right and down, with durations in s."""
 TABLET = (1024, 640)
 COLOURS = 128
 LIVE = "() => document.querySelector('[data-badge]')?.dataset.state === 'good'"
@@ -67,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @asynccontextmanager
 async def served(*words: str) -> Any:
-    """Run `urc` with the words and an own data folder; yield the address of its dashboard."""
+    """Run `urc` with these arguments and a separate data folder; yield its dashboard's address."""
     with tempfile.TemporaryDirectory() as data:
         process = UrcProcess((*words, "--port", "0"), {"URC_DATA_DIR": data})
         try:
@@ -90,10 +91,10 @@ async def opened(browser: Browser, address: str, path: str, size: tuple[int, int
 
 
 async def film() -> None:
-    """Write the moving picture of the front page."""
+    """Write the animated picture of the front page."""
     async with (
         served("serve", "turtlebot4", "--simulate") as address,
-        running_browser(is_whole=True) as browser,  # the other one cannot keep a screen on
+        running_browser(is_whole=True) as browser,  # the other browser cannot keep a screen on
     ):
         page = await opened(browser, address, "/robots/turtlebot4/", SCREEN)
         await page.wait_for_function(LIVE, timeout=READY_MS)
@@ -110,7 +111,7 @@ async def film() -> None:
 
 
 async def tap(page: Page) -> None:
-    """Touch the stick once, so that a hint about the screen is over before the film begins."""
+    """Touch the stick once, so that the hint about the screen disappears before the film begins."""
     x, y, _ = await centre(page.locator(".joystick-pad").first)
     await page.mouse.move(x, y)
     await page.mouse.down()
@@ -118,7 +119,7 @@ async def tap(page: Page) -> None:
 
 
 async def shoot(page: Page, frames: list[tuple[float, bytes]]) -> CDPSession:
-    """Collect pictures with their times, as the browser paints them, until the session ends."""
+    """Collect each painted picture with its time until the session ends."""
     session = await page.context.new_cdp_session(page)
     waiting = set()
 
@@ -140,7 +141,7 @@ async def shoot(page: Page, frames: list[tuple[float, bytes]]) -> CDPSession:
 
 
 async def drive(page: Page) -> None:
-    """Hold the stick and steer, let go, press STOP, and reset it."""
+    """Hold the stick and steer, release it, press STOP, and reset the stop."""
     x, y, radius = await centre(page.locator(".joystick-pad").first)
     await asyncio.sleep(1)
     await page.mouse.move(x, y)
@@ -157,7 +158,7 @@ async def drive(page: Page) -> None:
 
 
 async def centre(pad: Locator) -> tuple[float, float, float]:
-    """Return the centre and the radius of a stick, in pixels of the page."""
+    """Return the centre and the radius of a stick, in page pixels."""
     box = await pad.bounding_box()
     assert box is not None  # noqa: S101  the page shows its stick
     middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -165,7 +166,7 @@ async def centre(pad: Locator) -> tuple[float, float, float]:
 
 
 def write_loop(frames: list[tuple[float, bytes]]) -> None:
-    """Write the film as an animated WebP; each frame lasts as long as in reality."""
+    """Write the film as an animated WebP in real time."""
     taken = (Image.open(io.BytesIO(data)).convert("RGB") for _, data in frames)
     pictures = [one.resize(LOOP_SIZE, Image.Resampling.LANCZOS) for one in taken]
     times = [when for when, _ in frames]
@@ -220,7 +221,7 @@ def write_blocks(page: Path, folder: Path) -> None:
 
 
 async def keep(page: Page, file: Path) -> None:
-    """Write a picture of the page with few colours, so that the file is small."""
+    """Write a picture of the page with few colours, to keep the file small."""
     taken = Image.open(io.BytesIO(await page.screenshot())).convert("RGB")
     taken.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
     print(file.name)

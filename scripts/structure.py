@@ -1,18 +1,18 @@
-"""Metrics of the code's structure: its size, and its division into modules and functions.
+"""Measure the code's structure: its size, and its division into modules and functions.
 
     python -m scripts.structure             this tree
     python -m scripts.structure ROOT        another tree, such as a worktree of an older commit
 
-Use the metrics to compare the code before and after a change; no metric is a goal by itself.
+Use the metrics to compare the code before and after a change. No metric is a goal in itself.
 `--names` lists the counted modules, classes and functions. Definitions of the metrics:
 
-- modules with one importer: modules of `urc` that exactly one other module imports, at any level,
-  or names in an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
+- modules with one importer: modules of `urc` that exactly one other module uses. A use is an import
+  at any level, or an entry `"urc.module:name"` in a table. Packages and `__main__` do not count;
 - class names used more than once: names that `urc` defines in two or more places;
 - functions over 60 lines: lines include the docstring, but not decorators;
-- repeated lines: a function counts as a list of statements, with variable names and constants
-  blanked. Only the header of a compound statement is counted. Four consecutive statements that also
-  occur in an earlier function are repeated; each line counts once.
+- repeated lines: lines of four or more consecutive statements that also occur in an earlier
+  function. Variable names and constants are ignored. Only the header of a compound statement is
+  compared. Each line counts once.
 """
 
 import argparse
@@ -48,13 +48,13 @@ class Module:
 
 @dataclass
 class Lines:
-    """Numbers of lines of Python code, by kind."""
+    """Line counts of Python code, by kind."""
 
     total: int = 0
     blank: int = 0
     docstring: int = 0
     comments: int = 0
-    """Lines with a comment, alone or after code."""
+    """Lines with a comment, with or without code."""
 
     @property
     def code(self) -> int:
@@ -163,7 +163,7 @@ def structure(found: list[Module]) -> Structure:
 
 
 def lines_of(found: list[Module]) -> Lines:
-    """Return the sums of the line counts of the modules."""
+    """Return the total line counts of the modules."""
     counted = Lines()
     for module in found:
         lines = module.text.splitlines()

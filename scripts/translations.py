@@ -1,11 +1,11 @@
-"""The program that updates, checks and compiles the catalogues of the pages' texts.
+"""Update, check and compile the catalogues of the pages' texts.
 
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps
 
-Sources are the page templates, the pages' modules, and the widgets' templates, modules, titles and
-summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are PO files of
-gettext, which any translation program can open.
+The texts are in the page templates, the pages' modules, and the widgets' templates, modules, titles
+and summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext
+PO files, which any translation program can open.
 """
 
 import argparse
@@ -33,7 +33,7 @@ IDLE_HEADERS = tuple(
     f'"{name}'
     for name in ("POT-", "PO-", "Project-", "Report-", "Last-", "Language-Team", "Generated-")
 )
-"""Headers of a PO file that are removed, because they change with the date or the program."""
+"""PO file headers to remove, because they change with the date or the program."""
 HOLE = re.compile(r"\{[a-z_]+\}")
 
 
@@ -71,7 +71,7 @@ def messages() -> Mapping[str, list[str]]:
 
 
 def updated(tag: str, wanted: Mapping[str, list[str]]) -> Catalog:
-    """Return the updated catalogue with exactly these messages; existing translations stay."""
+    """Return the updated catalogue with exactly these messages; keep existing translations."""
     place = FOLDER / f"{tag}.po"
     old = read_po(io.BytesIO(place.read_bytes()), tag) if place.is_file() else Catalog(tag)
     new = Catalog(

@@ -1,4 +1,4 @@
-"""The generator of the widgets' pictures for the manual: ``docs/images/widgets/NAME.png``.
+"""Take the widgets' pictures for the manual: ``docs/images/widgets/NAME.png``.
 
     python -m scripts.widget_pictures             all widgets
     python -m scripts.widget_pictures NAME ...    only these

@@ -1,7 +1,7 @@
 """Checksum algorithms: parameters, and functions that compute checksums of bytes.
 
-`anycrc` computes all CRCs, except for the CRCs that `zlib` and `binascii` provide. A sum checksum
-or fold checksum takes a single call of a C function.
+`zlib` and `binascii` compute the CRCs in `_BUILT_IN`, and `anycrc` computes all other CRCs. A sum
+or XOR checksum needs only one call of a C function.
 """
 
 import binascii
@@ -40,7 +40,7 @@ class CrcSpec(NamedTuple):
 
 
 class FoldSpec(NamedTuple):
-    """A checksum that combines all numbers of a range with one operation."""
+    """Parameters of a checksum that combines all numbers of a range by addition or XOR."""
 
     operation: Literal["sum", "xor"]
     bits: int = 8
@@ -49,13 +49,13 @@ class FoldSpec(NamedTuple):
     """Width of the numbers in bits; the last number is padded with zeros."""
     complement: Literal["none", "ones", "twos"] = "none"
     mask: int | None = None
-    """Mask that selects the bits of the result; None: all bits."""
+    """Mask that selects the bits of the result; None selects all bits."""
     added: int = 0
     """Number to add to the result after masking."""
     ored: int = 0
-    """Mask of the bits to set in the result as the last step."""
+    """Bits that the last step sets in the result."""
     is_odd_xored: bool = False
-    """For 16-bit numbers: whether an unpaired last byte is combined by XOR."""
+    """Whether an unpaired last byte of 16-bit numbers is combined by XOR."""
 
 
 FOLDED: Final = {
@@ -83,7 +83,7 @@ def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
         return name
     if name in FOLDED:
         return FOLDED[name]
-    from anycrc import aliases, models  # 14 ms that only a driver with a CRC pays
+    from anycrc import aliases, models  # takes 14 ms, so only drivers with a CRC import it
 
     upper = name.upper()
     model = models.get(aliases.get(upper, upper)) if name == name.lower() else None
@@ -131,7 +131,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
     builtin = _BUILT_IN.get(spec)
     if builtin is not None:
         return builtin
-    from anycrc import CRC  # 14 ms that only a driver with such a checksum pays
+    from anycrc import CRC  # takes 14 ms, so only drivers with such a checksum import it
 
     compute: Compute = CRC(*spec).calc
     return compute

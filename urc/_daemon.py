@@ -1,7 +1,7 @@
 """Execution of blocking work in a daemon thread, without delaying the event loop or process exit.
 
-A closing event loop waits for the threads of `asyncio.to_thread`. A repository that does not answer
-for two minutes must not delay Ctrl-C by two minutes.
+A closing event loop waits for the threads of `asyncio.to_thread`. With `asyncio.to_thread`, a
+repository that does not respond for two minutes would delay Ctrl-C by two minutes.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
     """Start `work` in a new thread; return a future for the result or exception.
 
-    Cancelling the future does not stop the thread, but discards the result of the thread.
+    Cancelling the future discards the thread's result but does not stop the thread.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[_T] = loop.create_future()
@@ -29,7 +29,7 @@ def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
         if fault is not None:
             future.set_exception(fault)
         else:
-            future.set_result(result)  # type: ignore[arg-type]  # without a fault there is one
+            future.set_result(result)  # type: ignore[arg-type]  # a result is set
 
     def run() -> None:
         result: _T | None = None

@@ -12,7 +12,7 @@ DATA_DIR: Final = "URC_DATA_DIR"
 TOKEN: Final = "URC_TOKEN"  # noqa: S105 - the name of a variable
 REAL_TIME: Final = "URC_REAL_TIME"
 SETTING: Final = "URC_SET_"
-"""Start of the names of all variables that hold a setting of a robot."""
+"""Name prefix of all variables that contain a robot's setting."""
 
 VARIABLES: Final[Mapping[str, str]] = {
     DATA_DIR: "Data folder with people, keys, packages, settings and logs. `--data-dir` overrides"
@@ -23,7 +23,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     " `--server`.",
     REAL_TIME: "`no` disables the real-time priority of the guard.",
 }
-"""Meaning of each variable of URC."""
+"""Meaning of each URC variable, by name."""
 SYSTEM: Final[Mapping[str, str]] = {
     "DISPLAY": "Without `DISPLAY` and `WAYLAND_DISPLAY`, `urc demo` opens no browser on Linux.",
     "LOCALAPPDATA": "On Windows, the folder of the default data folder.",
@@ -31,4 +31,4 @@ SYSTEM: Final[Mapping[str, str]] = {
     "SSH_AUTH_SOCK": "The SSH agent with the keys of transports with `agent: true`.",
     "XDG_DATA_HOME": "On Linux, the folder of the default data folder.",
 }
-"""Effect of variables that other programs use as well."""
+"""Effect on URC of variables that other programs also use."""

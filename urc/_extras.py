@@ -1,7 +1,7 @@
-"""Optional packages: the command that adds the packages of an extra to this installation.
+"""Optional packages: the command that installs the packages of an extra.
 
-Messages name packages, not ``urc[extra]``: pip would look for `urc` itself in the index, although
-this URC may come from a file or a checkout.
+Messages name the packages instead of ``urc[extra]``. For ``urc[extra]``, pip would search the index
+for `urc` itself, even if this URC was installed from a file or a checkout.
 """
 
 import os
@@ -17,12 +17,12 @@ _IN_EXTRA = re.compile(r"""extra\s*==\s*['"]([a-z0-9-]+)['"]""")
 
 
 def missing(feature: str, package: str, extra: str) -> str:
-    """Return the message that a feature needs a package, with the command that installs it.
+    """Return a message with the missing package of a feature and its install command.
 
     Args:
         feature: subject and verb, such as ``mqtt needs``.
         package: distribution name of the package.
-        extra: extra of URC with this package.
+        extra: URC extra that contains the package.
     """
     return f"{feature} the package {package}: {install_command(extra)}"
 
@@ -48,7 +48,7 @@ def packages_of(extra: str) -> list[str]:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that adds the packages of an extra to this URC."""
+    """Return the command that installs the packages of an extra for this URC."""
     quote = '"{}"'.format if os.name == "nt" else "'{}'".format
     packages = " ".join(quote(one) for one in packages_of(extra) or [f"urc[{extra}]"])
     if Path(sys.prefix, "pipx_metadata.json").is_file():
@@ -60,7 +60,7 @@ def install_command(extra: str) -> str:
 
 
 def _shown(path: str) -> str:
-    """Return a path as a word of a command, relative to the current folder if it is inside."""
+    """Return a path quoted for a command line, relative if it is inside the current folder."""
     try:
         inside = os.path.relpath(path)
     except (ValueError, OSError):  # another drive; a deleted folder

@@ -1,8 +1,8 @@
 """Text forms of values in templates, joined lists, paths, topics and messages.
 
-Private to expressions. Equal numbers have the same text, whether received as 20 or 20.0. A number
-is written with the fewest digits that identify the number. Numbers have no exponents, because few
-robots can parse exponents.
+Private to expressions. Equal numbers have the same text, so 20 and 20.0 both become ``20``. Each
+number has the fewest digits that identify it. Numbers have no exponents, because few robots can
+parse exponents.
 """
 
 import json

@@ -1,9 +1,9 @@
 """Translation of expressions into Python source, for the supported subset of Jinja.
 
-Private to `urc.expressions`. Grammar and precedence follow Jinja ("Expressions" in the template
-designer documentation of Jinja). A custom parser can report the column of every error, and saves
-the 40 ms for the import of a template engine. `tests/unit/test_expressions.py` compares this parser
-with Jinja.
+Private to `urc.expressions`. Grammar and precedence follow the section "Expressions" of Jinja's
+template designer documentation. A custom parser can report the column of every error, and avoids
+the 40 ms import of a template engine. `tests/unit/test_expressions.py` compares this parser with
+Jinja.
 
 WARNING: the generated Python source is passed to eval. The source may contain only the `repr()` of
 constants, results of `resolve`, and names of `urc.filters.table.SCOPE`.
@@ -128,7 +128,7 @@ class _ExpressionParser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip the next token if it equals `text` outside quotes; return whether it was skipped."""
+        """Skip the next token if it is `text` without quotes; return whether it was skipped."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True
@@ -349,7 +349,7 @@ class _ExpressionParser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """Parse the argument ``('regular expression')`` of a test, and compile the argument."""
+        """Parse and compile the argument ``('regular expression')`` of a test."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":
@@ -385,7 +385,7 @@ class _ExpressionParser:
             text = f"{token.text!r} gives bytes, which only 'hex:' and 'bytes:' can send"
             raise ExpressionSyntaxError(text, token.offset)
         if token.text == "default":
-            # The only filter with a possibly missing name, so it evaluates its subject itself.
+            # The subject may be a missing name, so this filter evaluates its subject itself.
             subject = f"lambda: {subject}"
         return f"_filter_{token.text}({', '.join((subject, *arguments))})"
 

@@ -32,10 +32,9 @@ class Mark:
         self.key: Span | None = None
         self.children = {} if children is None else children
         self.origin: Any = None
-        """Document that contains the value and its children; None: the document of the parent
-        value."""
+        """Document of the value and its children; None means the parent value's document."""
         self.written: UnfilledText | None = None
-        """Original text of a computed value."""
+        """Original text of a value with substituted names; None for other values."""
 
     def copy(self, children: "dict[str | int, Mark] | None" = None) -> "Mark":
         """Return a copy of the mark, with new `children` if given."""

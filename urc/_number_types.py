@@ -19,15 +19,18 @@ class Number(NamedTuple):
 
     kind: Literal["integer", "float", "boolean", "varint", "zigzag", "bcd"]
     bits: int
-    """Width of the number in bits: 1 to 64 in ``bits:`` and packed arrays, otherwise 8 to 64 in
-    steps of 8."""
+    """Width of the number in bits.
+
+    The width is 1 to 64 in ``bits:`` and packed arrays, and 14 to 63 in steps of 7 with
+    `is_by_seven`. Otherwise, the width is 8 to 64 in steps of 8.
+    """
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
     are_words_swapped: bool = False
     """Whether the 16-bit words are in reverse order; `endian` is the byte order within each word.
     """
     is_by_seven: bool = False
-    """Whether each byte contains only seven bits of the number, after a zero bit."""
+    """Whether each byte contains a zero bit and seven bits of the number."""
 
     @property
     def size(self) -> int:
@@ -38,7 +41,7 @@ class Number(NamedTuple):
 
     @property
     def is_coded(self) -> bool:
-        """Whether the encoding is special: varint, BCD, swapped words or seven bits per byte."""
+        """Whether the encoding is varint, BCD, swapped words or seven bits per byte."""
         is_odd = self.is_variable or self.kind == "bcd"
         return is_odd or self.are_words_swapped or self.is_by_seven
 
@@ -87,7 +90,8 @@ def _odd_number(name: str) -> Number | None:
         letters: str = found[2] or found[3]
         kind: Literal["integer", "float"] = "float" if found[1] == "f" else "integer"
         endian: Literal["big", "little"] = "little" if letters.startswith("b") else "big"
-        # "badc" has words in normal order with the low byte first: reversed, it is little-endian.
+        # In "badc", the words are in normal order and each word has its low byte first, so the
+        # reverse is little-endian.
         return Number(kind, 8 * len(letters), found[1] == "i", endian, are_words_swapped=True)
     found = _SEPTETS.fullmatch(name)
     if found is None:

@@ -1,25 +1,25 @@
-r"""Regular expressions of documents, with matching in linear time.
+r"""Regular expressions in documents, matched in linear time.
 
-Only `urc.patterns` and `urc.filters.lists` use this module. The dialect of all patterns is RE2,
-without look-around and back-references. In RE2, ``$`` matches only the end of the text, and ``\d``
-only ASCII digits. A pattern runs on `re` if `_is_linear` proves linear time, because `re` is ten
-times faster for short lines. Unproven patterns run on RE2, or are refused if RE2 is not installed.
+Only `urc.patterns` and `urc.filters.lists` use this module. All patterns use the RE2 dialect, which
+has no look-around and no back-references. In RE2, ``$`` matches only the end of the text, and
+``\d`` matches only ASCII digits. A pattern runs on `re` if `_is_linear` proves linear time, because
+`re` is ten times faster for short lines. Unproven patterns run on RE2, or are refused if RE2 is not
+installed.
 
 Theory of operation: backtracking takes more than linear time only if two parts of a pattern can
-match the same characters in many ways. Every proven pattern has a start anchor, and alternatives
-with different first characters. Every repeat in a proven pattern matches a single set of
-characters, without any character that may follow the repeat.
+match the same characters in many ways. Every proven pattern has a start anchor, and its
+alternatives start with different characters. Every repeat in a proven pattern matches a single set
+of characters, and the set excludes every character that may follow the repeat.
 
-The run time of RE2 is proportional to the size of the text and to the size of the program. The
-program of a pattern contains every repeat ``{n}`` in expanded form. To limit the run time, the size
-of unproven patterns is limited. This module computes the size of a pattern from its source,
-independently of RE2.
+The run time of RE2 is proportional to the text size and to the program size. A program contains
+every repeat ``{n}`` in expanded form. A size limit for unproven patterns therefore limits the run
+time. This module computes the size of a pattern from its source, independently of RE2.
 """
 
 import re
 import warnings
 from collections.abc import Callable, Mapping
-from re import _constants, _parser  # type: ignore[attr-defined]  # no public door to the syntax tree
+from re import _constants, _parser  # type: ignore[attr-defined]  # the syntax tree is private
 from typing import Any, Final, Protocol
 
 from urc.problems import UrcError
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _OTHER_GROUP: Final = re.compile(r"\(?\?<([A-Za-z_]\w*)>")
-"""A named group as JavaScript, PCRE and .NET write it."""
+"""Pattern of a named group in the syntax of JavaScript, PCRE and .NET."""
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
 """Maximum ``n`` of a repeat ``{n}`` in RE2."""
@@ -143,14 +143,13 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
         is_over_bytes: whether the pattern matches bytes, each as one character, instead of text.
 
     Raises:
-        PatternError: the pattern is invalid or unsupported, or needs RE2 while RE2 is not
-            installed.
+        PatternError: the pattern is invalid or unsupported, or RE2 is required but not installed.
     """
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
     try:
         with warnings.catch_warnings():
-            # Python plans a new meaning for "[[", "--", "&&" in a class.
+            # Python plans a new meaning for "[[", "--" and "&&" in a character class.
             warnings.simplefilter("error", FutureWarning)
             tree = _parser.parse(text, re.ASCII)
     except FutureWarning as error:
@@ -179,7 +178,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
 
 
 def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
-    """Return a short text that matches `pattern`, with `groups` as named groups.
+    """Return a short text that matches `pattern`, with the texts of `groups` in its named groups.
 
     The caller must check that the result really matches `pattern`.
 
@@ -221,7 +220,7 @@ def can_be_empty(pattern: Pattern, name: str) -> bool:
 
 
 def _least_width(tree: Any, number: int) -> int | None:
-    """Return the minimum length of the group; None for a group outside of `tree`."""
+    """Return the minimum length of the group; None for a group outside `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return int(argument[3].getwidth()[0])
@@ -233,7 +232,7 @@ def _least_width(tree: Any, number: int) -> int | None:
 
 
 def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
-    """Return all possible characters of the group; None for a group outside of `tree`."""
+    """Return all possible characters of the group; None for a group outside `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return _letters(argument[3])
@@ -292,7 +291,7 @@ def _printable(characters: frozenset[int] | None, variant: int) -> str:
     wanted = characters or _ALL
     preferred = (*range(48, 58), *range(97, 123), *range(32, 48), *range(58, 97), *range(123, 127))
     found = [code for code in preferred if code in wanted] or [min(wanted, default=63)]
-    # The first, the last, and others between them.
+    # Variant 0 is the first character, 1 is the last, and others are in between.
     return chr(found[0 if not variant else -1 if variant == 1 else variant * 7 % len(found)])
 
 
@@ -311,7 +310,7 @@ def _check_dialect(tree: Any, text: str) -> None:
 
 
 def _parts(operation: Any, argument: Any) -> list[Any]:
-    """Return the syntax trees of the direct parts of one node."""
+    """Return the child syntax trees of one node."""
     if operation is _constants.SUBPATTERN:
         return [argument[3]]
     if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
@@ -369,7 +368,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """The pattern has no proof of linear time, but may still match in linear time."""
+    """Linear time is unproven for the pattern, but still possible."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:
@@ -391,8 +390,8 @@ def _is_linear(tree: Any, text: str) -> bool:
 def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
     """Check each item; return the possible first characters of `items` followed by `follow`.
 
-    The check runs from the last item to the first, because each item needs the possible next
-    characters.
+    The check runs from the last item to the first, because the check of an item needs the possible
+    next characters.
     """
     for operation, argument in reversed(items):
         follow = _first_of_item(operation, argument, follow)
@@ -466,5 +465,6 @@ def _characters(operation: Any, argument: Any) -> frozenset[int] | None:
             union.update(range(min(value[0], _OTHER), min(value[1], _OTHER) + 1))
         else:
             union |= _CATEGORIES[value]
-    # A negated class of some characters outside ASCII still matches all others.
+    # A negated class that contains non-ASCII characters still matches all other non-ASCII
+    # characters.
     return (_ALL - (union - {_OTHER})) if is_negated else frozenset(union)

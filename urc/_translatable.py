@@ -1,7 +1,7 @@
 """Translatable texts for people.
 
 A phrase stores the English text and the values, for later translation by `urc.web.words`.
-`scripts.translations` collects the texts to translate from the calls of `phrase`.
+`scripts.translations` collects the translatable texts from the calls to `phrase`.
 """
 
 from collections.abc import Iterable, Mapping

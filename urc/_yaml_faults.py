@@ -119,7 +119,7 @@ def _escape(at: _Clue) -> SyntaxFault | None:
     words = ("escape", "hexdecimal", "Unicode", "hexadecimal")
     if "quoted scalar" not in at.context or not any(word in at.said for word in words):
         return None
-    column = max(at.text.rfind("\\", 0, at.column + 1), 0)  # the pure parser points behind it
+    column = max(at.text.rfind("\\", 0, at.column + 1), 0)  # the pure parser points after it
     shown = at.text[column : column + 2]
     return SyntaxFault(
         at.line,
@@ -316,7 +316,7 @@ _RULES: tuple[Callable[[_Clue], SyntaxFault | None], ...] = (
 
 
 def advice(text: str, column: int, *, has_comment: bool = True) -> str:
-    """Return a hint for quoting the value at the 0-based `column` of the line `text`."""
+    """Return a hint to quote the value at the 0-based `column` of the line `text`."""
     rest = text[column:].split(" #")[0] if has_comment else text[column:]
     before = text[:column]
     if before.count("{") > before.count("}") or before.count("[") > before.count("]"):

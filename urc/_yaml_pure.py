@@ -1,7 +1,8 @@
-"""The parser of PyYAML in pure Python, with the rules of libyaml for text inside braces.
+"""PyYAML's pure Python parser, with the rules of libyaml for text inside braces.
 
-Private to `urc.source`. PyYAML ends an unquoted text at ``?`` inside ``{ }`` and ``[ ]``, so
-``{ send: MODE? }`` would be a syntax error only on machines without libyaml.
+Private to `urc.source`. Inside ``{ }`` and ``[ ]``, PyYAML's own parser ends an unquoted text at
+``?``. Without this module, ``{ send: MODE? }`` would be a syntax error only on machines without
+libyaml.
 """
 
 from typing import Any, Final
@@ -21,7 +22,7 @@ class PureParser(Reader, Scanner, Parser):
     """A parser with the events and errors of libyaml."""
 
     def __init__(self, text: str) -> None:
-        """Begin to read `text`."""
+        """Start reading `text`."""
         self._is_plain = False
         """Whether the scanner is inside an unquoted text."""
         Reader.__init__(self, text)

@@ -37,7 +37,7 @@ class DocumentLimits(NamedTuple):
 
 
 class StoppedError(Exception):
-    """Reading has stopped at an error; the last problem of the reader states the reason."""
+    """Reading stopped at an error; the reader's last problem describes the error."""
 
 
 class _Built(NamedTuple):
@@ -59,7 +59,7 @@ class TreeReader:
         self._nodes = 0
         self._path: list[str] = []
         self._anchors: dict[str, _Built | None] = {}
-        """Anchored nodes by anchor name; None for a node that is still incomplete."""
+        """Anchored nodes by anchor name; None for an incomplete node."""
 
     def read(self) -> tuple[object, Mark] | None:
         """Return the data and marks of the document; None for a text without a document.
@@ -290,7 +290,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon: the key is the rest of the text `before`, after a comma."""
+        """Report a key without a colon, which is the rest of an unquoted text after a comma."""
         self._report(
             event,
             "unquoted",
@@ -317,7 +317,7 @@ class TreeReader:
         )
 
     def _advice(self, event: Any) -> str:
-        from urc._yaml_faults import advice  # its patterns are for broken documents only
+        from urc._yaml_faults import advice  # only broken documents need its patterns
 
         return advice(self._line(event.start_mark.line), event.start_mark.column)
 

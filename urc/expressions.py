@@ -1,10 +1,10 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
-`urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
-objects, no loops, and no operator that turns a short text into a very long text. Expressions can
+`urc._grammar` defines the supported subset. Expressions run in a sandbox without attributes of
+Python objects, loops, or operators that turn a short text into a very long text. Expressions can
 call only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja
-converts CR to LF and drops a final newline. URC raises errors that Jinja hides (in Jinja, ``'abc' |
-int`` is 0), because a wrong reading must not become zero.
+converts CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong
+reading must not become zero. In Jinja, ``'abc' | int`` is 0.
 
 The result of a template with only one ``{{ expression }}`` keeps the type of the expression.
 """
@@ -42,7 +42,7 @@ NOW: Final = "now"
 """Name ``now`` in expressions: the current Unix time, in seconds."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""Functions that reveal almost nothing about the operands, such as a length."""
+"""Functions whose results, such as a length, reveal almost nothing about the operands."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Maximum length of a template, in characters."""
@@ -59,7 +59,7 @@ _INSTEAD: Final = {
 
 
 class ExpressionError(UrcError):
-    """An error in compiling a template, or in evaluating a template with given values.
+    """An error in compiling or evaluating a template.
 
     `offset` is the 0-based character position of the error in the template.
     """
@@ -115,7 +115,7 @@ class Template:
 
 
 def compile_template(text: str) -> Template:
-    """Compile a template: text with any number of ``{{ expression }}``.
+    """Compile a template, which is text with any number of ``{{ expression }}``.
 
     Raises:
         ExpressionError: the template is invalid; `offset` is the position of the error in `text`.
@@ -170,7 +170,7 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
     try:
         code = compile(f"lambda ns: {python}", f"<template {python[:60]}>", "eval")
     except (SyntaxError, RecursionError, MemoryError):
-        # Brackets of many long sums can exceed the nesting limit of the Python parser.
+        # The brackets around many long sums can exceed the nesting limit of the Python parser.
         raise ExpressionError("the expression is nested too deeply") from None
     # `python` contains only constants and names of SCOPE: see the warning in `urc._grammar`.
     function: Callable[[Mapping[str, object]], Any] = eval(code, table.SCOPE)  # noqa: S307
@@ -292,7 +292,7 @@ def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bo
         elif node.func.id == "_item" and ast.unparse(node.args[0]) == "ns['settings']":
             (digested if is_digested else shown).add(ast.literal_eval(node.args[1]))
     for inner in ast.iter_child_nodes(node):
-        # A condition between two values reveals no more than a length.
+        # Comparisons and conditions reveal no more than a length.
         is_test = isinstance(node, ast.Compare) or inner is getattr(node, "test", None)
         _sort(inner, shown, digested, is_digested=is_digested or is_test)
 

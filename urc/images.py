@@ -1,8 +1,8 @@
-"""Media type and size of an image, from its first bytes and without decoding.
+"""Media type and size of an image, read from its first bytes without decoding.
 
-A small image file may need gigabytes in a browser, so the size in pixels matters, not the file
-size. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
-9649), BMP (BITMAPINFOHEADER).
+A small image file may need gigabytes of memory in a browser, so the size in pixels matters, not the
+file size. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP
+(RFC 9649), BMP (BITMAPINFOHEADER).
 """
 
 import struct
@@ -42,14 +42,14 @@ def media_type(data: bytes) -> str:
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Return the width and height of an image in pixels; None if `data` ends before the size.
 
-    The result for AVIF is always None: the size is in nested boxes, and browsers limit the size of
-    AVIF images themselves.
+    The result for AVIF is always None, because AVIF stores the size in nested boxes. Browsers limit
+    the size of AVIF images themselves.
     """
     read = _READERS.get(media_type(data))
     try:
         return None if read is None else read(data)
     except (struct.error, IndexError):
-        return None  # truncated: no browser decodes it either
+        return None  # truncated, so no browser can decode the image
 
 
 def pixels(data: bytes) -> int:
@@ -75,10 +75,10 @@ def _bmp(data: bytes) -> tuple[int, int]:
 
 def _webp(data: bytes) -> tuple[int, int] | None:
     kind = data[12:16]
-    if kind == b"VP8X":  # two numbers of 24 bits, less one
+    if kind == b"VP8X":  # width - 1 and height - 1, 24 bits each
         width, height = data[24:27], data[27:30]
         return int.from_bytes(width, "little") + 1, int.from_bytes(height, "little") + 1
-    if kind == b"VP8L":  # after one byte, two numbers of 14 bits, less one
+    if kind == b"VP8L":  # after one byte: width - 1 and height - 1, 14 bits each
         (bits,) = struct.unpack_from("<I", data, 21)
         return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
     if kind == b"VP8 ":  # after the frame tag and the start code

@@ -21,8 +21,8 @@ __all__ = [
 
 Severity = Literal["error", "warning"]
 
-# Control characters including C1, characters that reorder the text of a terminal, and line ends:
-# the text of a robot must not be able to fake a line. Lone surrogates cannot be encoded at all.
+# Control characters including C1, characters that reorder a terminal's text, and line ends. Text
+# from a robot must not imitate a line of URC's output. Lone surrogates cannot be encoded.
 _CONTROLS = (*range(0x20), *range(0x7F, 0xA0))
 _MARKS = (0x061C, 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
 _HALVES = range(0xD800, 0xE000)
@@ -67,7 +67,7 @@ class Problem(NamedTuple):
     path: str = ""
     """Path in the document, such as ``transports.wire.port``."""
     hint: str = ""
-    """Suggested correction; "": no suggestion."""
+    """Suggested correction; "" without a suggestion."""
     source: str = ""
     """Source line, shown above the caret."""
     severity: Severity = "error"
@@ -91,7 +91,7 @@ def printable_json(text: str) -> str:
 
 
 def has_errors(problems: Iterable[Problem]) -> bool:
-    """Return whether any problem is an error, not only a warning."""
+    """Return whether any problem is an error rather than a warning."""
     return any(problem.severity == "error" for problem in problems)
 
 
@@ -127,7 +127,8 @@ def _excerpt(problem: Problem, width: int = 96) -> list[str]:
     left = max(0, start - width // 2) if len(problem.source) > width else 0
     shown = problem.source[left : left + width]
     before, marked = shown[: start - left], shown[start - left : end - left]
-    # Escapes are wider than the original characters, so place the caret after escaping.
+    # Escape sequences are wider than the original characters, so the caret is placed after
+    # escaping.
     caret = " " * len(printable(before)) + "^" * max(1, len(printable(marked)))
     gutter = f"{problem.line:>5} | "
     return [gutter + printable(shown), " " * (len(gutter) - 2) + "| " + caret]

@@ -62,7 +62,7 @@ class Table:
         if self._is_complete:
             return
         self._is_complete = True
-        from importlib.metadata import entry_points  # 20 ms: only when a name is not built in
+        from importlib.metadata import entry_points  # 20 ms, so only for unknown names
 
         for point in entry_points(group=self.group):
             self._rows.setdefault(point.name, RegistryEntry(point.name, point.value))

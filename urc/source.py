@@ -31,8 +31,8 @@ Path = tuple[str | int, ...]
 """Path of a value in a document: keys and list indices, from the root."""
 
 _LIMITS: Final = DocumentLimits()
-# Line ends as in the YAML reader, so that marks count the same lines. The Unicode patterns take
-# milliseconds to compile, so only texts that need them do so.
+# These patterns and the YAML reader use the same line ends, so marks count the same lines. The
+# Unicode patterns take milliseconds to compile, so they are compiled only for texts that need them.
 _LINE_END = re.compile("\r\n|[\r\n]")
 _LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -43,8 +43,7 @@ _ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
 class Document:
     """The content of one file, with the position of every key and value. Immutable after reading.
 
-    Parts of the data may originate from other documents; `source_of` returns the document of a
-    value.
+    Parts of the data may be from other documents; `source_of` returns the document of a value.
     """
 
     __slots__ = ("data", "file", "lines", "mark", "problems", "text")
@@ -174,7 +173,7 @@ def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
     wants_key = key or is_inside or mark.style == "{"
     if wants_key and mark.key is not None and (key or "{" in mark.style):
         return mark.key
-    # The end of a mapping or list is not useful; underline its first character.
+    # The end of a mapping or list is not useful, so only the first character is underlined.
     return mark.span._replace(end_line=0) if mark.style == "{" else mark.span
 
 
@@ -211,7 +210,7 @@ def parse_document(content: bytes | str, file: str, limits: DocumentLimits = _LI
         problems.append(_syntax_problem(error, file, lines))
     if reader is not None:
         told = {problem.line for problem in reader.problems}
-        # An unquoted value often breaks the parser further on; one problem per line is enough.
+        # An unquoted value often causes a later parser error, and one problem per line is enough.
         problems = [*reader.problems, *(p for p in problems if p.line not in told)]
     if has_errors(problems):
         raise ProblemsError(sorted(problems, key=lambda found: (found.line, found.column)))

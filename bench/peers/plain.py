@@ -1,6 +1,6 @@
-"""A page written by hand for one robot: ``python plain.py ROBOT_PORT``.
+"""A hand-written page for one robot: ``python plain.py ROBOT_PORT``.
 
-The server forwards each line of the robot immediately to the page's WebSocket; the page shows the
+The server forwards each line from the robot to the page's WebSocket immediately. The page shows the
 line in its next frame.
 """
 
@@ -26,7 +26,7 @@ new WebSocket(`ws://${location.host}/ws`).onmessage = ({ data }) => {
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Reply with the page to every request other than a WebSocket handshake."""
+    """Return the page for every request except a WebSocket handshake."""
     if request.path == "/ws":
         return None
     headers = Headers({"Content-Type": "text/html", "Content-Length": str(len(PAGE))})

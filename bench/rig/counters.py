@@ -1,4 +1,4 @@
-"""Robots driven over UDP, with polls on the same frame counter.
+"""Robots driven over UDP, whose polls use the same frame counter.
 
 Each robot is a socket that stores received frames in order and answers polls. A session with a
 guard drives the robots. Each gesture uses a separate connection. A control is held for some
@@ -130,7 +130,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control permanently and another at times; then release both, or stop sending."""
+    """Hold one control throughout and another at times; then release both, or stop sending."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
     controller.join(Operator("hand", "hand", "drive"))
     controller.attach(session)

@@ -1,4 +1,4 @@
-"""Cuts of the link between server and driven robots.
+"""Cuts of the link between the server and the driven robots.
 
 Each motion value is the send time of its tick, so the robot knows the age of received motion. One
 rig has robots on every kind of transport. A cut affects the whole link or the link of a single
@@ -48,7 +48,7 @@ class Cut(NamedTuple):
     kind: str
     lasted_s: float
     was_held: bool
-    """Whether the control was held during the whole cut; if False, the control was released."""
+    """Whether the control was held during the whole cut; False: it was released during the cut."""
     oldest_ms: float
     """Age of the oldest motion received after the cut, in milliseconds; 0 without motion."""
     stop_ms: float
@@ -76,7 +76,7 @@ class Cut(NamedTuple):
 
     @property
     def is_good(self) -> bool:
-        """Whether the robot's motion complied with the motion contract."""
+        """Whether the robot moved in accordance with the motion contract."""
         is_stopped = self.stop_ms <= self.bounds.stop_ms or not self.is_stop_needed
         is_fresh = self.oldest_ms <= self.bounds.oldest_ms
         return self.was_moving and not self.fault and is_fresh and is_stopped
@@ -151,7 +151,7 @@ class CutRig:
 
     @property
     def indexes(self) -> range:
-        """Indexes of all robots of the rig."""
+        """Indexes of all robots in the rig."""
         return range(len(self.kinds))
 
     def port(self, index: int) -> int:
@@ -174,7 +174,7 @@ class CutRig:
         Args:
             index: index of the robot in the rig.
             seconds: length of the cut.
-            share: share of the cut before the release of the control, in every second cut.
+            share: in every second cut, the fraction of the cut before the control's release.
         """
         for _ in range(ATTEMPTS - 1):
             try:
@@ -184,9 +184,9 @@ class CutRig:
         return self._trial((index,), seconds, f"cut {self.port(index)}", share)[0]
 
     def drive_once(self, index: int, life_s: float) -> None:
-        """Let a page drive and release a robot.
+        """Make a page drive and release a robot.
 
-        The page continues to run and keeps the controls.
+        The page continues to run and stays in control.
         """
         began_ns = time.monotonic_ns()
         number = self._drive(index, life_s)
@@ -228,7 +228,7 @@ class CutRig:
         return cuts
 
     def _drive(self, index: int, life_s: float = 120.0) -> int:
-        """Let a page drive a robot; return the page's number."""
+        """Make a page drive a robot; return the page's number."""
         with self._lock:
             self._numbers += 1
             number = self._numbers
@@ -286,7 +286,7 @@ class CutRig:
         ages_ms = [
             (one.time_ns - int(one.text[2:]) * 1000) / 1e6 for one in heard if one.text != "M 0"
         ]
-        # After a cut of one direction, the stop may also have come before the end of the cut.
+        # After a cut of one direction, the stop may also have arrived before the end of the cut.
         before = [one for one in all_heard if one.time_ns <= healed_ns]
         if not stops and before and before[-1].text == "M 0":
             stop_ms = 0.0

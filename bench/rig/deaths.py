@@ -25,13 +25,13 @@ LINK_DEATHS = ("black-hole", "interface-down")
 """Kinds of loss that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""Time after the restoration of the link without any motion to the robot, in seconds."""
+"""Time after the link's restoration in which no motion may reach the robot, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Time, in nanoseconds, after which the waits of a process for a processor are measured."""
+"""Longest delay until a process's wait for a processor is reported, in nanoseconds."""
 WITNESSES = 2
-"""Number of idle programs that measure late wake-ups, because the server has similar delays."""
+"""Number of idle programs that measure late wake-ups, as an estimate of the server's delays."""
 
 _PROFILE = """\
 urc: 1
@@ -50,7 +50,7 @@ commands:
 
 
 def robot_profile(index: int, host: str, port: int, kind: str = "tcp") -> str:
-    """Return the document of one robot of the rig: ``M TIME`` moves it, ``M 0`` stops it."""
+    """Return the document of one of the rig's robots: ``M TIME`` moves it, ``M 0`` stops it."""
     framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
     return _PROFILE.format(index=index, kind=kind, host=host, port=port, framing=framing)
 
@@ -66,8 +66,9 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    The value is the latest wake-up of an idle program or robot, or the server's or a guard's
-    longest wait for a processor.
+    The value is the sum of two delays. One is the latest wake-up of the robots' process. The other
+    is the latest wake-up of an idle program or the longest processor wait of the server or a guard,
+    whichever is larger.
     """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
@@ -105,7 +106,7 @@ class Rig:
 
         Args:
             folder: folder for the robots' documents and the server's data.
-            robot_count: number of robots, and number of parallel pages.
+            robot_count: number of robots and of parallel pages.
             has_relay: whether a relay connects pages and server; a relay needs root.
             options: additional options of ``urc serve``.
             inside: command prefix that starts the server in another network namespace.
@@ -137,7 +138,7 @@ class Rig:
             raise
 
     def _watch(self) -> None:
-        """Tell the robots' process to measure the processor waits of the server and its guards."""
+        """Start a program that measures the processor waits of the server and its guards."""
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
@@ -154,7 +155,7 @@ class Rig:
         self._programs.close()
 
     def bout(self, death: str) -> list[Trial]:
-        """Drive each robot by one page and let all pages vanish; return the results."""
+        """Drive each robot from one page, and make all pages vanish; return the results."""
         began_ns = time.monotonic_ns()
         pages = self._begin(death)
         self._let_die(death, pages)
@@ -173,7 +174,7 @@ class Rig:
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
-        """Send orders to the relay, for example for delay or loss."""
+        """Send orders to the relay, such as a delay or a loss."""
         self._link().do(*orders)
 
     def drive(
@@ -186,15 +187,15 @@ class Rig:
         key: str | None = None,
         cookie: str = "",
     ) -> int:
-        """Let a page drive a robot until the page vanishes; return the page's number.
+        """Make a page drive a robot until the page vanishes; return the page's number.
 
         Args:
             index: number of the robot.
             death: way of vanishing, as in `bench.rig.operator_process.Plan`.
-            drive_s: duration of driving before, in seconds.
+            drive_s: time of driving before the page vanishes, in seconds.
             has_spare: whether the page has a second connection.
             key: token of the page; None: the start key.
-            cookie: cookie of a sign-in, in place of a token.
+            cookie: cookie of a sign-in, instead of a token.
         """
         self._numbers += 1
         key = self.server.key if key is None else key
@@ -220,7 +221,7 @@ class Rig:
             self._link().do("down a")
 
     def _heal(self, death: str, pages: Mapping[int, int]) -> None:
-        """Restore the link; queued data of the pages then arrives, but must not move a robot."""
+        """Restore the link; the pages' queued data then arrives, but must not move a robot."""
         if death == "black-hole":
             self._link().do(*(f"heal {self.operators.news['port', one]}" for one in pages.values()))
         elif death == "interface-down":
@@ -262,7 +263,7 @@ class Rig:
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
 
     def late_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay of all processes that are needed for a stop, in milliseconds."""
+        """Return the largest delay of the processes involved in a stop, in milliseconds."""
         others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
         kept_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
         return self.robots.latest_ms(from_ns, until_ns) + max(others, kept_ms)

@@ -10,9 +10,9 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""Time limit for the replacement of a killed guard, in ms; the new guard first sends a stop."""
+"""Time limit for replacing a killed guard, in ms; the new guard first sends a stop."""
 OPEN_MS = 100.0
-"""Additional time for reconnecting and for the transfer, in ms."""
+"""Additional time for the new connection and the transfer, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 
@@ -27,7 +27,7 @@ class EngineRig(Rig):
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
-            self.operators.await_told("dying", number)  # it has driven, and continues
+            self.operators.await_told("dying", number)  # the page has driven, and continues
         told = len(self.server.lines)
         self._strike(death)
         heard = {index: self._await_stop(index, began_ns) for index in pages}

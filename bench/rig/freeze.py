@@ -1,4 +1,4 @@
-"""Trials of driven robots with a program that is frozen for some seconds.
+"""Trials in which a driven robot's program freezes for some seconds.
 
 The robot's program is separate (`bench.rig.robot_process`). Signals suspend and resume this
 program, while its kernel still accepts bytes. A session with a guard drives the robot. Each motion
@@ -62,13 +62,13 @@ class Freeze(NamedTuple):
     stop_ms: float
     """Time from the end of the freeze to the stop, in milliseconds; `inf` without a stop."""
     is_last: bool
-    """Whether no data arrived after the stop."""
+    """Whether nothing arrived after the stop."""
     late_ms: float
     """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
     """Whether the robot moved at the start of the freeze.
 
-    On a slow machine, an expired lease may have stopped the robot before.
+    On a slow machine, an expired lease may have stopped the robot already.
     """
     limit_ms: float = STOP_MS
     """Longest allowed `stop_ms`."""
@@ -142,7 +142,7 @@ async def _queue(
 
 
 class _Pause:
-    """A freeze of the robot's program."""
+    """Freezes the robot's program."""
 
     limit_ms = STOP_MS
 
@@ -150,7 +150,7 @@ class _Pause:
         self.robots, self._lasts_s = robots, lasts_s
 
     async def __call__(self) -> tuple[int, int]:
-        """Return begin and end of the freeze, in nanoseconds."""
+        """Return the start and end times of the freeze, in nanoseconds."""
         self.robots.signal(signal.SIGSTOP)
         frozen_ns = time.monotonic_ns()
         await asyncio.sleep(self._lasts_s)
@@ -160,7 +160,7 @@ class _Pause:
 
 
 class _Death:
-    """The death of the robot's program, and a new program at the same port."""
+    """Kills the robot's program, and starts a new one on the same port."""
 
     limit_ms = REVIVED_MS
 
@@ -168,7 +168,7 @@ class _Death:
         self.robots, self._lasts_s, self._place = robots, lasts_s, place
 
     async def __call__(self) -> tuple[int, int]:
-        """Return the times of the death and of the new start, in nanoseconds."""
+        """Return the times of the kill and of the restart, in nanoseconds."""
         self.robots.signal(signal.SIGKILL)
         killed_ns = time.monotonic_ns()
         await asyncio.to_thread(self.robots.close)
@@ -215,7 +215,7 @@ async def _hold(session: Session) -> None:
     assert session.backend is not None
     while True:
         now_ns = time.monotonic_ns()
-        with suppress(UrcError):  # the connection is closed, but the hand continues
+        with suppress(UrcError):  # the connection is closed, but the operator continues
             session.backend.tick(
                 "go", session.frames.motion_frame("go", {"t": now_ns // 1000}, 0.0)
             )

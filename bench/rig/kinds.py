@@ -2,7 +2,7 @@
 
 Each kind defines the robot's address (see `bench.rig.robot_process`), its document, and limits
 after a cut. If a connection reopens immediately, no motion older than 300 ms may arrive, and the
-stop must arrive within 100 ms. Slow or undetected reconnects have other limits.
+stop must arrive within 100 ms. Slow or undetected reconnections have other limits.
 """
 
 import shutil
@@ -61,7 +61,7 @@ def bounds_of(kind: str) -> Bounds:
         return Bounds(300.0, 0, 100.0, 0.45)
     if kind == "udp":
         return Bounds(300.0, 0, 100.0, float("inf"), is_told=False, is_repeated=True)
-    # At most one late motion, no older than a second, and the fastest possible reconnect.
+    # At most one late motion, at most a second old, and the fastest possible reconnection.
     return Bounds(1000.0, 1, 1000.0, 1.3, is_repeated=kind != "ssh")
 
 
@@ -114,7 +114,7 @@ class Counterpart(Program):
         """Run `command`, and wait until it listens on `port`."""
         self.port = port
         self.options: dict[str, str] = {}
-        """Values for the placeholders of the robot's document."""
+        """Values for the placeholders in the robot's document."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
         # Killed by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
@@ -149,7 +149,7 @@ def start_counterpart(
 ) -> Counterpart | None:
     """Start the third-party program for a robot of this kind.
 
-    Return None for kinds without a program.
+    Return None for kinds that need no program.
     """
     if kind == "mqtt":
         return _broker(FIRST_PORT[kind] + index, folder / f"broker-{index}.conf", inside)
@@ -190,7 +190,7 @@ def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
         "PrintMotd no\nPrintLastLog no\nLogLevel ERROR\nUseDNS no\n",
         "utf-8",
     )
-    Path("/run/sshd").mkdir(mode=0o755, exist_ok=True)  # it refuses to start without
+    Path("/run/sshd").mkdir(mode=0o755, exist_ok=True)  # sshd refuses to start without it
     program = shutil.which("sshd") or "/usr/sbin/sshd"
     command = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", _ENTER, "sh"]
     made = Counterpart([*command, str(folder), program], inside=inside, port=port)

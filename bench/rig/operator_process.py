@@ -1,9 +1,9 @@
 """Operators at pages that vanish in several ways: a separate program without imports from URC.
 
 The program reads plans from standard input, one JSON object on each line, and forks a process for
-each plan. The process acts like a page: it takes the controls, sends a tick every 50 ms, and
-vanishes as planned. For each event, the process prints one line, with times of the monotonic clock
-in nanoseconds::
+each plan. The process acts like a page: it takes control, sends a tick every 50 ms, and vanishes as
+planned. For each event, the process prints one line, with times from the monotonic clock in
+nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
     port NUMBER PORT        its source port, for cuts by a relay
@@ -12,8 +12,8 @@ in nanoseconds::
     failed NUMBER TEXT      it could not drive
     ended NUMBER TIME       it was killed by order, a plan ``{"kill": NUMBER}``
 
-The value of every tick is its send time in microseconds, so a robot knows the age of each tick.
-When its standard input closes, the program ends, and kills every forked process.
+The value of every tick is its send time in microseconds, so a robot can compute the tick's age.
+When its standard input closes, the program kills every forked process and ends.
 """
 
 import base64
@@ -47,19 +47,19 @@ class Plan(NamedTuple):
     death: str
     """Way of vanishing: ``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``.
 
-    With ``outside``, the page continues to drive while another program cuts the link. With
-    ``flood``, the page sends a thousand ticks a second.
+    With ``outside``, the page keeps driving while another program cuts the link. With ``flood``,
+    the page sends a thousand ticks a second.
     """
     drive_s: float
-    """Duration of driving before the page vanishes, in seconds."""
+    """Time of driving before the page vanishes, in seconds."""
     life_s: float = 120.0
-    """Longest time for which the page's process continues to run, in seconds."""
+    """Longest run time of the page's process, in seconds."""
     command: str = "go"
     argument: str = "t"
     key: str = ""
-    """Start key of the server, or a token; "" for a page without either."""
+    """Start key of the server, or a token; "" for neither."""
     cookie: str = ""
-    """Cookie of a sign-in, ``name=secret``; "" for a page without a cookie."""
+    """Cookie of a sign-in, ``name=secret``; "" for no cookie."""
     has_spare: bool = False
     """Whether the page also sends held controls on a second connection."""
 
@@ -117,7 +117,7 @@ class Page:
         self._sort()  # the first messages may have arrived with the handshake
 
     def say(self, message: dict[str, Any]) -> bool:
-        """Send a message if possible without waiting; return whether the message was sent."""
+        """Send a message if this requires no wait; return whether it was sent."""
         return self._frame(1, json.dumps(message).encode())
 
     def close(self) -> None:
@@ -248,7 +248,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return opcode and payload of the first frame, and the remaining data, or None."""
+    """Return the first frame's opcode and payload, and the remaining data, or None."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -332,13 +332,13 @@ def start(plan: Plan) -> int:
 
 
 def _end_with_parent() -> None:
-    """Let the kernel kill this process with its parent; a frozen process can't end itself."""
+    """Make the kernel kill this process with its parent; a frozen process can't end itself."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _reap(children: dict[int, int]) -> None:
-    """Forget ended processes, because process ids may soon be reused."""
+    """Remove ended processes from the list, because process ids may soon be reused."""
     for number, child in list(children.items()):
         if os.waitpid(child, os.WNOHANG)[0]:
             del children[number]

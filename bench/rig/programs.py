@@ -1,7 +1,7 @@
 """The programs of the test rig: robots, operators, a network, and a real server.
 
-Each program is a separate process. All programs timestamp events by the machine's monotonic clock,
-so their times can be compared. A program ends when its standard input closes, so no program
+Each program is a separate process. All programs timestamp events with the machine's monotonic
+clock, so the times are comparable. A program ends when its standard input closes, so no program
 outlives the test that started it.
 
 Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
@@ -40,7 +40,7 @@ READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
 PATIENCE_S = 25.0
-"""Timeout in seconds for a page to get the controls and drive; the page itself gives up earlier.
+"""Timeout in seconds for a page to take control and drive; the page's own timeout is shorter.
 """
 
 
@@ -164,7 +164,7 @@ def peer(script: str, *arguments: object) -> Iterator[int]:
 
 
 def _script(name: str, *arguments: str) -> list[str]:
-    # -P: else its own folder is first on the path, with names of the standard library.
+    # -P: otherwise, its own folder is first on the path, with names of the standard library.
     # -S: only the server of Foxglove needs installed packages.
     flags = "-PE" if name == "foxglove_process.py" else "-PSE"
     return [sys.executable, flags, str(HERE / name), *arguments]
@@ -209,7 +209,7 @@ class Robots(Program):
             self.visits[int(words[1])].append((int(words[2]), words[0] == "open"))
 
     def since(self, robot: int, time_ns: int) -> list[Heard]:
-        """Return the lines that a robot has received since the time `since`."""
+        """Return the lines that a robot has received since `time_ns`."""
         with self.changed:
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
@@ -230,11 +230,11 @@ class Robots(Program):
 
 
 class Operators(Program):
-    """Pages that vanish; see `bench.rig.operator_process`."""
+    """Pages that vanish in different ways; see `bench.rig.operator_process`."""
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """Rest of each line reported by a page, by word and number of the plan."""
+        """Remaining text of each report, by the report's first word and the plan's number."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
@@ -245,7 +245,7 @@ class Operators(Program):
             self.news[word, int(number)] = rest
 
     def start(self, plan: Mapping[str, object]) -> None:
-        """Start a page with a plan; `plan` contains fields of `operator_process.Plan`."""
+        """Start a page; `plan` contains fields of `operator_process.Plan`."""
         self.order(json.dumps(plan))
 
     def await_told(self, word: str, number: int, timeout_s: float = PATIENCE_S) -> str:
@@ -333,7 +333,7 @@ class Server(Program):
 
     @property
     def guards(self) -> list[int]:
-        """Process ids of all guards of the server."""
+        """Process ids of all the server's guards."""
         found = Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text("ascii").split()
         return [int(child) for child in found if _is_guard(child)]
 

@@ -9,7 +9,7 @@ reports on standard output::
     ready FD_A FD_B         descriptors of the two namespaces in this process
     done TIME               the last order was executed, monotonic nanoseconds
 
-Orders on standard input, one for each line, with times in milliseconds::
+Orders on standard input, one per line, with times in milliseconds::
 
     delay MS | jitter MS | loss PERCENT
     cut | heal              the whole link
@@ -65,13 +65,13 @@ class Weather:
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """For each side, whether all packets from this side are lost."""
+    """For each side, whether all its packets are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """Blocked ports of each side: packets from this side that use one of these ports are lost."""
+    """Blocked ports of each side. A side's packets to or from a blocked port are lost."""
 
 
 def made(name: str) -> Side:
-    """Move this process into a new namespace; return the end of the link with its active device."""
+    """Move this process into a new namespace; return its end of the link, with an active device."""
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
         raise OSError(ctypes.get_errno(), "cannot create a network namespace; this needs root")
     tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
@@ -91,7 +91,7 @@ def _address(control: socket.socket, request: int, address: str) -> None:
 
 
 def switch(side: Side, device: bytes, *, is_up: bool) -> None:
-    """Switch an interface of a side on or off."""
+    """Switch a side's interface on or off."""
     answer = fcntl.ioctl(side.control, SIOCGIFFLAGS, struct.pack("16sh14x", device, 0))
     flags = struct.unpack("16sh14x", answer)[1]
     flags = flags | IFF_UP if is_up else flags & ~IFF_UP

@@ -19,7 +19,7 @@ from urc.access.store import AccessStore
 __all__ = ["REVOKED_BOUND_MS", "REVOCATIONS", "RevocationRig"]
 
 REVOCATIONS: Final = ("person", "device", "role", "token")
-"""Ended rights: a removed person, a removed device of a person, a lowered role, a token."""
+"""Ways to end a right: remove a person, remove a person's device, lower a role, or end a token."""
 REVOKED_BOUND_MS: Final = 300.0
 """Longest time from the revocation to the first byte of the stop, in milliseconds."""
 _KNOWN_S: Final = 10.0

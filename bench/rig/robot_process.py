@@ -15,7 +15,7 @@ of the monotonic clock in nanoseconds::
     waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
                             ``pid:NUMBER`` watches a process and its children
 
-The program ends when its standard input closes, so it ends with its parent.
+The program ends when its standard input closes, and therefore with its parent.
 """
 
 import base64
@@ -222,14 +222,14 @@ def dialled(host: str, port: int) -> socket.socket:
 
 
 class Others:
-    """A process and its children, with the times that each process waits for a processor."""
+    """A process and its children, with the time that each process waits for a processor."""
 
     def __init__(self, process: str) -> None:
         self._process = process
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
-        """Return processes that have waited since the last check, with durations in nanoseconds."""
+        """Return the processes that waited since the last check, with wait times in nanoseconds."""
         found: list[tuple[str, int]] = []
         with contextlib.suppress(OSError):  # the process has ended
             with open(f"/proc/{self._process}/task/{self._process}/children") as children:

@@ -1,8 +1,8 @@
 """Random ROS messages and their bytes, made by the library rosbags.
 
-rosbags, by Ternaris, is independent of URC: a type store of ROS 2, and serialization in CDR and in
-the format of ROS 1. The values of a message are compared as plain data, as URC reads them. Numbers
-that are not finite become None, and arrays of ``uint8`` become bytes.
+rosbags, by Ternaris, is independent of URC. It has a type store of ROS 2, and serializes to CDR and
+to the format of ROS 1. The values of a message are compared as plain data, as URC reads them.
+Non-finite numbers become None, and arrays of ``uint8`` become bytes.
 """
 
 import math
@@ -54,7 +54,7 @@ _CONSTANTS: Final = {
     for store in (ROS2, ROS1)
     for name, kind in store.types.items()
 }
-"""Names that are no fields, by class; rosbags declares constants like fields."""
+"""Names to exclude from the fields, by class; rosbags declares constants like fields."""
 _TIMES: Final = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _LETTERS: Final = "abcdefghijklmnopqrstuvwxyz_/ 0123456789äß€漢😀"
 _STRANGE: Final = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e308, 5e-324)
@@ -70,7 +70,7 @@ class RandomMessages:
 
     def message(self, name: str) -> Any:
         """Return a random message of a type, as an object of rosbags."""
-        if name in _TIMES:  # rosbags knows only the times of ROS 2, which have another sign
+        if name in _TIMES:  # rosbags supports only the times of ROS 2, which have a different sign
             return self._store.types[name](self._dice.randrange(2**31), self._dice.randrange(10**9))
         described = self._store.fielddefs[name][1]
         values = {field: self._value(kind) for field, kind in described}
@@ -120,7 +120,7 @@ class RandomMessages:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of rosbags as plain data."""
+    """Return a rosbags value as plain data."""
     if isinstance(value, numpy.ndarray):
         if value.dtype == numpy.uint8:
             return value.tobytes()

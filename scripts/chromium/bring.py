@@ -1,8 +1,8 @@
-"""The installation of Chromium from npm, for Linux x64 machines without a browser and without root.
+"""Install Chromium from npm, for Linux x64 machines without a browser and without root access.
 
-The npm package is intended for cloud functions. The package contains brotli archives of the
-browser, its libraries, fonts and a software renderer. The archives are unpacked once into the
-user's cache, together with a launcher that sets the paths of libraries and fonts.
+The npm package is intended for cloud functions. It contains brotli archives of the browser, its
+libraries, fonts and a software renderer. The archives are unpacked once into the user's cache,
+together with a launcher that sets the library and font paths.
 """
 
 import hashlib
@@ -53,7 +53,7 @@ FONTS_CONF = """<?xml version="1.0"?>
 
 
 class BringError(Exception):
-    """A failed installation of the browser from npm; the message is one line."""
+    """The browser could not be installed from npm; the message is one line."""
 
 
 def bring_chromium() -> str:

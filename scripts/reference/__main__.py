@@ -1,4 +1,4 @@
-"""The generator of the reference: `python -m scripts.reference` writes docs/reference/.
+"""Generate the reference: `python -m scripts.reference` writes docs/reference/.
 
 A test fails if a page is outdated. The same code and schemas produce the same bytes everywhere.
 """

@@ -15,7 +15,7 @@ _EXIT = "Exit codes: 0 for success, 1 for problems or failure, 2 for wrong use."
 
 
 def page() -> str:
-    """Return the page: one section for each subcommand, one for each option."""
+    """Return the page: one section for each subcommand and each option."""
     lines = ["# Command line", "", "All subcommands of `urc` and their options.", "", _EXIT, ""]
     lines += ["| subcommand | does |", "|---|---|"]
     lines += [f"| [`urc {verb}`](#urc-{verb}) | {text} |" for verb, text in VERBS.items()]

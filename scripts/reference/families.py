@@ -1,4 +1,4 @@
-"""The families of keys: which page of the reference describes which definition of the schemas."""
+"""The families of keys: the reference page for each definition in the schemas."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -12,9 +12,9 @@ class Family(NamedTuple):
     title: str
     summary: str
     definitions: tuple[str, ...]
-    """Kinds of documents, such as `robot`, and definitions of their schemas, as `driver:hold`."""
+    """Kinds of documents, such as `robot`, and definitions in schemas, such as `driver:hold`."""
     guides: Mapping[str, str] = {}
-    """Path below docs/ and title of the pages that explain these keys."""
+    """The pages that explain these keys: path below docs/ and title."""
 
 
 def _driver(words: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The page of the HTTP API, from the OpenAPI document of the server."""
+"""The page of the HTTP API, from the server's OpenAPI document."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -14,7 +14,7 @@ _REF = "#/components/schemas/"
 
 
 def page() -> str:
-    """Return the page: one section for each call, and one for each shape."""
+    """Return the page: one section for each call and each shape."""
     document = json.loads(api_document())
     lines = [
         "# HTTP API reference",

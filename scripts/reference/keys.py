@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCHEMAS = ROOT / "schemas"
 KINDS = ("robot", "driver", "interface", "widget")
 COMMON = "driver:anyTransport"
-"""Keys of every transport; a transport repeats only the keys that differ from these."""
+"""Keys of every transport; a transport's page repeats only the keys whose schema differs."""
 
 Schema = Mapping[str, Any]
 
@@ -53,7 +53,7 @@ def read_schema(name: str) -> Schema:
 
 @cache
 def definitions() -> dict[str, Schema]:
-    """Return each kind of document and each definition of a schema, as `driver:hold`."""
+    """Return each kind of document and each definition in a schema, such as `driver:hold`."""
     found: dict[str, Schema] = {}
     for kind in KINDS:
         schema = read_schema(f"{kind}.schema.json")
@@ -63,7 +63,7 @@ def definitions() -> dict[str, Schema]:
 
 
 def page(name: str) -> str:
-    """Return the page of a family of keys."""
+    """Return the page for a family of keys."""
     family = FAMILIES[name]
     lines = [f"# {family.title}", "", *_paragraph(family.summary)]
     for guide, text in family.guides.items():
@@ -95,7 +95,7 @@ def _definition(file: str, name: str, schema: Schema) -> Iterator[str]:
 
 
 def _shared(file: str, name: str, schema: Schema) -> list[str]:
-    """Return the keys of a transport that every transport has, with the same meaning."""
+    """Return the transport's keys that are identical for every transport."""
     common = definitions()[COMMON]
     if schema is common or "type" not in schema.get("properties", {}):
         return []
@@ -129,7 +129,7 @@ def _objects(kind: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
 
 
 def _keys(file: str, owner: str, schema: Schema, shared: list[str]) -> Iterator[str]:
-    """Yield a section for each property, except for the keys of every transport."""
+    """Yield a section for each property, except the keys common to all transports."""
     required = dict.fromkeys(_required_when_whole(schema), "yes, in a whole document")
     required |= dict.fromkeys(schema.get("required", ()), "yes")
     own = {key: one for key, one in schema.get("properties", {}).items() if key not in shared}
@@ -139,7 +139,7 @@ def _keys(file: str, owner: str, schema: Schema, shared: list[str]) -> Iterator[
 
 
 def _required_when_whole(schema: Schema) -> list[str]:
-    """Return the keys that may be missing only in a part or in a document with a parent."""
+    """Return the keys that only a part, or a document with a parent, may omit."""
     otherwise = schema.get("else", {})
     inner: list[str] = list(otherwise.get("required", ()))
     return inner + _required_when_whole(otherwise) if otherwise else inner

@@ -1,4 +1,4 @@
-"""The page of limits, from the constants in the code with a docstring that begins “Maximum”."""
+"""The page of limits, from the constants whose docstring begins with “Maximum”."""
 
 import ast
 from collections.abc import Iterator

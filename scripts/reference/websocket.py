@@ -1,4 +1,4 @@
-"""The page of the WebSocket messages, from their types in `urc.wire`."""
+"""The page of the WebSocket messages, from the message types in `urc.wire`."""
 
 import ast
 import inspect
@@ -17,7 +17,7 @@ _PAGE = "Every message of the WebSocket `/ws?robot=NAME`, which the dashboard an
 
 
 def page() -> str:
-    """Return the page: messages of a client, messages of the server, rows, close codes."""
+    """Return the page: client messages, server messages, rows, close codes."""
     lines = ["# WebSocket messages", "", _PAGE]
     lines += ["A message is a JSON object; the field `t` names its kind.", ""]
     sent = typing.get_args(client_messages.ClientMessage)

@@ -1,7 +1,8 @@
-"""The work of administrators: an overview, roles, invitations, tokens, guest links and revocation.
+"""Administration of access: overview, roles, invitations, tokens, guest links and revocation.
 
-Layer 4. Each function makes one transaction of an `AccessStore`, so two administrators never undo
-each other's changes. The functions block for some milliseconds: servers call them in a thread.
+Layer 4. Each function runs in one transaction of an `AccessStore`, so two administrators cannot
+undo each other's changes. The functions block for a few milliseconds, so servers call them in a
+thread.
 """
 
 from collections import Counter
@@ -29,35 +30,35 @@ __all__ = [
 ]
 
 KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
-"""Ways of sign-ins that belong to a device or a program, and last until their removal."""
+"""Sign-in methods of devices and programs; these sign-ins stay valid until they are removed."""
 
 
 class PrincipalStatus(NamedTuple):
-    """A person, device, program or guest, with the state of its credentials."""
+    """A person, device, program or guest, with its credentials and sign-ins."""
 
     principal: Principal
     owner: str = ""
-    """Name of the person whose device this is, or ""."""
+    """Name of the device's owner; "" without an owner."""
     has_passphrase: bool = False
     passkeys: int = 0
     """Number of passkeys."""
     accounts: int = 0
     """Number of accounts at identity providers (OpenID Connect)."""
     invited_until: float | None = None
-    """UTC time at which the newest invitation ends, in seconds; None without an invitation."""
+    """UTC time at which the newest invitation expires, in seconds; None without an invitation."""
     sign_ins: int = 0
-    """Number of sign-ins that have not ended."""
+    """Number of active sign-ins."""
     used_at: float | None = None
-    """UTC time of the last use, in seconds; None without a use."""
+    """UTC time of the last use, in seconds; None if never used."""
 
 
 def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStatus]:
-    """Return all principals of some kinds, sorted by name.
+    """Return all principals of the given kinds, sorted by kind and name.
 
     Args:
         store: the store.
         now: UTC time in seconds since 1970.
-        kinds: the kinds; none: all.
+        kinds: the kinds to include; all kinds by default.
     """
     with store.transaction() as base:
         directory = store.directory()
@@ -97,12 +98,12 @@ def _status(directory: Directory, one: Principal, now: float) -> PrincipalStatus
 
 
 def _was_used(one: SignIn) -> bool:
-    """Return whether a sign-in was used; opening a browser's sign-in is a use."""
+    """Return whether a sign-in has been used; a new browser sign-in already counts as used."""
     return one.way not in KEYS or one.used_at > one.created_at
 
 
 def principal_named(directory: Directory, kind: Kind, name: str) -> Principal | None:
-    """Return the principal of a kind with this name, regardless of case; None without one."""
+    """Return the principal with this kind and name, ignoring case; None if there is no match."""
     wanted = " ".join(name.split()).casefold()
     found = (one for one in directory.principals.values() if one.kind == kind)
     return next((one for one in found if one.name.casefold() == wanted), None)
@@ -111,7 +112,7 @@ def principal_named(directory: Directory, kind: Kind, name: str) -> Principal | 
 def change_grants(
     store: AccessStore, principal: str, change: Callable[[tuple[Grant, ...]], Iterable[Grant]]
 ) -> tuple[Grant, ...]:
-    """Replace the grants of a principal by a function of the present ones, and return the result.
+    """Apply `change` to the grants of a principal, store the result and return it.
 
     Raises:
         AccessError: the principal is unknown.
@@ -128,19 +129,21 @@ def change_grants(
 def invite_person(
     store: AccessStore, name: str, grants: Collection[Grant], *, now: float, ends_at: float
 ) -> tuple[Principal, str]:
-    """Invite a person to choose a passphrase; return the person and a code that works once.
+    """Invite a person to choose a passphrase; return the person and a one-time code.
 
-    An unknown person is added with `grants`. A newer invitation replaces the person's older one.
+    A new person is added with `grants`. The new invitation replaces the person's previous
+    invitation.
 
     Args:
         store: the store.
         name: name of the person.
-        grants: rights of a new person; empty for a known person.
+        grants: grants of a new person; empty for an existing person.
         now: UTC time in seconds since 1970.
-        ends_at: UTC time after which the code is invalid.
+        ends_at: UTC time at which the code expires.
 
     Raises:
-        AccessError: a known person would get rights, an unknown one none, or the name is invalid.
+        AccessError: the name is invalid, an existing person is given grants, or a new person is
+            given no grants.
     """
     with store.transaction() as base:
         person = principal_named(store.directory(), "person", name)
@@ -156,15 +159,15 @@ def invite_person(
 
 
 def replace_passphrase(store: AccessStore, person: str, kept: str) -> int:
-    """Set a person's passphrase, and return the number of ended sign-ins.
+    """Set a person's passphrase; return the number of ended sign-ins.
 
-    Sign-ins of browsers and invitations end, because they may be the reason for the change. Paired
-    devices stay.
+    The person's browser sign-ins and invitations end, because they may be the reason for the
+    change. Paired devices stay signed in.
 
     Args:
         store: the store.
         person: id of the person.
-        kept: hash of the passphrase.
+        kept: hash of the new passphrase.
 
     Raises:
         AccessError: the person is unknown.
@@ -184,18 +187,19 @@ def add_token(
     ends_at: float | None,
     commands: Iterable[str] = (),
 ) -> tuple[Principal, str]:
-    """Add a program, and return it with its token.
+    """Add a program; return the program and its token.
 
     Args:
         store: the store.
         name: name of the program.
-        grants: rights of the token.
+        grants: grants of the token.
         now: UTC time in seconds since 1970.
-        ends_at: UTC time of the end; None: never.
-        commands: commands that the program may give; none: all of its role.
+        ends_at: UTC time at which the token expires; None for no expiry.
+        commands: commands that the program may send; empty for all commands of its role.
 
     Raises:
-        AccessError: the name is invalid or in use, or the token has no right or no future.
+        AccessError: the name is invalid or in use, the token has no grants, or its expiry is in the
+            past.
     """
     grants = tuple(grants)
     if not grants:
@@ -211,19 +215,19 @@ def add_token(
 def add_guest(
     store: AccessStore, name: str, robot: str, *, now: float, ends_at: float
 ) -> tuple[Principal, str]:
-    """Add a guest who may watch one robot, and return the guest with the secret of the link.
+    """Add a guest who may watch one robot; return the guest and the secret of the guest link.
 
-    Several browsers may use the link.
+    Several browsers can use the same link.
 
     Args:
         store: the store.
         name: name of the guest.
         robot: name of the robot in URLs.
         now: UTC time in seconds since 1970.
-        ends_at: UTC time of the end.
+        ends_at: UTC time at which the link expires.
 
     Raises:
-        AccessError: the name is invalid or in use, or the end is past or too late.
+        AccessError: the name is invalid or in use, or `ends_at` is in the past or too late.
     """
     if not now < ends_at <= now + LONGEST_GUEST_S:
         days = LONGEST_GUEST_S / 86400
@@ -235,7 +239,7 @@ def add_guest(
 
 
 def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bool]) -> int:
-    """End all sign-ins for which `is_chosen` returns true, and return their number."""
+    """End all sign-ins for which `is_chosen` returns true; return the number of ended sign-ins."""
     with store.transaction() as base:
         directory = store.directory()
         chosen = [
@@ -248,14 +252,14 @@ def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bo
 
 
 def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
-    """End what an old copy of the store must not revive, and return the number of ended sign-ins.
+    """End restored codes and sign-ins that are unsafe to keep; return the number of ended sign-ins.
 
-    All codes end, because they may have been used since. Sign-ins of browsers end, because they may
-    have been revoked since. People keep their passphrases.
+    After the backup, codes may have been used and browser sign-ins revoked. All codes and browser
+    sign-ins therefore end. People keep their passphrases.
 
     Args:
         store: the restored store.
-        ends_keys: whether to remove all devices, programs and guests too.
+        ends_keys: whether to remove all devices, programs and guests as well.
     """
     with store.transaction() as base:
         base.execute("DELETE FROM invitations")
@@ -266,7 +270,7 @@ def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
 
 
 def newest_time(store: AccessStore) -> float:
-    """Return the newest UTC time of an event in the store, in seconds; 0 for an empty store."""
+    """Return the UTC time of the newest event in the store, in seconds; 0 for an empty store."""
     directory = store.directory()
     people = (one.created_at for one in directory.principals.values())
     return max([0.0, *people, *(one.used_at for one in directory.sign_ins.values())])

@@ -1,10 +1,10 @@
-"""A local certificate authority: HTTPS for a machine without a public name.
+"""A local certificate authority, which provides HTTPS on machines without a public name.
 
-Layer 4. `CertificateAuthority` keeps one root certificate for years, which people trust once on
-each device, and issues the server's certificate from it. The root is limited to names of local
-networks (RFC 5280, 4.2.1.10), so a stolen key cannot imitate public websites.
+Layer 4. `CertificateAuthority` keeps one root certificate for years and uses it to issue the
+server's certificate. Users trust the root certificate once on each device. The root is limited to
+local network names (RFC 5280, 4.2.1.10), so a stolen key cannot impersonate public websites.
 
-The machine may have no clock: then all dates start on the day of this version's release.
+On a machine without a clock, all dates start on the release day of this version.
 """
 
 import ipaddress
@@ -34,15 +34,15 @@ __all__ = [
 ]
 
 AUTHORITY_FOLDER: Final = "tls"
-"""Folder of the certificates and keys in the data folder."""
+"""Subfolder of the data folder for certificates and keys."""
 AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
-"""Browsers refuse server certificates with a longer life."""
+"""Validity of a server certificate; browsers reject certificates with a longer validity."""
 RENEW_BEFORE: Final = timedelta(days=30)
 OLDEST: Final = RELEASED
-"""An earlier time of the machine's clock is wrong."""
+"""Earliest plausible time of the machine's clock."""
 _BACK: Final = timedelta(days=1)
-"""Devices whose clock is a little late accept the certificate, too."""
+"""Validity before the issue date, so that devices with a slow clock also accept the certificate."""
 _LOCAL_NAMES: Final = ("localhost", "local", "lan", "internal", "home.arpa")
 _LOCAL_NETWORKS: Final = (
     "127.0.0.0/8", "10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16",
@@ -53,31 +53,31 @@ _Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class ServerCertificate(NamedTuple):
-    """The files that a TLS server loads."""
+    """The certificate and key files of a TLS server."""
 
     chain: Path
     key: Path
     ends: datetime
-    """Time after which browsers refuse it."""
+    """Time after which browsers reject the certificate."""
     is_new: bool
-    """Whether this call issued it."""
+    """Whether the certificate was issued by this call."""
 
 
 class CertificateAuthority:
-    """The authority in one folder; both keys are readable to the owner only."""
+    """The certificate authority in one folder; only the owner can read its two keys."""
 
     def __init__(
         self, folder: Path, names: Sequence[str], now: datetime, *, optional: Sequence[str] = ()
     ) -> None:
-        """Load the authority, or make one.
+        """Load the authority, or create one.
 
         Args:
             folder: folder for certificates and keys.
-            names: names and addresses that the certificate must have. A name outside of the limits
-                of the existing authority needs a new authority, which all devices have to trust.
-            now: time of this machine's clock, with a time zone.
-            optional: further names and addresses, left out if the existing authority does not
-                permit them; see `left_out`.
+            names: required names and addresses of the certificate. A name outside the limits of the
+                existing authority requires a new authority, which every device must trust again.
+            now: time on this machine's clock, with a time zone.
+            optional: additional names and addresses. Names that the existing authority does not
+                permit are omitted and listed in `left_out`.
 
         Raises:
             AccessError: a file cannot be read or written, or a name is invalid.
@@ -87,11 +87,11 @@ class CertificateAuthority:
         self._names = _parsed(names)
         more = [one for one in _parsed(optional) if one not in self._names]
         self.left_out: tuple[str, ...] = ()
-        """Optional names that the certificate lacks."""
+        """Optional names that were omitted from the certificate."""
         self.file = folder / "authority.pem"
-        """Root certificate, which devices trust; public."""
+        """Root certificate for devices to trust; not secret."""
         self.is_new = False
-        """Whether devices have to trust a new root."""
+        """Whether devices must trust a new root certificate."""
         try:
             make_private(folder)
             with exclusive(folder / "lock"):
@@ -116,16 +116,16 @@ class CertificateAuthority:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of the root certificate, in groups for people."""
+        """SHA-256 of the root certificate, in readable groups."""
         return fingerprint(self._root)
 
     @property
     def pem(self) -> bytes:
-        """The root certificate in PEM."""
+        """The root certificate in PEM format."""
         return self._root.public_bytes(serialization.Encoding.PEM)
 
     def issue(self) -> ServerCertificate:
-        """Return the server's certificate; a new one if the old one ends soon or lacks a name.
+        """Return the server's certificate; issue a new one if it expires soon or a name is missing.
 
         Raises:
             AccessError: the files cannot be written.
@@ -215,7 +215,7 @@ class CertificateAuthority:
         )
 
     def _is_usable(self) -> bool:
-        """Return whether the root lasts, and allows all names of this machine."""
+        """Return whether the root does not expire soon and permits all names of this machine."""
         if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
         allowed = self._allowed()
@@ -241,16 +241,16 @@ class CertificateAuthority:
 
 
 def fingerprint(certificate: x509.Certificate) -> str:
-    """Return SHA-256 of a certificate as 16 groups of four hex digits."""
+    """Return the SHA-256 hash of a certificate as 16 groups of four hexadecimal digits."""
     text = certificate.fingerprint(hashes.SHA256()).hex().upper()
     return " ".join(text[at : at + 4] for at in range(0, len(text), 4))
 
 
 def issued_at(file: Path) -> datetime | None:
-    """Return a time at or before which a certificate of this module was issued.
+    """Return the earliest possible issue time of a certificate from this module.
 
-    The start of validity is no evidence, because it is never later than `OLDEST`. Return None for
-    a missing or damaged file.
+    The start of its validity does not show the issue time, because it is never later than `OLDEST`.
+    Return None for a missing or damaged file.
     """
     found = _certificate(file)
     if found is None:
@@ -292,7 +292,7 @@ def _certificate(file: Path) -> x509.Certificate | None:
     try:
         return x509.load_pem_x509_certificate(file.read_bytes())
     except (OSError, ValueError):
-        return None  # it is made again
+        return None  # a new certificate replaces it
 
 
 def _is_signed(leaf: x509.Certificate, root: x509.Certificate) -> bool:

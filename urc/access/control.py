@@ -1,12 +1,14 @@
-"""The access control of one server: it identifies requests, and reads rights at each command.
+"""Access control of one server: identification of requests, and a check of rights at each command.
 
-Layer 4. Each server has one local user besides the people, devices and programs of the store. The
-local user holds the start key, which the server prints in its address, and administers. The start
-key and the local sign-ins are in memory only, and end with the server.
+Layer 4. Each server has one local user in addition to the people, devices and programs in the
+store. The local user holds the start key and administers the server. The server prints the start
+key in its address. The start key and the local sign-ins exist only in memory and end with the
+server.
 
-Theory of operation. Each change replaces `directory` as a whole, including changes by another
-process. Then `on_change` is called, and sockets without a right are closed. The time of this module
-never runs backwards, so a machine with a wrong clock cannot revive an ended sign-in.
+Theory of operation. Every change, including a change by another process, replaces the whole
+`directory`. The callbacks in `on_change` then close the sockets that have lost their rights. Time
+in this module never runs backwards, so a change of the machine's clock cannot revive an ended
+sign-in.
 """
 
 import asyncio
@@ -28,12 +30,12 @@ __all__ = ["LOCAL_USER", "AccessControl"]
 LOCAL_USER: Final = Principal("local", "person", "this computer", (Grant("administer"),))
 """The holder of the start key."""
 LOCAL_SIGN_INS: Final = 1000
-"""Most browsers and programs with the start key; the oldest sign-in is closed for a new one."""
+"""Maximum number of sign-ins with the start key; above the limit, the oldest is closed."""
 _CODES: Final = 16
 WATCH_S: Final = 0.1
-"""Interval of the look for changes by other processes, in seconds."""
+"""Interval between checks for changes by other processes, in seconds."""
 TOUCH_S: Final = 60.0
-"""Interval at which the use of sign-ins is recorded, in seconds."""
+"""Interval at which the last use of sign-ins is recorded, in seconds."""
 
 log = logging.getLogger(__name__)
 
@@ -49,19 +51,19 @@ class AccessControl:
         instance: str = "",
         utc: Callable[[], float] = time.time,
     ) -> None:
-        """Make the start key.
+        """Create the start key and load the store.
 
         Args:
-            store: people, devices and programs; None for a server with the local user alone.
-            key: the start key; "" makes one.
-            instance: identifier of this server in cookie names; "" makes one.
+            store: people, devices and programs; None for a server with only the local user.
+            key: the start key; "" to generate one.
+            instance: identifier of this server in cookie names; "" to generate one.
             utc: source of UTC time, in seconds since 1970.
         """
         self.store = store
         self.key = key or secrets.token_urlsafe(24)
         self.instance = instance or secrets.token_hex(4)
         self.on_change: list[Callable[[], None]] = []
-        """Called after each change of rights."""
+        """Callbacks after each change of rights."""
         self._utc = utc
         self._latest = utc()
         self._codes: dict[str, None] = {}
@@ -70,30 +72,30 @@ class AccessControl:
         self._program = program
         self.directory = Directory()
         self._used: dict[str, float] = {}
-        """Id of a sign-in → UTC time of its last use that is not recorded yet."""
+        """UTC time of the last unrecorded use, by sign-in id."""
         self.load()
 
     # Identities
 
     def now(self) -> float:
-        """Return UTC time in seconds, never earlier than before."""
+        """Return UTC time in seconds, never earlier than the previous result."""
         self._latest = max(self._latest, self._utc())
         return self._latest
 
     def identify(self, secret: str) -> Identity:
-        """Return the identity that holds a sign-in's secret or a token; `NOBODY` without one."""
+        """Return the identity with this sign-in secret or token; `NOBODY` if there is no match."""
         return self.directory.identify(secret, self.now())
 
     def role(self, who: Identity, robot: str = "", tags: Collection[str] = ()) -> Role | None:
-        """Return the present role of `who` at a robot; "" asks for the whole server."""
+        """Return the current role of `who` for a robot; "" means the whole server."""
         return self.directory.role(who, self.now(), robot, tags)
 
     # The local user
 
     def code(self) -> str:
-        """Return a code for one browser of the local user, in place of the start key.
+        """Return a one-time code that replaces the start key for one browser of the local user.
 
-        The code may appear in public after its use, for example in the command line of a browser.
+        A used code is harmless if it becomes public, for example in a browser's command line.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None
@@ -102,7 +104,7 @@ class AccessControl:
         return code
 
     def admit(self, word: str, *, place: str = "", agent: str = "") -> str | None:
-        """Return the secret of a new sign-in for the start key or a code; None for other words."""
+        """Open a sign-in with the start key or a code; return its secret, or None on failure."""
         if word in self._codes:
             del self._codes[word]
         elif not compare_digest(word.encode(), self.key.encode()):
@@ -116,15 +118,15 @@ class AccessControl:
         return secret
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest present role of `who` at any robot, or None."""
+        """Return the highest current role of `who` for any robot, or None."""
         return self.directory.best_role(who, self.now())
 
     # Changes
 
     async def watch(self) -> None:
-        """Follow the changes by other processes, and record the use of sign-ins, until cancelled.
+        """Detect changes by other processes and record the use of sign-ins, until cancelled.
 
-        The file is read in a thread, because another process may have locked it.
+        A thread reads the file, because another process may have locked it.
         """
         touched_at = self.now()
         while self.store is not None:
@@ -141,13 +143,13 @@ class AccessControl:
                 log.warning("%s", error)
 
     async def reload(self) -> None:
-        """Read the store again, and report the change."""
+        """Read the store again and report the change."""
         if self.store is not None:
             self._stored = await asyncio.to_thread(self.store.directory)
         self._merge()
 
     def load(self) -> None:
-        """Read the store again, like `reload`, but block meanwhile."""
+        """Read the store again like `reload`, but block until done."""
         self._stored = self.store.directory() if self.store else Directory()
         self._merge()
 
@@ -158,23 +160,23 @@ class AccessControl:
         await self.reload()
 
     def used(self, sign_in: str) -> None:
-        """Note the use of a sign-in, which `watch` records."""
-        # Only in memory, because each request is a use, and a transaction waits for the disk.
+        """Note the use of a sign-in; `watch` records it later."""
+        # Only in memory, because every request is a use and a transaction would wait for the disk.
         self._used[sign_in] = self.now()
 
     async def _record_use(self) -> None:
-        used, self._used = self._used, {}  # uses during the write are recorded the next time
+        used, self._used = self._used, {}  # later uses are recorded next time
         if used and self.store is not None:
             await asyncio.to_thread(self.store.touch_all, used)
             await self.reload()
 
     async def _end_overdue(self) -> None:
-        """Delete the sign-ins that have ended by themselves, and report the change.
+        """Delete expired sign-ins and report the change.
 
-        Sockets of such sign-ins close, and a clock that is set back before the next start revives
-        none of them.
+        The sockets of these sign-ins are closed. If the clock is set back before the next start,
+        the deleted sign-ins stay invalid.
         """
-        # First the uses that are only in memory: a sign-in in use must not end as an idle one.
+        # Record the uses in memory first, so that an active sign-in does not expire as idle.
         await self._record_use()
         if self.store is not None:
             now, directory = self.now(), self._stored
@@ -188,8 +190,8 @@ class AccessControl:
         self._next_end = min(ends, default=float("inf"))
         own = {self._program.id: self._program, **self._local}
         sign_ins = {**self._stored.sign_ins, **own}
-        # One assignment: no request sees half a change. The listeners come after it, because each
-        # socket asks the new directory whether its right still exists.
+        # A single assignment, so no request sees a partial change. The callbacks run afterwards,
+        # because each socket checks its rights in the new directory.
         self.directory = Directory(
             {**self._stored.principals, LOCAL_USER.id: LOCAL_USER},
             sign_ins,

@@ -1,7 +1,8 @@
-"""The directory: all identities, sign-ins and tokens at one moment, and the rights they have now.
+"""The directory: a snapshot of all identities, sign-ins and tokens, with their current rights.
 
-Layer 4. Pure. The store makes a new directory after each change. A socket keeps an `Identity`,
-never a right: it asks the current directory at each command, so a revocation acts at once.
+Layer 4. Pure. The store creates a new directory after each change. A socket stores an `Identity`,
+but never its rights. It checks the rights in the current directory at each command, so a revocation
+takes effect immediately.
 """
 
 import hashlib
@@ -16,26 +17,26 @@ __all__ = ["NOBODY", "Directory", "Identity", "Kind", "Principal", "SignIn", "Wa
 
 Kind = Literal["person", "device", "program", "guest"]
 Way = Literal["key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
-"""How a sign-in began: the right by which a command was given, as the audit log names it."""
+"""Method of a sign-in; the audit log records this method for each command."""
 
 
 class Principal(NamedTuple):
     """A person, a device, a program or a guest."""
 
     id: str
-    """Unique and never used again."""
+    """Unique and never reused."""
     kind: Kind
     name: str
-    """Name for people and for the audit log, such as “Tablet in the lab”."""
+    """Display name, also used in the audit log, such as “Tablet in the lab”."""
     grants: tuple[Grant, ...] = ()
     owner: str = ""
-    """Id of the person whose device this is. Such a device has the rights of the owner."""
+    """Id of the person who owns the device. An owned device has its owner's rights."""
     commands: tuple[str, ...] = ()
-    """Commands that a program may give; empty: all of its role."""
+    """Commands that a program may send; empty for all commands of its role."""
     created_at: float = 0.0
-    """UTC time in seconds since 1970."""
+    """UTC creation time, in seconds since 1970."""
     ends_at: float | None = None
-    """UTC time after which all rights end; None: never."""
+    """UTC time at which all rights end; None for no end."""
 
 
 class SignIn(NamedTuple):
@@ -47,28 +48,28 @@ class SignIn(NamedTuple):
     """Id of the principal."""
     way: Way
     digest: bytes
-    """SHA-256 of the secret; the store never has the secret itself."""
+    """SHA-256 of the secret; the store never contains the secret itself."""
     created_at: float
     used_at: float
-    """UTC time of the last use, exact to a minute."""
+    """UTC time of the last use, accurate to one minute."""
     ends_at: float | None
-    """UTC time of the latest end; None: never."""
+    """UTC time at which the sign-in ends at the latest; None for no limit."""
     idle_s: float | None
-    """Longest time without use, in seconds; None: unlimited."""
+    """Maximum time without use, in seconds; None for no limit."""
     place: str = ""
-    """Network address at the sign-in."""
+    """Network address from which the sign-in was made."""
     agent: str = ""
-    """Browser and system in words, such as “Chromium on Android”."""
+    """Name of browser and system, such as “Chromium on Android”."""
 
     def is_over(self, now: float) -> bool:
-        """Return whether the sign-in has ended by itself."""
+        """Return whether the sign-in has expired."""
         if self.ends_at is not None and now >= self.ends_at:
             return True
         return self.idle_s is not None and now - self.used_at >= self.idle_s
 
 
 class Identity(NamedTuple):
-    """The proven identity of a request: it names, and grants nothing."""
+    """The proven identity of a request, without any rights."""
 
     principal: str = ""
     """Id of the principal; "" for an unknown visitor."""
@@ -78,33 +79,33 @@ class Identity(NamedTuple):
     kind: Kind | Literal[""] = ""
     way: Way | Literal[""] = ""
     person: str = ""
-    """Id of the person: the owner of a device, or else the principal itself."""
+    """Id of the device's owner, or of the principal itself if there is no owner."""
 
 
 NOBODY: Final = Identity()
 
 
 def digest_of(secret: str) -> bytes:
-    """Return the form in which a random secret is stored.
+    """Return the stored form of a random secret.
 
-    A plain hash is enough for 256 random bits; only chosen passphrases need a slow one.
+    A fast hash is sufficient for 256 random bits. Only user-chosen passphrases need a slow hash.
     """
     return hashlib.sha256(secret.encode()).digest()
 
 
 @dataclass(frozen=True, slots=True)
 class Directory:
-    """All principals and sign-ins at one moment."""
+    """A snapshot of all principals and sign-ins."""
 
     principals: Mapping[str, Principal] = field(default_factory=dict)
-    """Id → principal."""
+    """Principals by id."""
     sign_ins: Mapping[str, SignIn] = field(default_factory=dict)
-    """Id → sign-in."""
+    """Sign-ins by id."""
     by_digest: Mapping[bytes, str] = field(default_factory=dict)
-    """Digest of a secret → id of its sign-in."""
+    """Sign-in ids by digest of the secret."""
 
     def identify(self, secret: str, now: float) -> Identity:
-        """Return the identity that holds `secret`; `NOBODY` if it is unknown, over or revoked."""
+        """Return the identity with this `secret`; `NOBODY` if it is unknown, expired or revoked."""
         sign_in = self.sign_ins.get(self.by_digest.get(digest_of(secret), ""))
         if sign_in is None or sign_in.is_over(now):
             return NOBODY
@@ -119,18 +120,18 @@ class Directory:
     def role(
         self, who: Identity, now: float, robot: str = "", tags: Collection[str] = ()
     ) -> Role | None:
-        """Return the present role of `who` at a robot, or None.
+        """Return the current role of `who` for a robot, or None.
 
         Args:
-            who: the identity, however old.
+            who: the identity, possibly from an earlier directory.
             now: UTC time in seconds since 1970.
-            robot: name of the robot; "" asks for the whole server.
+            robot: name of the robot; "" for the whole server.
             tags: tags of the robot.
         """
         return role_at(self._grants(who, now), robot, tags)
 
     def best_role(self, who: Identity, now: float) -> Role | None:
-        """Return the highest present role of `who` at any robot, or None."""
+        """Return the highest current role of `who` for any robot, or None."""
         return highest(grant.role for grant in self._grants(who, now))
 
     def _grants(self, who: Identity, now: float) -> tuple[Grant, ...]:
@@ -143,9 +144,9 @@ class Directory:
         return self.principals.get(principal.owner, principal).grants
 
     def end_of(self, sign_in: SignIn) -> float:
-        """Return the UTC time at which a sign-in ends without further use; infinity: never.
+        """Return the UTC time at which a sign-in ends without further use; infinity for no end.
 
-        The sign-in of a device also ends with its owner.
+        A device's sign-in also ends when its owner's rights end.
         """
         principal = self.principals.get(sign_in.principal)
         owner = self.principals.get(principal.owner) if principal and principal.owner else None
@@ -154,12 +155,12 @@ class Directory:
         return min((end for end in ends if end is not None), default=float("inf"))
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether the scope of a program's token contains a command."""
+        """Return whether a program's token allows a command."""
         principal = self.principals.get(who.principal)
         return principal is not None and (not principal.commands or command in principal.commands)
 
     def _ended(self, principal: Principal, now: float) -> bool:
-        """Return whether a principal's rights ended, or those of its owner, or its owner left."""
+        """Return whether the principal's or owner's rights have ended, or the owner was removed."""
         if principal.ends_at is not None and now >= principal.ends_at:
             return True
         if not principal.owner:

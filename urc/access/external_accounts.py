@@ -1,13 +1,13 @@
-"""Accounts of identity providers and proxies, and the people that they stand for.
+"""Accounts of identity providers and proxies, and the corresponding people.
 
-Layer 4. An account is known by its issuer and subject, never by its name. Names change, and another
-person of this server may have the same name. The functions block for some milliseconds: servers
-call them in a thread.
+Layer 4. An account is identified by its issuer and subject, never by its name. Names can change,
+and another person on this server may have the same name. The functions block for a few
+milliseconds, so servers call them in a thread.
 
-Theory of operation. Each sign-in replaces the grants of the previous one by the grants of the
-present claims. Grants that an administrator gave by hand stay. All rights of the person end with
-the sign-in, including those of the person's devices and passkeys, and the next sign-in renews them.
-So an account that is blocked at its provider keeps no way in.
+Theory of operation. Each sign-in replaces the grants of the previous sign-in with those from its
+current claims. Grants from an administrator remain. All rights of the person, including those of
+devices and passkeys, end with the sign-in. The next sign-in renews them. An account that its
+provider has blocked therefore loses all access.
 """
 
 import sqlite3
@@ -24,26 +24,26 @@ __all__ = ["ExternalAccount", "admit_account", "admit_named"]
 
 _MOST_NAMESAKES: Final = 100
 _PROXY: Final = "proxy:"
-"""Start of the issuer of people that a proxy has added; addresses of providers start with http."""
+"""Issuer prefix for people added by a proxy; provider addresses start with http instead."""
 
 
 class ExternalAccount(NamedTuple):
-    """An account, as its issuer has proven it for one sign-in."""
+    """An account that its issuer has confirmed for one sign-in."""
 
     issuer: str
     """Address of the provider."""
     subject: str
-    """Identifier of the account; never given to another account."""
+    """Identifier of the account at its issuer; never reused for another account."""
     name: str
-    """Name for people."""
+    """Display name."""
     grants: tuple[Grant, ...]
-    """Grants that follow from the present claims."""
+    """Grants derived from the current claims."""
     ends_at: float
-    """UTC time of the latest end of the sign-in, in seconds since 1970."""
+    """UTC time at which the sign-in ends at the latest, in seconds since 1970."""
 
 
 def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> Principal:
-    """Return the person of an account with the present grants, and add the person if needed.
+    """Return an account's person with updated grants; add a person for a new account.
 
     Args:
         store: the store.
@@ -51,8 +51,8 @@ def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> P
         now: UTC time in seconds since 1970.
 
     Raises:
-        AccessError: the account has no grants. If the person exists, earlier grants of the account
-            are removed all the same.
+        AccessError: the account has no grants. Grants from its earlier sign-ins are removed even in
+            this case.
     """
     with store.transaction() as base:
         row = base.execute(
@@ -84,16 +84,16 @@ def admit_named(
     now: float,
     ends_at: float,
 ) -> Principal:
-    """Return the person with a name, and add the person with `new_grants` if there are any.
+    """Return the person with this name; add a missing person if `new_grants` is not empty.
 
     Args:
         store: the store.
-        name: name that a trusted proxy has proven.
-        new_grants: grants of a new person; none: the person must exist.
+        name: name confirmed by a trusted proxy.
+        new_grants: grants of a new person; if empty, the person must already exist.
         proxy: name of the proxy.
         now: UTC time in seconds since 1970.
-        ends_at: UTC time of the end of the sign-in. All rights of a person that a proxy has added
-            end then, too.
+        ends_at: UTC time at which the sign-in ends. For a person added by a proxy, all rights end
+            at the same time.
 
     Raises:
         AccessError: no person has the name, or the name is invalid.
@@ -124,7 +124,7 @@ def _renewed(
 
 
 def _extended(base: sqlite3.Connection, person: Principal, ends_at: float) -> Principal:
-    """Let the rights of a person last until `ends_at`, or until a later end that it has already."""
+    """Extend a person's rights to `ends_at`, unless they already end later."""
     ends_at = max(ends_at, person.ends_at or 0.0)
     base.execute("UPDATE principals SET ends_at = ? WHERE id = ?", (ends_at, person.id))
     return person._replace(ends_at=ends_at)
@@ -147,7 +147,7 @@ def _keep(base: sqlite3.Connection, account: ExternalAccount, principal: str) ->
 
 
 def _free_name(store: AccessStore, account: ExternalAccount) -> str:
-    """Return the account's name, with the provider and a number if another person has the name."""
+    """Return the account's name; add the provider and a number if the name is already in use."""
     directory = store.directory()
     if principal_named(directory, "person", account.name) is None:
         return account.name

@@ -22,12 +22,12 @@ __all__ = [
 ]
 
 ALL: Final = "*"
-"""Scope of a grant for all robots, now and later."""
+"""Scope of a grant for all current and future robots."""
 _TAG: Final = "#"
 
 
 class AccessError(UrcError):
-    """A request about people, devices or tokens that cannot be carried out."""
+    """A failed request about people, devices or tokens."""
 
 
 class Grant(NamedTuple):
@@ -35,14 +35,14 @@ class Grant(NamedTuple):
 
     role: Role
     scope: str = ALL
-    """`ALL`, the name of a robot, or ``#`` and a tag."""
+    """`ALL`, a robot's name, or ``#`` followed by a tag."""
 
     def __str__(self) -> str:
-        """Return the text form."""
+        """Return the grant in its text form."""
         return self.role if self.scope == ALL else f"{self.role}@{self.scope}"
 
     def covers(self, robot: str, tags: Collection[str]) -> bool:
-        """Return whether the grant is valid for a robot."""
+        """Return whether the grant applies to a robot."""
         if self.scope == ALL:
             return True
         if self.scope.startswith(_TAG):
@@ -51,7 +51,7 @@ class Grant(NamedTuple):
 
 
 def parse_grant(text: str) -> Grant:
-    """Return the grant that `text` stands for.
+    """Return the grant described by `text`.
 
     Raises:
         AccessError: the role is unknown, the scope is empty, or ``administer`` has a scope.
@@ -67,22 +67,22 @@ def parse_grant(text: str) -> Grant:
 
 
 def grants_to_json(grants: Iterable[Grant]) -> str:
-    """Return grants in the form of the store, a JSON list of their text forms."""
+    """Return grants as stored: a JSON list of their text forms."""
     return json.dumps([str(grant) for grant in grants])
 
 
 def grants_from_json(text: str) -> tuple[Grant, ...]:
-    """Return the grants that `grants_to_json` has written."""
+    """Return the grants from the output of `grants_to_json`."""
     return tuple(parse_grant(each) for each in json.loads(text))
 
 
 def role_at(grants: Iterable[Grant], robot: str = "", tags: Collection[str] = ()) -> Role | None:
-    """Return the highest role of `grants` at a robot; "" asks for the whole server."""
+    """Return the highest role of `grants` for a robot; "" means the whole server."""
     return highest(grant.role for grant in grants if grant.covers(robot, tags))
 
 
 def highest(roles: Iterable[Role]) -> Role | None:
-    """Return the highest of `roles`, or None without a role."""
+    """Return the highest of `roles`, or None if there are no roles."""
     best: Role | None = None
     for role in roles:
         if best is None or includes(role, best):

@@ -1,6 +1,6 @@
 """Lifetimes of sign-ins, codes and links.
 
-Layer 4. Pure. A guest and a token end at the time that their maker chose.
+Layer 4. Pure. The creator of a guest link or token chooses its end.
 """
 
 from typing import Final, NamedTuple
@@ -14,19 +14,19 @@ class Lifetime(NamedTuple):
     """Limits of one kind of sign-in."""
 
     longest_s: float | None
-    """Longest life, in seconds; None: unlimited."""
+    """Maximum duration, in seconds; None for no limit."""
     idle_s: float | None
-    """Longest time without use, in seconds; None: unlimited."""
+    """Maximum time without use, in seconds; None for no limit."""
 
     def ends_at(self, now: float) -> float | None:
-        """Return the latest end of a sign-in that begins now, as UTC time in seconds; or None."""
+        """Return the latest UTC end time of a sign-in that begins now; None for no limit."""
         return None if self.longest_s is None else now + self.longest_s
 
 
 PERSON: Final = Lifetime(7 * _DAY_S, 12 * 3600.0)
-"""The sign-in of a person in a browser."""
+"""Lifetime of a person's sign-in in a browser."""
 DEVICE: Final = Lifetime(None, 90 * _DAY_S)
-"""The key of a paired device."""
+"""Lifetime of a paired device's key."""
 PAIRING_S: Final = 120.0
 """Validity of a pairing code, in seconds."""
 INVITATION_S: Final = _DAY_S

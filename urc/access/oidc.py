@@ -1,11 +1,12 @@
 """Sign-in with an OpenID Connect provider: the authorization code flow with PKCE.
 
-Layer 4. OpenID Connect Core 1.0, RFC 7636 (PKCE) and RFC 9700 (security practice).
+Layer 4. The sign-in follows OpenID Connect Core 1.0, RFC 7636 (PKCE) and RFC 9700 (security
+practice).
 
-Theory of operation. `begin` returns the address of the provider's page. The address has a random
-state, which is valid once, and for ten minutes. The state is valid only in the browser with the
-binding, so a link cannot lead a browser into the account of an attacker. `finish` exchanges the
-code of the redirect for an ID token and checks the token. Grants follow from the token's claims.
+Theory of operation. `begin` returns the address of the provider's page. The address contains a
+random state, which is valid once and for ten minutes. The state is valid only in the browser that
+has the binding, so a link cannot sign a browser in to an attacker's account. `finish` exchanges the
+code in the redirect for an ID token and checks the token. The token's claims determine the grants.
 """
 
 import asyncio
@@ -31,18 +32,18 @@ from urc.access.pending import Pending
 __all__ = ["STATE_S", "OidcRedirect", "OidcSignIn"]
 
 STATE_S: Final = 600.0
-"""Time for the sign-in at the provider, in seconds."""
+"""Time limit for the sign-in at the provider, in seconds."""
 _LONGEST_NAME: Final = 64
 _LATE: Final = "the sign-in took too long, or began in another browser: try again"
 
 
 class OidcRedirect(NamedTuple):
-    """The begin of a sign-in."""
+    """The start of a sign-in."""
 
     url: str
     """Address of the provider's page."""
     binding: str
-    """Secret that the browser keeps in a cookie until it comes back."""
+    """Secret in a cookie of the browser during the sign-in at the provider."""
 
 
 class _Flow(NamedTuple):
@@ -53,7 +54,7 @@ class _Flow(NamedTuple):
 
 
 class OidcSignIn:
-    """The sign-ins of one server at its provider."""
+    """The sign-ins of one server through its provider."""
 
     def __init__(
         self,
@@ -61,12 +62,12 @@ class OidcSignIn:
         provider: OidcProvider | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare.
+        """Initialize without contacting the provider.
 
         Args:
             options: the options.
-            provider: the provider; None: the one of the options.
-            clock: source of monotonic time in seconds.
+            provider: the provider; None for the provider in the options.
+            clock: function that returns monotonic time in seconds.
 
         Raises:
             AccessError: the extra `oidc` is not installed.
@@ -79,10 +80,10 @@ class OidcSignIn:
         self._pending: Pending[_Flow] = Pending(STATE_S)
 
     async def begin(self, redirect: str, place: str) -> OidcRedirect:
-        """Return the address of the provider's page for one sign-in.
+        """Return the address of the provider's page and the binding for one sign-in.
 
         Args:
-            redirect: address of this server to which the provider sends the browser.
+            redirect: address on this server to which the provider redirects the browser.
             place: network address of the browser.
 
         Raises:
@@ -106,18 +107,18 @@ class OidcSignIn:
         return OidcRedirect(f"{metadata.authorization}{joint}{urlencode(query)}", binding)
 
     async def finish(self, answer: Mapping[str, str], binding: str, now: float) -> ExternalAccount:
-        """Return the account with which a browser comes back.
+        """Return the account of a browser that returns from the provider.
 
         Args:
-            answer: the query of the redirect.
-            binding: the secret in the browser's cookie; "" without one.
+            answer: query parameters of the redirect.
+            binding: the secret in the browser's cookie; "" without a cookie.
             now: UTC time in seconds since 1970.
 
         Raises:
             AccessError: the sign-in was refused, took too long or began in another browser, or the
                 provider's response is invalid.
         """
-        # The state ends here, whatever follows: each state has one attempt.
+        # Each state allows one attempt, so it ends here in all cases.
         flow = self._pending.finish(answer.get("state", ""), self._clock())
         if flow is None or not compare_digest(flow.binding, digest_of(binding)):
             raise AccessError(_LATE)
@@ -138,7 +139,7 @@ class OidcSignIn:
         )
 
     async def _claims(self, response: Mapping[str, Any], nonce: str, now: float) -> dict[str, Any]:
-        """Return the claims of the ID token, and those of the account that the rules need."""
+        """Return the claims of the ID token; add claims of the account if the rules need them."""
         token = response.get("id_token")
         if not isinstance(token, str):
             raise AccessError("the provider sent no ID token: is the scope 'openid' allowed?")
@@ -158,7 +159,7 @@ class OidcSignIn:
         access = response.get("access_token")
         if isinstance(access, str) and not all(claim_values(claims, name) for name in wanted):
             more = await self._provider.userinfo(access)
-            # The response counts only for the same account (OpenID Connect Core, 5.3.2).
+            # The response must be about the same account (OpenID Connect Core, 5.3.2).
             if more.get("sub") == claims["sub"]:
                 claims = more | claims
         return claims
@@ -172,10 +173,10 @@ class OidcSignIn:
         return "?"
 
     def _ends_at(self, response: Mapping[str, Any], claims: Mapping[str, Any], now: float) -> float:
-        """Return the latest end of the sign-in, at most that of the provider's session.
+        """Return the latest end of the sign-in, limited by the provider's session.
 
-        The provider may tell the end of its session by the claim ``session_expiry`` (OpenID
-        Connect Enterprise Extensions) or by ``refresh_expires_in`` (Keycloak).
+        The provider may report the end of its session in the claim ``session_expiry`` (OpenID
+        Connect Enterprise Extensions) or in ``refresh_expires_in`` (Keycloak).
         """
         ends = [now + self.options.longest_s]
         until, lasts_s = claims.get("session_expiry"), response.get("refresh_expires_in")

@@ -1,6 +1,6 @@
-"""The options of an OpenID Connect provider: its address, our credentials, and roles by claims.
+"""The options of an OpenID Connect provider: address, credentials, and roles based on claims.
 
-Layer 4. The file of ``--oidc`` has them in YAML; see ``docs/sign-in.md``.
+Layer 4. The file for ``--oidc`` contains the options in YAML; see ``docs/sign-in.md``.
 """
 
 from collections.abc import Mapping
@@ -24,14 +24,14 @@ __all__ = [
 ]
 
 ANY: Final = "*"
-"""Value of a rule that holds for every value of its claim."""
+"""Value of a rule that matches every value of its claim."""
 LONGEST_H: Final = 12.0
-"""Longest life of a sign-in, in hours."""
+"""Longest duration of a sign-in, in hours."""
 KEYS: Final = (
     "issuer", "client_id", "client_secret_file", "title", "address", "scopes", "name",
     "authority_file", "hours", "grants",
 )  # fmt: skip
-"""All keys of the file."""
+"""All permitted keys of the file."""
 _RULE_KEYS: Final = ("claim", "value", "grant")
 _SCOPES: Final = ("openid", "profile")
 _OPENID: Final = "openid"
@@ -39,36 +39,36 @@ _MOST_RULES: Final = 200
 
 
 class ClaimRule(NamedTuple):
-    """One rule: people with a value of a claim get a grant."""
+    """One rule: a grant for people with a certain value of a claim."""
 
     claim: str
-    """Name of the claim; points lead into nested claims, as in ``realm_access.roles``."""
+    """Name of the claim; dots separate nested names, as in ``realm_access.roles``."""
     value: str
-    """The value, or `ANY`. A claim with a list holds if the list contains the value."""
+    """The value, or `ANY`. A list in the claim matches if it contains the value."""
     grant: Grant
 
 
 @dataclass(frozen=True, slots=True)
 class OidcOptions:
-    """The options."""
+    """The options of one provider."""
 
     issuer: str
-    """Address of the provider, exactly as in its tokens."""
+    """Address of the provider, exactly as written in its tokens."""
     client_id: str
-    """Name of this server at the provider."""
+    """Identifier of this server at the provider."""
     client_secret: str = field(default="", repr=False)
     """The secret of this server at the provider; "" for a public client."""
     title: str = ""
-    """Text on the button, such as the name of the school."""
+    """Text of the sign-in button, such as the name of the school."""
     address: str = ""
-    """Address by which browsers reach this server, without a path; "": the one of each request."""
+    """Public address of this server, without a path; "" to use the address in each request."""
     scopes: tuple[str, ...] = _SCOPES
     name: str = "preferred_username"
-    """Claim with the name of the person."""
+    """Claim that contains the person's name."""
     authority_file: Path | None = None
-    """Certificate authorities of the provider, in PEM; None: those of this machine."""
+    """Certificate authorities for the provider, in PEM format; None for those of this machine."""
     longest_s: float = LONGEST_H * 3600
-    """Longest life of a sign-in, in seconds."""
+    """Longest duration of a sign-in, in seconds."""
     rules: tuple[ClaimRule, ...] = ()
 
     def grants(self, claims: Mapping[str, Any]) -> tuple[Grant, ...]:
@@ -83,11 +83,11 @@ class OidcOptions:
 
 
 def claim_values(claims: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """Return the values of a claim as text: of a list all of its items.
+    """Return the values of a claim as text; a list has several values.
 
     Args:
         claims: the claims of a token.
-        name: name of the claim, or a path with points.
+        name: name of the claim, or a path with dots.
     """
     if name in claims:
         return _values(claims[name])
@@ -112,10 +112,10 @@ def _values_of_one(found: Any) -> tuple[str, ...]:
 
 
 def read_oidc_options(file: str) -> OidcOptions:
-    """Return the options in a file.
+    """Return the options from a file.
 
     Raises:
-        ProblemsError: the file or the file of a secret cannot be read, or a value is invalid.
+        ProblemsError: the file or a secret's file cannot be read, or a value is invalid.
     """
     options = OptionsFile(file, KEYS)
     issuer = options.text("issuer")

@@ -1,8 +1,8 @@
-"""The requests to an OpenID Connect provider: its description, its keys, and tokens for codes.
+"""Requests to an OpenID Connect provider for its description, its keys, and tokens.
 
-Layer 4. Every request ends within `TOTAL_S`, its response is limited to `MOST_BYTES`, and redirects
-are not followed. The description and the keys are kept for an hour. After a failure, the next
-attempt waits, so visitors of the sign-in page cannot make this server flood the provider.
+Layer 4. Every request ends within `TOTAL_S`, responses are limited to `MOST_BYTES`, and redirects
+are not followed. The description and the keys are cached for one hour. After a failure, the next
+attempt is delayed, so visitors to the sign-in page cannot make this server flood the provider.
 """
 
 import asyncio
@@ -24,40 +24,40 @@ __all__ = ["KEPT_S", "MOST_BYTES", "OidcProvider", "ProviderMetadata", "TOTAL_S"
 TOTAL_S: Final = 10.0
 """Timeout of one request, in seconds."""
 MOST_BYTES: Final = 262_144
-"""Largest response, in bytes."""
+"""Largest permitted response, in bytes."""
 KEPT_S: Final = 3600.0
-"""Time for which the description and the keys are kept, in seconds."""
+"""Time for which the description and the keys are cached, in seconds."""
 _CONNECT_S: Final = 5.0
 _RETRY_S: Final = 5.0
 _OTHER_KEYS_S: Final = 60.0
-"""Shortest time between two requests for the keys, in seconds."""
+"""Minimum time between two requests for the keys, in seconds."""
 _PATH: Final = "/.well-known/openid-configuration"
 
 
 class ProviderMetadata(NamedTuple):
-    """The part of a provider's description that a sign-in needs (OpenID Connect Discovery, 3)."""
+    """The parts of a provider's description needed for a sign-in (OpenID Connect Discovery, 3)."""
 
     authorization: str
-    """Address of the page on which people sign in."""
+    """Address of the provider's sign-in page."""
     token: str
-    """Address that gives tokens for codes."""
+    """Address for exchanging codes for tokens."""
     keys: str
     """Address of the keys."""
     userinfo: str = ""
-    """Address that gives more claims; "" if the provider has none."""
+    """Address for requesting more claims; "" if the provider has no such address."""
     is_secret_posted: bool = False
-    """Whether the provider accepts our secret only in the body of a request."""
+    """Whether the provider accepts this server's secret only in the request body."""
 
 
 class OidcProvider:
     """The provider of one server."""
 
     def __init__(self, options: OidcOptions, clock: Callable[[], float] = time.monotonic) -> None:
-        """Keep the options; the first request comes with the first sign-in.
+        """Store the options; the first sign-in triggers the first request.
 
         Args:
             options: the options.
-            clock: source of monotonic time in seconds.
+            clock: function that returns monotonic time in seconds.
         """
         self._options = options
         self._clock = clock
@@ -71,7 +71,7 @@ class OidcProvider:
         self._keys_at = float("-inf")
 
     async def metadata(self) -> ProviderMetadata:
-        """Return the description of the provider.
+        """Return the description of the provider, from the cache if possible.
 
         Raises:
             AccessError: the provider is unreachable, or its description is invalid.
@@ -96,8 +96,8 @@ class OidcProvider:
         """Return the keys of the provider, as JSON Web Keys.
 
         Args:
-            is_fresh: whether a token has an unknown key, so the kept keys may be too old. Even then
-                the keys are requested at most once a minute.
+            is_fresh: whether the cached keys may be outdated, because a token has an unknown key.
+                Even then, the keys are requested at most once a minute.
 
         Raises:
             AccessError: the provider is unreachable, or its response is invalid.
@@ -114,15 +114,15 @@ class OidcProvider:
             return self._keys
 
     async def redeem(self, code: str, verifier: str, redirect: str) -> dict[str, Any]:
-        """Return the token response for a code.
+        """Exchange a code for a token, and return the provider's response.
 
         Args:
-            code: code from the redirect of the browser.
+            code: code from the browser's redirect.
             verifier: the secret of this sign-in (PKCE, RFC 7636).
-            redirect: address to which the provider sent the browser.
+            redirect: address to which the provider redirected the browser.
 
         Raises:
-            AccessError: the provider is unreachable, or refuses the code.
+            AccessError: the provider is unreachable or rejects the code.
         """
         metadata = await self.metadata()
         form = {
@@ -136,15 +136,15 @@ class OidcProvider:
         if not secret or metadata.is_secret_posted:
             form |= {"client_id": user} | ({"client_secret": secret} if secret else {})
         else:
-            # Both are encoded as in forms before they are joined (RFC 6749, 2.3.1).
+            # Both parts are form-encoded before they are joined (RFC 6749, 2.3.1).
             credentials = httpx2.BasicAuth(quote(user, safe=""), quote(secret, safe=""))
         return await self._ask("POST", metadata.token, form=form, credentials=credentials)
 
     async def userinfo(self, token: str) -> dict[str, Any]:
-        """Return more claims of the account with an access token; empty if the provider has none.
+        """Return more claims of a token's account; empty if the provider does not offer them.
 
         Raises:
-            AccessError: the provider is unreachable, or refuses the token.
+            AccessError: the provider is unreachable or rejects the token.
         """
         metadata = await self.metadata()
         if not metadata.userinfo:
@@ -163,9 +163,9 @@ class OidcProvider:
     ) -> dict[str, Any]:
         """Return the JSON object in the response to a request."""
         if self._trust is None:
-            # Reading the certificate authorities takes tens of milliseconds.
+            # In a thread, because reading the certificate authorities takes tens of milliseconds.
             self._trust = await asyncio.to_thread(self._trusted)
-        # Without compression, so that the response cannot grow after the transfer.
+        # No compression, so that the response cannot grow after the transfer.
         sent = {"accept": "application/json", "accept-encoding": "identity", **(headers or {})}
         timeout = httpx2.Timeout(TOTAL_S, connect=_CONNECT_S)
         try:
@@ -210,7 +210,7 @@ def _json(url: str, status: int, body: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError):
         found = None
     if status != 200:
-        # The code of an OAuth error (RFC 6749, 5.2); its description may have any text.
+        # Show only the OAuth error code (RFC 6749, 5.2), because the description may be any text.
         reason = found.get("error") if isinstance(found, dict) else None
         shown = f": {reason}" if isinstance(reason, str) and reason.isidentifier() else ""
         raise AccessError(f"{url}: the provider replied with status {status}{shown[:80]}")
@@ -241,7 +241,7 @@ def _parsed(found: Mapping[str, Any], issuer: str) -> ProviderMetadata:
 
 
 def _address(found: Mapping[str, Any], key: str, *, is_private: bool) -> str:
-    """Return an address of the description; plain HTTP only on the machine of a plain issuer."""
+    """Return an address from the description; HTTP is valid only locally, for an HTTP issuer."""
     text = found.get(key)
     try:
         url = httpx2.URL(text if isinstance(text, str) else "")

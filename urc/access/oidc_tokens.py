@@ -1,7 +1,7 @@
-"""The check of ID tokens (OpenID Connect Core 1.0, 3.1.3.7).
+"""Validation of ID tokens (OpenID Connect Core 1.0, 3.1.3.7).
 
-Layer 4. Pure. Only asymmetric signatures are allowed: a provider cannot choose ``none``, or a
-signature with a secret that a page may know. The keys come from the provider over TLS.
+Layer 4. Pure. Only asymmetric signatures are allowed. A provider can choose neither ``none`` nor a
+signature with a shared secret, which a page may know. The provider sends its keys over TLS.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,15 +15,15 @@ ALGORITHMS: Final = (
     "RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512",
     "Ed25519",
 )  # fmt: skip
-"""Allowed algorithms of signatures (RFC 7518, RFC 9864)."""
+"""Allowed signature algorithms (RFC 7518, RFC 9864)."""
 LEEWAY_S: Final = 60.0
-"""Tolerance between the clocks of this machine and of the provider, in seconds."""
+"""Tolerated difference between the clocks of this machine and the provider, in seconds."""
 _SHORTEST_RSA: Final = 2048
 _LONGEST_TOKEN: Final = 65536
 
 
 class UnknownKey(AccessError):
-    """A token with a key that is not among the known keys of the provider."""
+    """The error for a token that was signed with an unknown key."""
 
 
 def verified_claims(
@@ -35,19 +35,19 @@ def verified_claims(
     nonce: str,
     now: float,
 ) -> dict[str, Any]:
-    """Return the claims of an ID token.
+    """Return the claims of an ID token after validation.
 
     Args:
         token: the token.
         keys: keys of the provider, as JSON Web Keys (RFC 7517).
         issuer: expected issuer.
-        client_id: name of this server at the provider.
-        nonce: the random text of this sign-in.
+        client_id: identifier of this server at the provider.
+        nonce: random text of this sign-in.
         now: UTC time in seconds since 1970.
 
     Raises:
-        UnknownKey: no key fits; newer keys of the provider may.
-        AccessError: the token is invalid, too old, or for another sign-in or server.
+        UnknownKey: no key matches, but the provider may have newer keys.
+        AccessError: the token is invalid or too old, or belongs to another sign-in or server.
     """
     claims = _signed(token, keys)
     audience = claims.get("aud")
@@ -98,7 +98,7 @@ def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     algorithm, name = header.get("alg"), header.get("kid")
     if algorithm not in ALGORITHMS:
         raise AccessError(f"the provider signs with {algorithm!r}, which is not allowed")
-    # Providers may add members of their own to the header; critical ones stay refused.
+    # Providers may add their own header members; unknown critical members are still rejected.
     registry = jws.JWSRegistry(algorithms=[algorithm], strict_check_header=False)
     for key in (one for one in keys if name is None or one.get("kid") == name):
         try:
@@ -112,14 +112,14 @@ def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _key(data: Mapping[str, Any]) -> Any:
-    """Return a public key that may sign tokens; raise `ValueError` for another one."""
+    """Return a key for checking signatures; raise `ValueError` for an unsuitable key."""
     from joserfc.jwk import ECKey, OKPKey, RSAKey
 
     kinds: dict[object, type[RSAKey | ECKey | OKPKey]] = {"RSA": RSAKey, "EC": ECKey, "OKP": OKPKey}
     kind = data.get("kty")
     if kind not in kinds or data.get("use", "sig") != "sig":
         raise ValueError("a key for another purpose")
-    # Base64 has six bits in each character.
+    # Each base64 character encodes six bits.
     if kind == "RSA" and len(str(data.get("n"))) * 6 < _SHORTEST_RSA:
         raise ValueError("a short key")
     return kinds[kind].import_key(dict(data))

@@ -1,7 +1,7 @@
-"""Files with the options of a way to sign in: YAML, with the line of every mistake.
+"""YAML files with sign-in options; every error contains the line.
 
-Layer 4. Secrets are never in the file itself: it names other files, which only their owner may
-read.
+Layer 4. The file contains no secrets. It names other files with the secrets, which only their owner
+may read.
 """
 
 import os
@@ -30,14 +30,14 @@ class OptionsFile:
 
         Args:
             file: path of the file.
-            keys: all keys that the file may have.
+            keys: all permitted keys of the file.
 
         Raises:
             ProblemsError: the file cannot be read, or is not a mapping with these keys.
         """
         self._document: Document = read_document(file, _LIMITS)
         self.folder = Path(file).resolve().parent
-        """Folder of the file; other files are named relative to it."""
+        """Folder of the file; paths of other files are relative to this folder."""
         data = self._document.data
         if not isinstance(data, dict):
             raise self.fault((), f"expected the keys: {', '.join(keys)}", "wrong-type")
@@ -58,18 +58,18 @@ class OptionsFile:
                 raise self.fault((*path, key), text, "unknown-key", is_key=True)
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return a text; raise `ProblemsError` for another type, or a missing key without default.
+        """Return a text; raise `ProblemsError` for a wrong type or a missing required key.
 
         Args:
             key: the key.
-            default: the value of a missing key; None: the key is mandatory.
+            default: value if the key is missing; None if the key is required.
         """
         return self.text_in((), self.data, key, default)
 
     def text_in(
         self, path: DocumentPath, data: dict[str, Any], key: str, default: str | None = None
     ) -> str:
-        """Return the text of a key in the mapping `data` at `path`; see `text`."""
+        """Return the text of a key in the mapping `data` at `path`; see also `text`."""
         value = data.get(key)
         if value is None and default is not None:
             return default
@@ -80,7 +80,7 @@ class OptionsFile:
         return value
 
     def list_of(self, key: str) -> list[Any]:
-        """Return a list; empty for a missing key; raise `ProblemsError` for another type."""
+        """Return a list, empty for a missing key; raise `ProblemsError` for a wrong type."""
         value = self.data.get(key)
         if value is None:
             return []
@@ -89,15 +89,15 @@ class OptionsFile:
         return value
 
     def secret(self, key: str, *, shortest: int = 1) -> str:
-        """Return the content of a secret's file, without spaces around it; "" for a missing key.
+        """Return the stripped content of a secret's file; "" if the key is missing.
 
         Args:
-            key: the key with the name of the file.
-            shortest: fewest characters of the secret.
+            key: the key that contains the path of the file.
+            shortest: minimum length of the secret, in characters.
 
         Raises:
-            ProblemsError: the file cannot be read, is too short or too long, or other users of this
-                machine may read it.
+            ProblemsError: the file cannot be read, is too short or too long, or is accessible to
+                other users of this machine.
         """
         if self.data.get(key) is None:
             return ""
@@ -122,6 +122,6 @@ class OptionsFile:
 
 
 def is_loopback_host(host: str) -> bool:
-    """Return whether a host of a URL is this machine, where plain HTTP is private."""
-    # A fixed list: any other name is resolved again at each request, and may then be elsewhere.
+    """Return whether a URL's host is this machine, where plain HTTP is private."""
+    # A fixed list, because any other name is resolved at each request and could change its address.
     return host in ("127.0.0.1", "localhost", "::1", "[::1]")

@@ -1,7 +1,7 @@
-"""Codes that work once: a device pairs, or an invited person chooses a passphrase.
+"""One-time codes that pair a device or let an invited person choose a passphrase.
 
-Layer 4. Each function is one transaction: after an error, such as a name that is in use, the code
-stays valid. The functions block for some milliseconds.
+Layer 4. Each function runs in one transaction. The code therefore stays valid after an error, such
+as a name in use. The functions block for a few milliseconds.
 """
 
 import hashlib
@@ -27,19 +27,19 @@ UNKNOWN_CODE: Final = "this code is unknown, was used already, or is too old"
 
 
 class Origin(NamedTuple):
-    """Origin of a request, for the list of sign-ins."""
+    """Origin of a request, as shown in the list of sign-ins."""
 
     place: str = ""
     """Network address."""
     agent: str = ""
-    """Browser and system in words."""
+    """Name of browser and system."""
 
 
 UNKNOWN_ORIGIN: Final = Origin()
 
 
 class NewSignIn(NamedTuple):
-    """A sign-in that has just begun."""
+    """A new sign-in with its secret."""
 
     principal: Principal
     sign_in: SignIn
@@ -49,12 +49,12 @@ class NewSignIn(NamedTuple):
 def pair(
     store: AccessStore, code: str, name: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
 ) -> NewSignIn:
-    """Make a device of the code's invitation, and open its sign-in, which is its key.
+    """Add a device with the code of an invitation; return its sign-in, which serves as its key.
 
     Args:
         store: the store.
         code: the code.
-        name: name that was chosen on the device; the invitation's own name comes first.
+        name: name chosen on the device, used if the invitation has no name.
         now: UTC time in seconds since 1970.
         origin: origin of the request.
 
@@ -75,7 +75,7 @@ def pair(
 def join(
     store: AccessStore, code: str, kept: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
 ) -> NewSignIn:
-    """Set the passphrase of an invited person, and sign the person in.
+    """Set an invited person's passphrase and sign the person in.
 
     Args:
         store: the store.
@@ -101,16 +101,16 @@ def join(
 
 
 def check_number(sign_in: SignIn) -> str:
-    """Return four digits that both screens show after a pairing, such as ``47 19``.
+    """Return the four digits that both screens show after a pairing, such as ``47 19``.
 
-    A person compares them by eye: another device that used the code first has other digits.
+    The user compares the digits. If another device has used the code first, its digits differ.
     """
     number = int.from_bytes(hashlib.sha256(b"urc pairing " + sign_in.digest).digest()[:4], "big")
     return f"{number // 100 % 100:02} {number % 100:02}"
 
 
 def free_name(directory: Directory, wanted: str) -> str:
-    """Return `wanted`, or a similar name if a device has it already, such as ``Phone 2``."""
+    """Return `wanted`, or a similar free name such as ``Phone 2`` if a device has that name."""
     number, name = 1, wanted
     while principal_named(directory, "device", name) is not None:
         number += 1
@@ -121,6 +121,6 @@ def free_name(directory: Directory, wanted: str) -> str:
 def _redeemed(store: AccessStore, code: str, now: float, kind: Kind) -> Invitation:
     found = store.redeem(code, now)
     if found is None or found.kind != kind:
-        # The error undoes the caller's transaction, so a code of the other kind stays valid.
+        # The error rolls back the caller's transaction, so a code of the other kind stays valid.
         raise AccessError(UNKNOWN_CODE)
     return found

@@ -1,7 +1,7 @@
-"""The passkeys of all people, in the store of people, devices and programs.
+"""Table of all passkeys, in the store of people, devices and programs.
 
-Layer 4. A passkey is a public key, so the table has no secret. The methods block for some
-milliseconds: servers call them in a thread.
+Layer 4. A passkey is a public key, so the table contains no secrets. The methods block for a few
+milliseconds, so servers call them in a thread.
 """
 
 from typing import Final, NamedTuple
@@ -12,49 +12,49 @@ from urc.access.store import AccessStore, parse_name
 __all__ = ["MOST_PASSKEYS", "Passkey", "PasskeyTable", "check_number"]
 
 MOST_PASSKEYS: Final = 20
-"""Most passkeys of one person."""
+"""Maximum number of passkeys per person."""
 
 
 class Passkey(NamedTuple):
-    """A public key whose private key is in a phone, a computer or a security key."""
+    """A public key; its private key is stored in a phone, a computer or a security key."""
 
     id: str
-    """Credential id in base64url; unique, no secret."""
+    """Credential id in base64url; unique, but not secret."""
     principal: str
-    """Id of its owner."""
+    """Id of the owner."""
     name: str
-    """Name for people, such as “Ann's phone”."""
+    """Display name, such as “Ann's phone”."""
     host: str
     """Host name for which browsers offer the passkey (the RP ID of WebAuthn)."""
     public_key: bytes
-    """The public key in the form of COSE (RFC 9052)."""
+    """The public key in COSE format (RFC 9052)."""
     counter: int
-    """The last value of its signature counter; 0 for passkeys without a counter."""
+    """Last value of the signature counter; 0 for passkeys without a counter."""
     created_at: float
-    """UTC time in seconds since 1970."""
+    """UTC creation time, in seconds since 1970."""
     used_at: float
-    """UTC time of the last sign-in; `created_at` before the first."""
+    """UTC time of the last sign-in; equal to `created_at` before the first sign-in."""
 
 
 def check_number(count: int) -> None:
-    """Raise `AccessError` if a person with `count` passkeys may have no further one."""
+    """Raise `AccessError` if a person with `count` passkeys may not add another passkey."""
     if count >= MOST_PASSKEYS:
         raise AccessError(f"you have {count} passkeys; remove one first")
 
 
 class PasskeyTable:
-    """The passkeys in the file."""
+    """Access to the passkeys in the store."""
 
     def __init__(self, store: AccessStore) -> None:
-        """Keep the store."""
+        """Use the table in `store`."""
         self._store = store
 
     def add(self, passkey: Passkey) -> Passkey:
-        """Add a passkey; return it with its name in the form that is kept.
+        """Add a passkey; return it with its normalized name.
 
         Raises:
-            AccessError: the name is invalid, the passkey is known, or the owner is not a person of
-                this server or has too many passkeys.
+            AccessError: the name is invalid, the passkey is already registered, or the owner is not
+                a person on this server or has too many passkeys.
         """
         passkey = passkey._replace(name=parse_name(passkey.name))
         with self._store.transaction() as base:
@@ -76,7 +76,7 @@ class PasskeyTable:
         return passkey
 
     def find(self, passkey: str) -> Passkey | None:
-        """Return the passkey with an id, or None."""
+        """Return the passkey with this id, or None."""
         with self._store.transaction() as base:
             row = base.execute("SELECT * FROM passkeys WHERE id = ?", (passkey,)).fetchone()
         return Passkey(*row) if row else None
@@ -90,7 +90,7 @@ class PasskeyTable:
         return [Passkey(*row) for row in rows]
 
     def rename(self, principal: str, passkey: str, name: str) -> None:
-        """Give a passkey of a person another name.
+        """Rename a person's passkey.
 
         Raises:
             AccessError: the name is invalid, or the person has no such passkey.
@@ -101,14 +101,14 @@ class PasskeyTable:
         )  # fmt: skip
 
     def remove(self, principal: str, passkey: str) -> None:
-        """Remove a passkey of a person; raise `AccessError` if the person has no such passkey."""
+        """Remove a person's passkey; raise `AccessError` if the person has no such passkey."""
         self._changed("DELETE FROM passkeys WHERE id = ? AND principal = ?", passkey, principal)
 
     def used(self, passkey: str, counter: int, now: float) -> None:
-        """Record a sign-in.
+        """Record a sign-in with a passkey.
 
         Raises:
-            AccessError: the passkey was removed, or a later sign-in was recorded already.
+            AccessError: the passkey was removed, or a later sign-in is already recorded.
         """
         self._changed(
             "UPDATE passkeys SET counter = ?, used_at = ? WHERE id = ? AND (counter < ? OR ? = 0)",

@@ -1,13 +1,13 @@
-"""Passkeys: a sign-in with the screen lock of a device, or with a security key (WebAuthn level 3).
+"""Passkeys: sign-in with a device's screen lock or a security key (WebAuthn level 3).
 
-Layer 4. A browser offers passkeys only on a page with a host name, never with an IP address, and
-only over HTTPS or on ``localhost``. The passkey belongs to that host name, so a page with another
-name cannot ask for it.
+Layer 4. A browser offers passkeys only on a page with a host name, not an IP address, and only over
+HTTPS or on ``localhost``. A passkey belongs to that host name, so a page on another host cannot
+request it.
 
-Theory of operation. Each ceremony has two requests. The first one returns options with a random
-challenge, which is valid once and for five minutes. The second one returns the signature of the
-authenticator. `Passkeys` blocks for some milliseconds (SQLite, signatures): servers call its
-methods in a thread, one call at a time for the challenges.
+Theory of operation. Each ceremony has two requests. The response to the first request contains
+options with a random challenge, which is valid once and for five minutes. The second request
+contains the authenticator's signature. The methods of `Passkeys` block for a few milliseconds
+(SQLite, signatures), so servers call them in a thread. A lock serializes access to the challenges.
 """
 
 import ipaddress
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["CHALLENGE_S", "Passkeys", "RelyingParty", "relying_party"]
 
 CHALLENGE_S: Final = 300.0
-"""Time for a ceremony, in seconds; also the timeout of the browser's dialog."""
+"""Time limit of a ceremony and of the browser's dialog, in seconds."""
 _NAME: Final = "URC"
 _LOCAL: Final = "localhost"
 _DEFAULT_PORTS: Final = {"http": 80, "https": 443}
@@ -41,18 +41,18 @@ log = logging.getLogger(__name__)
 
 
 class RelyingParty(NamedTuple):
-    """This server as browsers know it."""
+    """This server as seen by browsers."""
 
     host: str
-    """Host name, to which passkeys belong (the RP ID)."""
+    """Host name to which passkeys belong (the RP ID)."""
     origins: tuple[str, ...]
-    """Origins whose pages may ask for the passkeys."""
+    """Origins whose pages may request passkeys."""
 
 
 class _Ceremony(NamedTuple):
     host: str
     principal: str
-    """Id of the person who adds a passkey; "" for a sign-in."""
+    """Id of the person adding a passkey; "" for a sign-in."""
 
 
 def relying_party(host: str, port: int | None) -> RelyingParty:
@@ -60,7 +60,7 @@ def relying_party(host: str, port: int | None) -> RelyingParty:
 
     Args:
         host: host of the request's ``Host`` header; an IPv6 address keeps its brackets.
-        port: port of the header; None for the default port.
+        port: port in the ``Host`` header; None for the default port.
 
     Raises:
         AccessError: the host is an IP address.
@@ -82,11 +82,11 @@ class Passkeys:
     """The ceremonies of one server."""
 
     def __init__(self, table: PasskeyTable, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begin without challenges.
+        """Initialize without pending challenges.
 
         Args:
             table: the registered passkeys.
-            clock: source of monotonic time in seconds.
+            clock: function that returns monotonic time in seconds.
         """
         self.table = table
         self._clock = clock
@@ -115,18 +115,18 @@ class Passkeys:
         )
 
         passkeys = self.table.of(owner.id)
-        check_number(len(passkeys))  # before the authenticator makes one
+        check_number(len(passkeys))  # before the authenticator creates one
         known = [each for each in passkeys if each.host == party.host]
         options = generate_registration_options(
             rp_id=party.host,
             rp_name=_NAME,
-            # The id is random, so the passkey tells no name to other websites.
+            # The id is random, so the passkey reveals no name to other websites.
             user_id=owner.id.encode(),
             user_name=owner.name,
             challenge=_bytes(self._begin(_Ceremony(party.host, owner.id), place)),
             timeout=round(CHALLENGE_S * 1000),
             authenticator_selection=AuthenticatorSelectionCriteria(
-                # The sign-in page asks for no name: the authenticator must know the passkey.
+                # The sign-in page requests no name, so the authenticator must store the passkey.
                 resident_key=ResidentKeyRequirement.REQUIRED,
                 user_verification=UserVerificationRequirement.PREFERRED,
             ),
@@ -137,17 +137,17 @@ class Passkeys:
     def register(
         self, owner: Principal, party: RelyingParty, response: object, name: str, now: float
     ) -> Passkey:
-        """Add the passkey that a browser has made.
+        """Add a passkey that a browser has created.
 
         Args:
-            owner: the signed-in person, the same as for the options.
+            owner: the signed-in person who requested the options.
             party: this server.
             response: the result of ``navigator.credentials.create``, as JSON.
-            name: name of the passkey for people.
+            name: display name of the passkey.
             now: UTC time in seconds since 1970.
 
         Raises:
-            AccessError: the response is invalid or late, or the passkey cannot be added.
+            AccessError: the response is invalid or too late, or the passkey cannot be added.
         """
         from webauthn import verify_registration_response
         from webauthn.helpers import bytes_to_base64url
@@ -189,7 +189,7 @@ class Passkeys:
         return _as_json(options)
 
     def authenticate(self, party: RelyingParty, response: object, now: float) -> Passkey:
-        """Return the passkey that has signed a challenge of this server.
+        """Return the passkey that signed a challenge of this server.
 
         Args:
             party: this server.
@@ -197,7 +197,7 @@ class Passkeys:
             now: UTC time in seconds since 1970.
 
         Raises:
-            AccessError: the response is invalid or late, or the passkey is unknown.
+            AccessError: the response is invalid or too late, or the passkey is unknown.
         """
         from webauthn import verify_authentication_response
 
@@ -215,7 +215,7 @@ class Passkeys:
             expected_rp_id=party.host,
             expected_origin=list(party.origins),
             credential_public_key=passkey.public_key,
-            # The counter is compared below, for a message of its own.
+            # The counter is compared below, for a specific error message.
             credential_current_sign_count=0,
         )
         if passkey.counter and proof.new_sign_count <= passkey.counter:
@@ -234,7 +234,7 @@ class Passkeys:
             return self._pending.begin(ceremony, place, self._clock())
 
     def _finish(self, answer: Mapping[str, Any], expected: _Ceremony) -> str:
-        """Return the challenge of a response and end it; raise `AccessError` if it is not ours."""
+        """End and return the challenge in a response; raise `AccessError` if it is unknown."""
         challenge = _challenge_of(answer)
         with self._lock:
             found = self._pending.finish(challenge, self._clock())
@@ -250,17 +250,17 @@ def _checked(response: object) -> dict[str, Any]:
 
 
 def _challenge_of(answer: Mapping[str, Any]) -> str:
-    """Return the challenge that the browser has signed, as text; "" if the response has none."""
+    """Return the signed challenge as text; "" if the response contains no challenge."""
     try:
         data = json.loads(_bytes(answer["response"]["clientDataJSON"]))
-        # A page in a frame of another site may not use the passkeys of this server.
+        # A page in another site's frame must not use this server's passkeys.
         return "" if data.get("crossOrigin") else str(data["challenge"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return ""
 
 
 def _owner_of(answer: Mapping[str, Any]) -> str:
-    """Return the id of the owner that the authenticator has kept; "" if it has sent none."""
+    """Return the owner's id from the authenticator's response; "" without an id."""
     try:
         return _bytes(answer["response"].get("userHandle") or "").decode()
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -268,11 +268,11 @@ def _owner_of(answer: Mapping[str, Any]) -> str:
 
 
 def _verified(verify: Callable[..., Any], **given: Any) -> Any:
-    """Return the result of the library's check; raise `AccessError` after any fault."""
+    """Return the result of the library's check; raise `AccessError` for any failure."""
     try:
         return verify(**given)
     except Exception as error:
-        # The library lets errors of its parsers through, such as KeyError and struct.error.
+        # The library does not catch errors of its parsers, such as KeyError and struct.error.
         log.info("refused a passkey: %s", error)
         raise AccessError(_REFUSED) from None
 
@@ -290,6 +290,6 @@ def _bytes(text: str) -> bytes:
 
 
 def _origin(scheme: str, name: str, port: int | None) -> str:
-    """Return an origin as browsers write it: without a default port."""
+    """Return an origin as browsers write it, without a default port."""
     is_default = port in (None, _DEFAULT_PORTS[scheme])
     return f"{scheme}://{name}" if is_default else f"{scheme}://{name}:{port}"

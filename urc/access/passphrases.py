@@ -1,8 +1,8 @@
-"""Passphrases: the rules for new ones, their argon2id hashes, and the check of a sign-in.
+"""Passphrases: rules for new passphrases, argon2id hashes, and the check at sign-in.
 
-Layer 4. Slow on purpose: a hash takes about 50 ms and 64 MiB. Servers therefore make one
-hash at a time, in a thread. RFC 9106 (argon2id, the second recommended choice of
-parameters); NIST SP 800-63B-4 for the rules: length counts, common passwords are refused, and no
+Layer 4. A hash is deliberately slow and takes about 50 ms and 64 MiB. Servers therefore compute one
+hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, the second recommended choice of
+parameters). The rules follow NIST SP 800-63B-4: a minimum length, no common passwords, and no
 composition rules.
 """
 
@@ -25,31 +25,31 @@ __all__ = [
 ]
 
 SHORTEST: Final = 8
-"""Fewest characters."""
+"""Minimum number of characters."""
 LONGEST: Final = 256
-"""Most characters; the hash of a longer text would cost an attacker nothing and the server time."""
+"""Maximum number of characters; longer texts would let attackers waste the server's time."""
 WRONG: Final = "the name or the passphrase is wrong"
 _FEWEST_DIFFERENT: Final = 4
 _JUDGED: Final = 16
-"""Characters that the estimate of guesses reads; 16 take at most 0.1 s."""
+"""Number of characters used to estimate guesses; 16 characters take at most 0.1 s."""
 _FEWEST_POINTS: Final = 2
-"""Fewest points of the estimate; 2 of 4 means more than a million guesses."""
+"""Minimum score of the estimate; 2 of 4 means more than a million guesses."""
 _OWN_WORDS: Final = ("urc", "robot", "robots", "controller")
 _HASHER: Final = argon2.PasswordHasher()
 _NEVER: Final = (
     "$argon2id$v=19$m=65536,t=3,p=4$"
     "Y9S+Qk9ql1FsY7cIblZ4kg$+SK2RqF890o7afnBg00/BKpDnvcql9WqfC07seo0hAU"
 )
-"""Compared for unknown names, so that the time of the answer does not tell which names exist.
-A literal, because computing the hash would take 50 ms of each start of a server."""
+"""Hash compared for unknown names, so that the response time does not reveal which names exist.
+The hash is a literal, because computing it would delay each server start by 50 ms."""
 
 
 def hash_of(passphrase: str, *, name: str = "") -> str:
     """Return the hash of a new passphrase, with its salt and parameters.
 
     Raises:
-        AccessError: the passphrase is too short, too long or too uniform, is the name, or is easy
-            to guess, such as a common password.
+        AccessError: the passphrase is too short, too long, too uniform, identical to the name, or
+            easy to guess, such as a common password.
     """
     passphrase = _normal(passphrase)
     length = len(passphrase)
@@ -69,10 +69,10 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
 
 
 def matches(passphrase: str, kept: str | None) -> bool:
-    """Return whether `passphrase` belongs to the hash; always takes the time of one hash.
+    """Return whether `passphrase` matches the hash; the check always takes the time of one hash.
 
     Args:
-        passphrase: text of the person who signs in.
+        passphrase: passphrase entered at the sign-in.
         kept: the result of `hash_of`; None for an unknown person.
     """
     if len(passphrase) > LONGEST:
@@ -89,15 +89,15 @@ def matches(passphrase: str, kept: str | None) -> bool:
 
 
 def is_stale(kept: str) -> bool:
-    """Return whether the hash has older parameters and should be replaced at the next sign-in."""
+    """Return whether the hash has outdated parameters and should be replaced."""
     return _HASHER.check_needs_rehash(kept)
 
 
 def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
-    """Return the id of the person with this name and passphrase; "" if one of them is wrong.
+    """Return the id of the person with this name and passphrase; "" if either is wrong.
 
-    The answer takes equally long for an unknown name and for a wrong passphrase. A hash with older
-    parameters is replaced. The call blocks for about 50 ms.
+    An unknown name and a wrong passphrase take the same time. A hash with outdated parameters is
+    replaced. The call blocks for about 50 ms.
 
     Raises:
         AccessError: the store cannot be used.
@@ -114,11 +114,11 @@ def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
 
 
 def _is_common(passphrase: str, name: str) -> bool:
-    """Return whether a million guesses of a program find the passphrase.
+    """Return whether a program could find the passphrase with a million guesses.
 
-    Only its beginning counts, because the estimate of a long text can take seconds.
+    Only the beginning of the passphrase is checked, because a long text can take seconds.
     """
-    from zxcvbn import zxcvbn  # a megabyte of word lists, loaded only for new passphrases
+    from zxcvbn import zxcvbn  # one megabyte of word lists, needed only for new passphrases
 
     known = [*_OWN_WORDS, *name.split()]
     score: int = zxcvbn(passphrase[:_JUDGED], user_inputs=known)["score"]
@@ -126,5 +126,5 @@ def _is_common(passphrase: str, name: str) -> bool:
 
 
 def _normal(passphrase: str) -> str:
-    """Return the one form of texts that look equal; keyboards write “é” in two ways (NFKC)."""
+    """Return the text in NFKC form, because keyboards can encode “é” in two ways."""
     return unicodedata.normalize("NFKC", passphrase)

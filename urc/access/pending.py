@@ -1,7 +1,7 @@
-"""Sign-ins that wait for their second request: each one works once, and only for a short time.
+"""Pending sign-ins, which wait a short time for their second request and can be used once.
 
-Layer 4. Pure. A passkey answers a challenge of the server, and an OpenID Connect provider sends the
-browser back with a state. The limits bound the memory that unknown visitors can take.
+Layer 4. Pure. A passkey signs a challenge of the server. An OpenID Connect provider returns the
+browser with a state. The limits restrict the memory that unknown visitors can occupy.
 """
 
 import ipaddress
@@ -12,9 +12,9 @@ from typing import Final, Generic, NamedTuple, TypeVar
 __all__ = ["MOST_PENDING", "MOST_PENDING_HERE", "Pending", "place_of"]
 
 MOST_PENDING: Final = 2048
-"""Most pending sign-ins; a new one replaces the oldest."""
+"""Maximum number of pending sign-ins; above the limit, the oldest is dropped."""
 MOST_PENDING_HERE: Final = 16
-"""Most pending sign-ins of one place; a new one replaces the oldest of the same place."""
+"""Maximum number of pending sign-ins per place; above the limit, the place's oldest is dropped."""
 _SUBNET: Final = 64
 
 _Value = TypeVar("_Value")
@@ -27,32 +27,32 @@ class _Entry(NamedTuple, Generic[_Value]):
 
 
 class Pending(Generic[_Value]):
-    """Values by random keys of 256 bits."""
+    """Values, accessible by random 256-bit keys."""
 
     def __init__(self, lasts_s: float) -> None:
-        """Begin empty.
+        """Initialize without values.
 
         Args:
-            lasts_s: time after which a key is invalid, in seconds.
+            lasts_s: validity of a key, in seconds.
         """
         self._lasts_s = lasts_s
         self._entries: OrderedDict[str, _Entry[_Value]] = OrderedDict()
 
     def __len__(self) -> int:
-        """Return the number of keys, including those whose time has run out."""
+        """Return the number of keys, including expired keys."""
         return len(self._entries)
 
     def begin(self, value: _Value, place: str, now: float) -> str:
-        """Keep a value and return its key.
+        """Store a value and return its key.
 
         Args:
-            value: the value, which the key returns once.
+            value: the value, which can be retrieved once.
             place: network address of the visitor.
             now: monotonic time in seconds.
         """
         place = place_of(place)
         self._forget_old(now)
-        # A place at its limit loses its own oldest key, never that of another place.
+        # At its limit, a place loses its own oldest key, never another place's key.
         here = [key for key, entry in self._entries.items() if entry.place == place]
         if len(here) >= MOST_PENDING_HERE:
             del self._entries[here[0]]
@@ -63,21 +63,21 @@ class Pending(Generic[_Value]):
         return key
 
     def finish(self, key: str, now: float) -> _Value | None:
-        """Return the value of a key and end the key; None for an unknown or late key."""
+        """Return the value of a key and delete the key; None for an unknown or expired key."""
         self._forget_old(now)
         entry = self._entries.pop(key, None)
         return entry.value if entry else None
 
     def _forget_old(self, now: float) -> None:
-        # All keys last equally long, so the oldest ones are first.
+        # All keys have the same validity, so the oldest keys are first.
         while self._entries and next(iter(self._entries.values())).ends_at <= now:
             self._entries.popitem(last=False)
 
 
 def place_of(address: str) -> str:
-    """Return the part of an address by which visitors are counted.
+    """Return the part of an address that identifies a visitor's network for the limits.
 
-    One device chooses among 2⁶⁴ addresses of its IPv6 network, so the network counts.
+    A device can use any of 2⁶⁴ addresses in its IPv6 network, so the limit applies to the network.
     """
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])

@@ -1,8 +1,8 @@
-"""Trusted proxies: web servers in front of URC that sign people in, and name them in a header.
+"""Trusted proxies: web servers in front of URC that sign people in and send their names.
 
-Layer 4. Pure, except for `read_proxy_options`. The name counts only together with the secret of the
-proxy, never because of a network address. Without the secret both headers are removed, so no client
-and no other proxy can name a person.
+Layer 4. Pure, except for `read_proxy_options`. URC accepts a name only together with the proxy's
+secret, regardless of the network address. Without the secret, both headers are removed, so neither
+a client nor another proxy can set a name.
 """
 
 import re
@@ -17,48 +17,48 @@ from urc.access.options_file import OptionsFile
 __all__ = ["KEYS", "ProxiedRequest", "TrustedProxy", "read_proxy_options", "without_proxy_headers"]
 
 SHORTEST_SECRET: Final = 32
-"""Fewest characters of the secret; 32 random letters cannot be guessed."""
+"""Minimum length of the secret; 32 random letters cannot be guessed."""
 KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
-"""All keys of the file."""
+"""All permitted keys of the file."""
 _HEADER: Final = re.compile(r"[A-Za-z0-9-]{1,64}")
 _TAKEN: Final = re.compile(
     r"host|origin|cookie|authorization|connection|upgrade|content-.*|transfer-.*|sec-.*|user-agent",
     re.IGNORECASE,
 )
-"""Headers that browsers or HTTP use themselves."""
+"""Headers with a meaning in browsers or HTTP, which a proxy must not use for names or secrets."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
 @dataclass(frozen=True, slots=True)
 class TrustedProxy:
-    """One proxy."""
+    """One trusted proxy."""
 
     name: str
-    """Name for logs."""
+    """Name of the proxy in logs."""
     user_header: bytes
-    """Header with the name of the person, in lower case."""
+    """Name of the header with the person's name, in lower case."""
     secret_header: bytes
-    """Header with the secret, in lower case."""
+    """Name of the header with the secret, in lower case."""
     secret: bytes = field(repr=False)
     new_people: tuple[Grant, ...] = ()
-    """Grants of a person who does not exist yet; empty: such people are refused."""
+    """Grants of a new person; if empty, new people are rejected."""
 
 
 class ProxiedRequest(NamedTuple):
-    """The headers of one request, after the check of the proxies."""
+    """The headers of one request after the proxy check."""
 
     headers: list[tuple[bytes, bytes]]
-    """The headers without those of proxies."""
+    """The headers without proxy headers."""
     proxy: TrustedProxy | None = None
-    """The proxy that has proven itself, or None."""
+    """The proxy whose secret was correct, or None."""
     user: str = ""
-    """Name of the person, as the proxy has proven it; "" if the proxy names none."""
+    """Name of the person according to the proxy; "" if the proxy sent no name."""
     fault: str = ""
-    """Reason why headers of a proxy were ignored, or ""."""
+    """Reason why proxy headers were ignored, or ""."""
 
 
 def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) -> ProxiedRequest:
-    """Return the headers of a request without those of proxies, and the proven person.
+    """Return a request's headers without proxy headers, and the person confirmed by a proxy.
 
     Args:
         headers: headers of the request, with names in lower case.
@@ -74,7 +74,7 @@ def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) ->
         kept = [pair for pair in kept if pair[0] not in ours]
         if not users and not secrets:
             continue
-        # A second header of the same name comes from the client: the proxy must replace it.
+        # A second header with the same name is from the client; the proxy should have replaced it.
         if len(secrets) != 1 or not compare_digest(secrets[0], proxy.secret):
             fault = f"the header {proxy.user_header.decode()} came without the secret of the proxy"
         elif len(users) > 1:
@@ -89,10 +89,10 @@ def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) ->
 
 
 def read_proxy_options(file: str) -> TrustedProxy:
-    """Return the proxy that a file describes.
+    """Return the proxy described by a file.
 
     Raises:
-        ProblemsError: the file or the file of the secret cannot be read, or a value is invalid.
+        ProblemsError: the file or the secret's file cannot be read, or a value is invalid.
     """
     options = OptionsFile(file, KEYS)
     user, secret = (_header(options, key) for key in ("user_header", "secret_header"))

@@ -1,11 +1,11 @@
 """The store of people, devices, programs, sign-ins and pairing codes: one private SQLite file.
 
-Layer 4. Secrets are stored as hashes only. Several processes may use the file: the server, and the
-commands that manage people on the same machine. `changed` tells each of them of the changes of the
-others, so a removal by command line acts on a running server.
+Layer 4. Secrets are stored as hashes only. Several processes can use the file: the server and the
+management commands on the same machine. `changed` reports changes by other processes, so a removal
+on the command line takes effect on a running server.
 
-Theory of operation. Each change is one transaction. `directory` reads all tables, a few thousand
-rows at most, into an immutable `Directory`; readers never see half a change.
+Theory of operation. Each change is one transaction. `directory` reads all tables, with at most a
+few thousand rows, into an immutable `Directory`. Readers never see a partial change.
 """
 
 import json
@@ -35,16 +35,16 @@ __all__ = [
 
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
-"""Most sign-ins and tokens; the least recently used sign-in is closed for a new one."""
+"""Maximum number of sign-ins, without tokens; a new sign-in closes the least recently used one."""
 MOST_PRINCIPALS: Final = 5000
 MOST_INVITATIONS: Final = 1000
 MOST_SIGN_INS_OF_ONE: Final = 100
-"""Most sign-ins of one person; the least recently used one is closed for a new one. One person
-therefore cannot end the sign-ins of others."""
+"""Maximum number of sign-ins per person; a new sign-in closes the least recently used one. One
+person therefore cannot end the sign-ins of others."""
 MOST_CODES_OF_ONE: Final = 8
-"""Most valid codes for devices of one person; a new code replaces the oldest."""
+"""Maximum number of valid pairing codes per person; above the limit, the oldest code ends."""
 MOST_DEVICES_OF_ONE: Final = 50
-"""Most paired devices of one person."""
+"""Maximum number of paired devices per person."""
 LONGEST_NAME: Final = 64
 _VERSION: Final = 1
 _BUSY_S: Final = 5.0
@@ -82,25 +82,25 @@ _CREATE: Final = (
 
 
 class Invitation(NamedTuple):
-    """The right to become a device or a person, by a code that works once."""
+    """The right to pair a device or sign in as a person with a one-time code."""
 
     kind: Kind
     name: str
-    """Suggested name; "" lets the new device choose."""
+    """Suggested name; "" lets the user choose a name on the new device."""
     grants: tuple[Grant, ...]
     owner: str = ""
-    """Id of the person whose device pairs, or of the invited person, who sets a passphrase."""
+    """Id of the device's owner, or of the person invited to set a passphrase."""
     ends_at: float = 0.0
 
 
 class AccessStore:
-    """The file. Its methods block for some milliseconds: servers call them in a thread."""
+    """The file; its methods block for a few milliseconds, so servers call them in a thread."""
 
     def __init__(self, folder: Path) -> None:
         """Open the file, and create it if it is missing.
 
         Raises:
-            AccessError: the file cannot be opened, or a newer URC wrote it.
+            AccessError: the file cannot be opened, or was written by a newer version of URC.
         """
         self.file = folder / FILE
         self._lock = threading.RLock()
@@ -118,7 +118,7 @@ class AccessStore:
 
     def _prepare(self) -> None:
         self._base.execute("PRAGMA foreign_keys = ON")
-        # Hashes of removed people are overwritten in the file, not only unlinked.
+        # Overwrite the hashes of removed people in the file, instead of only unlinking them.
         self._base.execute("PRAGMA secure_delete = ON")
         with self._change():
             (version,) = self._base.execute("PRAGMA user_version").fetchone()
@@ -135,18 +135,18 @@ class AccessStore:
             self._base.close()
 
     def changed(self) -> bool:
-        """Return whether another process changed the file since the last call."""
+        """Return whether another process has changed the file since the last call."""
         was, self._seen = self._seen, self._version()
         return was != self._seen
 
     def instance(self) -> str:
-        """Return the identifier of this store, which names its cookies."""
+        """Return the identifier of this store, which is part of its cookies' names."""
         with self._lock, self._readable():
             (instance,) = self._base.execute("SELECT instance FROM server").fetchone()
         return str(instance)
 
     def directory(self) -> Directory:
-        """Return the present directory."""
+        """Return the current directory."""
         with self._lock, self._readable():
             principals = {row[0]: _principal(row) for row in self._rows("principals")}
             sign_ins = {row[0]: SignIn(*row) for row in self._rows("sign_ins")}
@@ -169,13 +169,13 @@ class AccessStore:
         """Add a principal and return it.
 
         Args:
-            kind: its kind.
-            name: its name, unique among its kind regardless of case.
-            grants: its rights.
+            kind: kind of the principal.
+            name: name of the principal, unique within its kind, ignoring case.
+            grants: grants of the principal.
             now: UTC time in seconds since 1970.
-            owner: id of the person whose device it is.
-            commands: commands that a program may give; none: all of its role.
-            ends_at: UTC time after which all rights end; None: never.
+            owner: id of the person who owns the device.
+            commands: commands that a program may send; empty for all commands of its role.
+            ends_at: UTC time at which all rights end; None for no end.
 
         Raises:
             AccessError: the name is empty, too long or in use, or there are too many principals.
@@ -204,14 +204,14 @@ class AccessStore:
         return principal
 
     def rename(self, principal: str, name: str) -> None:
-        """Give a principal another name; raise `AccessError` if it is in use or invalid."""
+        """Rename a principal; raise `AccessError` if the name is in use or invalid."""
         try:
             self._update("UPDATE principals SET name = ? WHERE id = ?", parse_name(name), principal)
         except sqlite3.IntegrityError:
             raise AccessError(f"the name {name!r} is in use") from None
 
     def set_grants(self, principal: str, grants: Iterable[Grant]) -> None:
-        """Replace the rights of a principal; raise `AccessError` if it is unknown."""
+        """Replace the grants of a principal; raise `AccessError` if the principal is unknown."""
         self._update(
             "UPDATE principals SET grants = ? WHERE id = ?", grants_to_json(grants), principal
         )
@@ -223,8 +223,9 @@ class AccessStore:
             AccessError: the principal is unknown.
         """
         with self._change():
-            # Devices and codes name their owner without a foreign key, because most have none.
-            # Sign-ins, passphrases and passkeys go with their principal (ON DELETE CASCADE).
+            # Devices and codes have no foreign key for their owner, because most have no owner.
+            # Sign-ins, passphrases and passkeys are deleted with their principal (ON DELETE
+            # CASCADE).
             self._base.execute("DELETE FROM principals WHERE owner = ?", (principal,))
             self._base.execute("DELETE FROM invitations WHERE owner = ?", (principal,))
             self._update("DELETE FROM principals WHERE id = ?", principal)
@@ -242,7 +243,7 @@ class AccessStore:
                 raise AccessError("that person was removed") from None
 
     def passphrase_of(self, name: str) -> tuple[str, str | None]:
-        """Return id and hash of the person with that name; "" and None without one."""
+        """Return the id and hash of the person with this name; "" and None without a match."""
         with self._lock, self._readable():
             row = self._base.execute(
                 "SELECT id, hash FROM principals LEFT JOIN passphrases ON principal = id"
@@ -264,7 +265,7 @@ class AccessStore:
         place: str = "",
         agent: str = "",
     ) -> tuple[SignIn, str]:
-        """Open a sign-in and return it with its secret, which is never stored.
+        """Open a sign-in; return the sign-in and its secret, which is never stored.
 
         Raises:
             AccessError: the principal was removed.
@@ -275,8 +276,8 @@ class AccessStore:
             place[:LONGEST_NAME], agent[:LONGEST_NAME],
         )  # fmt: skip
         with self._change():
-            # Room for the new sign-in: first within the limit of its person, then within that of
-            # all. Tokens stay, because a program cannot sign in again by itself.
+            # Make room for the new sign-in, first within its person's limit, then within the total
+            # limit. Tokens remain, because a program cannot sign in again by itself.
             self._base.execute(
                 "DELETE FROM sign_ins WHERE ends_at <= ? OR used_at + idle_s <= ?", (now, now)
             )
@@ -297,7 +298,7 @@ class AccessStore:
         return sign_in, secret
 
     def touch_all(self, used: Mapping[str, float]) -> None:
-        """Record the last use of sign-ins, by id; removed sign-ins stay removed."""
+        """Record the last use of sign-ins by id, and ignore removed sign-ins."""
         with self._change():
             self._base.executemany(
                 "UPDATE sign_ins SET used_at = max(used_at, ?) WHERE id = ?",
@@ -305,7 +306,7 @@ class AccessStore:
             )
 
     def close_sign_in(self, sign_in: str) -> None:
-        """Close a sign-in; raise `AccessError` if it is unknown."""
+        """Close a sign-in; raise `AccessError` for an unknown sign-in."""
         self._update("DELETE FROM sign_ins WHERE id = ?", sign_in)
 
     # Codes that work once
@@ -314,8 +315,8 @@ class AccessStore:
         """Return a new code for `invitation`.
 
         Args:
-            invitation: the right that the code gives.
-            now: UTC time in seconds since 1970, at which older codes may have ended.
+            invitation: the right that the code conveys.
+            now: UTC time in seconds since 1970, for deleting expired codes.
 
         Raises:
             AccessError: too many codes are valid.
@@ -346,7 +347,7 @@ class AccessStore:
         return code
 
     def invitation(self, code: str, now: float) -> Invitation | None:
-        """Return the invitation of a code, which stays valid; None if it is unknown or too old."""
+        """Return a code's invitation; the code stays valid. None for an unknown or expired code."""
         with self._change():
             row = self._base.execute(
                 "SELECT kind, name, grants, owner, ends_at FROM invitations"
@@ -356,7 +357,7 @@ class AccessStore:
         return _invitation(row) if row else None
 
     def redeem(self, code: str, now: float) -> Invitation | None:
-        """Return the invitation of a code, and end it; None if the code is unknown or too old."""
+        """Return a code's invitation and end the code; None if the code is unknown or expired."""
         with self._change():
             self._base.execute("DELETE FROM invitations WHERE ends_at <= ?", (now,))
             row = self._base.execute(
@@ -368,7 +369,7 @@ class AccessStore:
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Make one transaction of all changes in the context, and undo all after an error.
+        """Run all changes in the context as one transaction, and roll back after an error.
 
         Raises:
             AccessError: another process has locked the file for several seconds.
@@ -379,20 +380,21 @@ class AccessStore:
     # Inside
 
     def _version(self) -> int:
-        """Return a number that changes with each change by another process."""
+        """Return a number that changes whenever another process changes the file."""
         with self._lock, self._readable():
             (version,) = self._base.execute("PRAGMA data_version").fetchone()
         return int(version)
 
     @contextmanager
     def _change(self) -> Iterator[None]:
-        """Run one transaction; a nested one is part of the outer one."""
+        """Run one transaction; a nested transaction is part of the outer transaction."""
         with self._lock:
             if self._base.in_transaction:
                 yield
                 return
             with self._readable():
-                # Immediate: of two processes that read first, one would fail at its first change.
+                # With a deferred transaction, two processes could read first, and one would then
+                # fail to write.
                 self._base.execute("BEGIN IMMEDIATE")
                 try:
                     yield
@@ -403,7 +405,7 @@ class AccessStore:
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
-        """Raise `AccessError` in place of an error of the disk, or of a file that stays locked."""
+        """Raise `AccessError` instead of SQLite's error for a disk failure or a locked file."""
         try:
             yield
         except sqlite3.OperationalError as error:
@@ -423,10 +425,10 @@ class AccessStore:
 
 
 def parse_name(name: str) -> str:
-    """Return a name with single spaces.
+    """Return a name with normalized spaces.
 
     Raises:
-        AccessError: the name is empty or too long, or has invisible characters.
+        AccessError: the name is empty or too long, or contains invisible characters.
     """
     name = " ".join(name.split())
     if not name:

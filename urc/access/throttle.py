@@ -1,8 +1,9 @@
-"""The limit on failed attempts to sign in, to pair or to open a link.
+"""Rate limit for failed attempts to sign in, pair or open a link.
 
-Layer 4. Pure. Each address, and each name that is tried, has a bucket of attempts. After `FREE`
-failures the wait doubles with each one, up to `LONGEST_S`. A success empties the bucket of the name
-alone: an attacker with one valid account cannot clear an address. STOP is never throttled here.
+Layer 4. Pure. Each address and each attempted name has its own count of failures. After `FREE`
+failures, each further failure doubles the wait, up to `LONGEST_S`. A success clears only the count
+of the name, so an attacker with one valid account cannot clear the count of an address. STOP is
+never throttled here.
 """
 
 from collections import OrderedDict
@@ -11,13 +12,13 @@ from typing import Final, NamedTuple
 __all__ = ["FREE", "LONGEST_S", "MOST", "Throttle"]
 
 FREE: Final = 5
-"""Failures without a wait."""
+"""Number of failures without a wait."""
 LONGEST_S: Final = 30.0
 """Longest wait between two attempts, in seconds."""
 FORGET_S: Final = 900.0
 """Time after which failures are forgotten, in seconds."""
 MOST: Final = 4096
-"""Most buckets; the least recently used one is forgotten."""
+"""Maximum number of counts; above the limit, the least recently used is dropped."""
 
 
 class _Bucket(NamedTuple):
@@ -26,17 +27,17 @@ class _Bucket(NamedTuple):
 
 
 class Throttle:
-    """Failed attempts by address and by name."""
+    """Counts of failed attempts by address and by name."""
 
     def __init__(self) -> None:
         self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
 
     def wait_s(self, now: float, *keys: str) -> float:
-        """Return the time until the next attempt is allowed, in seconds; 0 if it is allowed now.
+        """Return the time until the next permitted attempt, in seconds; 0 if permitted now.
 
         Args:
             now: monotonic time in seconds.
-            keys: keys of the attempt, such as its address and the name that is tried.
+            keys: keys of the attempt, such as its address and the attempted name.
         """
         return max((self._wait_s(now, key) for key in keys), default=0.0)
 
@@ -46,7 +47,7 @@ class Throttle:
             bucket = self._bucket(now, key)
             self._buckets[key] = _Bucket(bucket.failures + 1, now)
             self._buckets.move_to_end(key)
-        # An attacker needs this many addresses before the failures of one are forgotten early.
+        # To clear one address's failures early, an attacker would need this many addresses.
         while len(self._buckets) > MOST:
             self._buckets.popitem(last=False)
 
@@ -64,6 +65,7 @@ class Throttle:
         bucket = self._bucket(now, key)
         if bucket.failures < FREE:
             return 0.0
-        # 1, 2, 4, … s: a person who mistypes hardly waits, and a program guesses twice a minute.
+        # Waits of 1, 2, 4, … s hardly delay a person who mistypes, but limit a program to two
+        # guesses a minute.
         pause_s = min(LONGEST_S, 2.0 ** (bucket.failures - FREE))
         return max(0.0, bucket.at + pause_s - now)

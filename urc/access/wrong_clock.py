@@ -1,7 +1,7 @@
 """Detection of a clock that is behind, such as the clock of a Raspberry Pi without a network.
 
-Layer 4. Pure. A clock that is earlier than a known event is wrong. A clock that is ahead cannot be
-detected.
+Layer 4. Pure. A clock that shows a time before a known event is wrong. A clock that is ahead cannot
+be detected.
 """
 
 import time
@@ -12,13 +12,13 @@ from typing import Final, NamedTuple
 __all__ = ["RELEASED", "KnownTime", "clock_fault"]
 
 RELEASED: Final = datetime(2026, 11, 1, tzinfo=UTC)
-"""Day of this version's release; an earlier time of the machine's clock is wrong."""
+"""Release day of this version; a clock that shows an earlier time is wrong."""
 _SLACK_S: Final = 120.0
-"""Difference that is no fault, in seconds: time servers set clocks back by small steps."""
+"""Tolerated difference in seconds, because time servers set clocks back in small steps."""
 
 
 class KnownTime(NamedTuple):
-    """A time that is past."""
+    """A time in the past."""
 
     at: float
     """UTC time in seconds since 1970."""
@@ -31,7 +31,7 @@ def clock_fault(now: float, known: Iterable[KnownTime] = ()) -> str:
 
     Args:
         now: UTC time of the machine's clock, in seconds since 1970.
-        known: times of events in the past; the day of the release is always known.
+        known: times of past events; the release day is always included.
     """
     release = KnownTime(RELEASED.timestamp(), "the release of this version of URC")
     newest = max([release, *known])

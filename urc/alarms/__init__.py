@@ -1,1 +1,1 @@
-"""Alarm states of one robot, as in ISA-18.2; pure, with the time passed by callers."""
+"""Alarm states of one robot, as in ISA-18.2. The code is pure; callers pass the time."""

@@ -1,11 +1,11 @@
 """The alarms of one robot: a state machine for each signal with limits, as in ISA-18.2.
 
-Layer 3. Pure. Inputs are alarms of samples, suppression, lost values, and the actions of operators,
-each with its time. Outputs are the records, and the events of the history.
+Layer 3. Pure. The inputs are sample alarms, suppression, lost values and operator actions, each
+with its time. The outputs are the records and the history events.
 
-An alarm leaves the list only by a return to normal that is acknowledged, or by a new document. An
-alarm whose value becomes unknown stays. A chattering alarm (3 activations in a minute) ends only
-after 10 s of normal values, so it neither flashes nor fills the history.
+An alarm leaves the list only after an acknowledged return to normal, or with a new document. An
+alarm stays if its value becomes unknown. A chattering alarm (3 activations in a minute) ends only
+after 10 s of normal values, so it does not flash or fill the history.
 """
 
 from collections import deque
@@ -47,7 +47,7 @@ class AlarmActor(NamedTuple):
 
 
 class AlarmList:
-    """All alarms of one robot that are not normal."""
+    """All non-normal alarms of one robot."""
 
     def __init__(
         self, limits: Mapping[str, AlarmLimits], records: Iterable[AlarmRecord] = ()
@@ -55,17 +55,17 @@ class AlarmList:
         """Continue the alarms of an earlier run.
 
         Args:
-            limits: limits by signal; only signals with limits may be judged.
-            records: the records of the last run, whose values are unknown now.
+            limits: limits by signal; alarms of other signals are not allowed.
+            records: the records of the last run. Their values are now unknown.
         """
         self.records: dict[str, AlarmRecord] = {
             one.signal: one._replace(is_known=False) for one in records
         }
-        """Alarms that are not normal, by signal."""
+        """Non-normal alarms, by signal."""
         self.revision = 0
         """Number of changes so far."""
         self.changed: dict[str, int] = {}
-        """Revision of the last change of each signal's alarm, also of alarms that are gone."""
+        """Revision of the last change to each signal's alarm, including removed alarms."""
         self._limits = limits
         self._events: list[AlarmEvent] = []
         kept = self.records.values()
@@ -77,16 +77,16 @@ class AlarmList:
         )
         self._activations: dict[str, deque[float]] = {}
         self._settling: dict[str, float] = {}
-        """End of each chattering alarm whose value is normal now, by signal."""
+        """End time of each chattering alarm with a normal value, by signal."""
 
     @property
     def is_flooded(self) -> bool:
-        """Whether more alarms come than an operator can handle."""
+        """Whether more alarms occur than an operator can handle."""
         return self._flood.is_flooded
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next change by the passage of time; None if there is no such change."""
+        """Time of the next scheduled change; None if no change is scheduled."""
         shelves = [one.shelved_until for one in self.records.values() if one.shelved_until]
         flood = self._flood.deadline
         more = [] if flood is None else [flood]
@@ -100,7 +100,7 @@ class AlarmList:
     # The robot
 
     def judge(self, signal: str, alarm: Alarm, value: Reading, now: float) -> None:
-        """Take the alarm of a sample; a value that is not available ends no alarm."""
+        """Process the alarm of a sample; an unavailable value ends no alarm."""
         if value is None:
             self.forget((signal,), now)
             return
@@ -120,13 +120,13 @@ class AlarmList:
         record = self.records.get(signal)
         priority = self._limits[signal].attributes_of(condition).priority
         if record is not None and record.is_active:
-            # A chattering alarm that comes back before its end is counted, and not raised again.
+            # A chattering alarm that recurs before its end is counted but not raised again.
             if self._settling.pop(signal, None) is not None:
                 record = self._put(record._replace(times=record.times + 1))
             if record.condition != condition:
                 text = text_of_value(value)
                 changed = record._replace(condition=condition, priority=priority, value=text)
-                # Only a change for the worse needs another acknowledgement.
+                # Only a more severe condition needs another acknowledgement.
                 if is_easing(record.condition, condition):
                     self._record(self._put(self._judged(changed)), "changed", now)
                 else:
@@ -148,8 +148,8 @@ class AlarmList:
         self._raise(fresh, now)
 
     def _raise(self, record: AlarmRecord, now: float) -> None:
-        """Ask for an acknowledgement, unless the alarm is shelved or suppressed."""
-        # A time, so that numbers of an earlier run are never used again.
+        """Request an acknowledgement, unless the alarm is shelved or suppressed."""
+        # A time, so that numbers from an earlier run are never reused.
         self._raised = max(self._raised + 1, round(now * 1000))
         record = self._judged(
             record._replace(
@@ -166,7 +166,7 @@ class AlarmList:
         self._return(record._replace(value=text_of_value(value)), now)
 
     def _return(self, record: AlarmRecord, now: float) -> None:
-        # No operator has to see a shelved or suppressed alarm, so none has to acknowledge it.
+        # No operator has to see or acknowledge a shelved or suppressed alarm.
         is_unseen = not record.is_annunciated
         returned = record._replace(
             is_active=False,
@@ -177,7 +177,7 @@ class AlarmList:
         self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
-        """Mark values as unknown, because their link is lost or they are stale; alarms stay."""
+        """Mark values as unknown because of a lost link or stale values; alarms stay."""
         for signal in signals:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
@@ -185,9 +185,9 @@ class AlarmList:
                 self._record(self._put(record._replace(is_known=False)), "unknown", now)
 
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
-        """Take the pairs of signal and condition that are suppressed by design now.
+        """Set the pairs of signal and condition that are now suppressed by design.
 
-        Alarms of unknown values stay as they are until their next value.
+        Alarms of unknown values stay unchanged until their next value.
         """
         if suppressed == self._suppressed:
             return
@@ -205,7 +205,7 @@ class AlarmList:
             self._raise(judged, now)
 
     def adopt(self, limits: Mapping[str, AlarmLimits], now: float) -> None:
-        """Continue with the limits of another document, and remove alarms that it lacks."""
+        """Use another document's limits, and remove alarms that the document does not declare."""
         self._limits = limits
         self._settling.clear()
         for record in [*self.records.values()]:
@@ -225,11 +225,11 @@ class AlarmList:
     def acknowledge(
         self, raised: Mapping[str, int], actor: AlarmActor, now: float
     ) -> list[AlarmRecord]:
-        """Acknowledge alarms; return those that were acknowledged now.
+        """Acknowledge alarms; return the newly acknowledged alarms.
 
         Args:
-            raised: the attribute `raised` of each alarm as the operator saw it, by signal. An alarm
-                that was raised again meanwhile is not acknowledged.
+            raised: the attribute `raised` of each alarm that the operator saw, by signal. An alarm
+            that has been raised again since then is not acknowledged.
             actor: the person or program.
             now: UTC time in seconds.
         """
@@ -252,9 +252,9 @@ class AlarmList:
     def shelve(
         self, signals: Iterable[str], until: float, actor: AlarmActor, now: float
     ) -> list[AlarmRecord]:
-        """Shelve alarms until a time; return those that are shelved now.
+        """Shelve alarms until a time; return the newly shelved alarms.
 
-        The end is at most `LONGEST_SHELF_S` away.
+        The time is limited to `LONGEST_SHELF_S` from now.
         """
         until = min(until, now + LONGEST_SHELF_S)
         done = []
@@ -262,7 +262,7 @@ class AlarmList:
             record = self.records.get(signal)
             if record is None or until <= now:
                 continue
-            # Nobody needs to acknowledge what had returned to normal and is shelved.
+            # A shelved alarm that has returned to normal needs no acknowledgement.
             record = self._put(
                 record._replace(
                     shelved_until=until,
@@ -275,7 +275,7 @@ class AlarmList:
         return done
 
     def unshelve(self, signals: Iterable[str], actor: AlarmActor, now: float) -> list[AlarmRecord]:
-        """End the shelves of alarms; return those that were shelved."""
+        """Unshelve alarms; return the alarms that were shelved."""
         found = [self.records.get(signal) for signal in signals]
         shelved = [one for one in found if one is not None and one.shelved_until]
         for record in shelved:
@@ -291,7 +291,7 @@ class AlarmList:
     # Time
 
     def tick(self, now: float) -> None:
-        """Make all changes that are due at `now`."""
+        """Make all changes due at `now`."""
         for record in [*self.records.values()]:
             if 0 < record.shelved_until <= now:
                 self._unshelve(record, None, now)
@@ -316,7 +316,7 @@ class AlarmList:
             self._events.append(AlarmEvent(now, "", kind))
 
     def _judged(self, record: AlarmRecord) -> AlarmRecord:
-        """Return the record with the present suppression of its condition."""
+        """Return the record with its condition's present suppression."""
         pair = record.signal, record.condition
         return record._replace(is_suppressed=record.is_active and pair in self._suppressed)
 

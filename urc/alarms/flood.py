@@ -1,8 +1,8 @@
 """Floods and bursts of alarms, as in ISA-18.2.
 
-Layer 3. Pure. A flood begins with more than 10 alarms in 10 minutes, the most that one operator can
-handle. A flood ends with fewer than 5 alarms in 10 minutes. A burst is a sequence of alarms with
-short gaps, which often have one cause: the first alarm of the burst.
+Layer 3. Pure. A flood begins with more than 10 alarms in 10 minutes, because one operator can
+handle at most 10. A flood ends with fewer than 5 alarms in 10 minutes. A burst is a sequence of
+alarms with short gaps. The first alarm of a burst is often the cause of the others.
 """
 
 from collections import deque
@@ -12,7 +12,7 @@ __all__ = ["BURST_GAP_S", "FLOOD_BEGINS", "FLOOD_ENDS", "FLOOD_S", "FloodDetecto
 
 FLOOD_S: Final = 600.0
 FLOOD_BEGINS: Final = 10
-"""Most alarms in `FLOOD_S` without a flood."""
+"""Highest number of alarms in `FLOOD_S` without a flood."""
 FLOOD_ENDS: Final = 5
 """A flood ends with fewer alarms than this in `FLOOD_S`."""
 BURST_GAP_S: Final = 5.0
@@ -28,7 +28,7 @@ class FloodDetector:
         self.group = group
         """Number of the present burst."""
         self._times: deque[float] = deque(maxlen=FLOOD_BEGINS + 1)
-        """Times of the newest alarms; the oldest of them decides about the beginning."""
+        """Times of the newest alarms; the oldest time decides whether a flood begins."""
 
     def count(self, now: float) -> None:
         """Count one alarm."""
@@ -44,7 +44,7 @@ class FloodDetector:
         return self._times[-FLOOD_ENDS] + FLOOD_S if self.is_flooded else None
 
     def tick(self, now: float) -> None:
-        """End a flood whose rate has fallen; a clock that was set back ends it, too."""
+        """End a flood whose rate has fallen, or during which the clock was set back."""
         end = self.deadline
         if end is not None and not end - FLOOD_S <= now < end:
             self.is_flooded = False

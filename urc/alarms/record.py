@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 PRIORITIES: Final[tuple[AlarmPriority, ...]] = ("high", "medium", "low")
-"""Priorities, the most urgent first."""
+"""Priorities, in order of decreasing urgency."""
 AlarmState = Literal[
     "normal", "unacknowledged", "acknowledged", "returned", "shelved", "suppressed"
 ]
@@ -29,27 +29,27 @@ AlarmEventKind = Literal[
     "raised", "changed", "returned", "acknowledged", "shelved", "unshelved", "suppressed",
     "unsuppressed", "unknown", "removed", "flood began", "flood ended",
 ]  # fmt: skip
-"""Kind of an event. ``changed``: less severe than before. ``unknown``: the value is not known any
-more. ``removed``: the robot's document declares the alarm no longer."""
+"""Kind of an event. ``changed``: less severe than before. ``unknown``: the value became unknown.
+``removed``: the robot's document no longer declares the alarm."""
 _MILD: Final = ("low", "high", "minor")
 _SAME_SIDE: Final = {("lolo", "low"), ("hihi", "high")}
 _LONGEST_VALUE: Final = 100
 
 
 class AlarmRecord(NamedTuple):
-    """The state of the alarm of one signal."""
+    """The alarm state of one signal."""
 
     signal: str
     condition: str
     """Crossed limit or alarm state, now or before the return to normal."""
     priority: AlarmPriority
     number: int
-    """Number of the activation within the robot; the order of these numbers is first-out."""
+    """Number of the activation within the robot; these numbers give the first-out order."""
     group: int
-    """Number of the burst of alarms to which the activation belongs."""
+    """Number of the burst to which the activation belongs."""
     began_at: float
     raised: int
-    """Number of the last event that asks for an acknowledgement; see `AlarmList.acknowledge`."""
+    """Number of the last event that requires acknowledgement; see `AlarmList.acknowledge`."""
     value: str = ""
     """Value at the last change, as text."""
     is_active: bool = True
@@ -64,7 +64,7 @@ class AlarmRecord(NamedTuple):
     acknowledged_at: float = 0.0
     acknowledged_by: str = ""
     shelved_until: float = 0.0
-    """End of the shelf; 0 for an alarm that is not shelved."""
+    """End of the shelf; 0 for an unshelved alarm."""
     shelved_by: str = ""
 
     @property
@@ -97,32 +97,32 @@ class AlarmEvent(NamedTuple):
     state: AlarmState = "normal"
     """State of the alarm after the event."""
     who: str = ""
-    """Name of the person or program that acted; "" for an event of the robot."""
+    """Name of the person or program that acted; "" if the robot caused the event."""
     principal: str = ""
     until: float = 0.0
-    """End of a shelf."""
+    """End time of a shelf."""
     times: int = 1
     """Number of equal activations that the event represents."""
 
 
 def condition_of(alarm: Alarm, value: Reading, limits: AlarmLimits) -> str:
-    """Return the limit or the alarm state behind the alarm of a sample; "" without an alarm."""
+    """Return the limit or alarm state that caused a sample's alarm; "" without an alarm."""
     if alarm not in ("major", "minor"):
         return alarm
     wanted = "high" if alarm == "major" else ""
     words = [word for word in state_texts(value) if word in limits.states]
     graver = (word for word in words if limits.attributes_of(word).priority == wanted)
-    # During an off-delay, the value has left the alarm state already.
+    # During an off-delay, the value has already left the alarm state.
     return next(graver, words[0] if words else alarm)
 
 
 def severity(condition: str, priority: AlarmPriority) -> tuple[int, int]:
-    """Return the order of an alarm by severity; the smallest is the most severe."""
+    """Return a sort key by severity; the most severe alarm has the smallest key."""
     return PRIORITIES.index(priority), int(condition in _MILD)
 
 
 def is_easing(before: str, after: str) -> bool:
-    """Return whether a change of the condition only eases an alarm, as from lolo to low."""
+    """Return whether a change of condition makes an alarm less severe, such as from lolo to low."""
     return (before, after) in _SAME_SIDE
 
 

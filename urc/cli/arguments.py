@@ -1,6 +1,6 @@
 """Command-line parsing, shared by all subcommands.
 
-Layer 6. Each module of a subcommand has `EXAMPLE`, `add_arguments(parser)` and `run(arguments) ->
+Layer 6. Each subcommand's module has `EXAMPLE`, `add_arguments(parser)` and `run(arguments) ->
 int`.
 """
 
@@ -51,7 +51,7 @@ class _ArgumentParser(argparse.ArgumentParser):
         raise _Exit(2)
 
     def print_help(self, file: object = None) -> None:
-        print(self.format_help(), end="")  # argparse's own way hides a failure to write
+        print(self.format_help(), end="")  # argparse's own method hides write errors
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         raise _Exit(status)
@@ -62,14 +62,14 @@ def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Na
     parser = _ArgumentParser(prog=f"urc {verb}", allow_abbrev=False)
     describe(parser, summary, module)
     try:
-        # Options may stand between words, as in `urc watch PROFILE --for 5s SIGNAL`.
+        # Options may appear between words, as in `urc watch PROFILE --for 5s SIGNAL`.
         return parser.parse_intermixed_args(words)
     except _Exit as ended:
         return int(ended.args[0])
 
 
 def describe(parser: argparse.ArgumentParser, summary: str, module: Any) -> None:
-    """Give a parser the description, the example and the arguments of a subcommand."""
+    """Add the description, example and arguments of a subcommand to a parser."""
     parser.description = summary[0].upper() + summary[1:] + "."
     parser.epilog = f"example:\n  {module.EXAMPLE}"
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -147,7 +147,7 @@ def load(word: str) -> "Profile":
 
 
 def profile_path(word: str) -> str:
-    """Return the file of a robot, given a path, a shipped robot or an installed robot.
+    """Return a robot's file; `word` is a path, or the name of a shipped or installed robot.
 
     An existing path has priority over shipped robots, and shipped robots have priority over
     installed packages.
@@ -158,14 +158,14 @@ def profile_path(word: str) -> str:
     named = shipped("robots") / f"{word}.yaml"
     if len(path.parts) == 1 and os.path.isfile(named):
         return str(named)
-    from urc.cli.packages import installed_document  # every command starts here
+    from urc.cli.packages import installed_document  # slow to load
 
     if installed := installed_document(word):
         return str(installed)
     if path.suffix or len(path.parts) > 1:
         return word
     if os.path.exists(word):
-        return word  # a folder fails when it is read
+        return word  # reading it as a file reports an error later
     for suffix in (".yaml", ".yml"):
         if os.path.isfile(word + suffix):
             raise UrcError(f"file {word!r} does not exist; did you mean {word + suffix!r}?")
@@ -174,7 +174,7 @@ def profile_path(word: str) -> str:
 
 
 def what_it_has(word: str, known: Iterable[str]) -> str:
-    """Return a suggestion for a name that is unknown in a profile."""
+    """Return a suggestion for an unknown name in a profile."""
     from difflib import get_close_matches
 
     names = list(known)
@@ -183,7 +183,7 @@ def what_it_has(word: str, known: Iterable[str]) -> str:
 
 
 def duration(text: str) -> float:
-    """Return a duration in seconds, above 0.
+    """Return a duration in seconds, greater than 0.
 
     `text` is a number of seconds, or a number with ms, s, m or h.
     """

@@ -95,12 +95,12 @@ def _export(file: Path, target: str, robot: str) -> None:
 
     blocks = exported(file, frozenset({robot}) if robot else None)
     if target == "-":
-        # Exports are UTF-8 everywhere, because a check elsewhere reads them as UTF-8.
+        # Exports are always UTF-8, because a check on another machine reads UTF-8.
         for block in blocks:
             sys.stdout.buffer.write(block.encode())
         sys.stdout.buffer.flush()
         return
-    # The log names people and addresses, so only its owner may read the copy.
+    # The log contains names and addresses, so only the owner may read the copy.
     number = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with open(number, "w", encoding="utf-8", newline="\n") as copy:
         with suppress(OSError):

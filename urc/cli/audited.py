@@ -1,6 +1,6 @@
 """Audit entries about commands on this machine, in the audit log of the data folder.
 
-A running server may write to the same file; both continue one hash chain.
+A running server may write to the same file. Both processes extend the same hash chain.
 """
 
 from collections.abc import Callable, Iterable
@@ -24,7 +24,7 @@ def audit_access(data: Path, command: str, **about: object) -> None:
     Args:
         data: the data folder.
         command: the change, such as ``people grant``.
-        about: names, roles and times, without secrets.
+        about: details such as names, roles and times, without secrets.
     """
     _write(data, lambda recorder, user: recorder.access_changed(user, command, **about))
 
@@ -43,7 +43,7 @@ def audit_packages(command: str, packages: Iterable[object]) -> None:
 
 
 def _write(data: Path, event: "Callable[[ServerRecorder, Actor], None]") -> None:
-    """Write one entry and wait for it; complain if the log cannot be written."""
+    """Write one entry and wait until it is written; print a message on failure."""
     from urc.runtime.audit import FILE, AuditLog
     from urc.runtime.server_recorder import ServerRecorder, terminal_actor
 

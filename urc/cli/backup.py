@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the backup, also while a server is running."""
+    """Write the backup, even while a server is running."""
     from urc import __version__
     from urc._folders import data_folder
     from urc.runtime.backup_archive import BackupManifest, parts_in, write_backup

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the bundle. Bundles of the same packages always have the same bytes."""
+    """Write the bundle. Bundles of the same packages always contain the same bytes."""
     from urc.cli.error_report import Misuse
     from urc.cli.packages import open_store
     from urc.packages.atomic_files import put_file
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "InstallPlan":
-    """Return the packages, preferably in their installed versions, which are tested."""
+    """Return the packages, preferably in the installed versions, because these are tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_requirement

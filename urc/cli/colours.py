@@ -1,6 +1,7 @@
-"""Colours of terminal output, which follow https://no-color.org and the terminal itself.
+"""Colours of terminal output, according to https://no-color.org and the type of terminal.
 
-Layer 6. A colour never carries a meaning of its own: each coloured word also says it.
+Layer 6. Colours never convey additional information, because the coloured words state the same
+meaning.
 """
 
 import os
@@ -27,15 +28,15 @@ def is_terminal(stream: TextIO, environment: Mapping[str, str] = os.environ) -> 
     """Return whether a stream is a terminal that understands control sequences."""
     try:
         return stream.isatty() and environment.get("TERM") != "dumb"
-    except ValueError:  # closed
+    except ValueError:  # a closed stream
         return False
 
 
 def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
     """Return whether output to a stream may be coloured.
 
-    A `NO_COLOR` that is not empty turns colours off. A `FORCE_COLOR` that is not empty turns
-    colours on for pipes and files, as the logs of CI servers need it.
+    A non-empty `NO_COLOR` disables colours. A non-empty `FORCE_COLOR` enables colours for pipes and
+    files, such as the logs of CI servers.
     """
     if environment.get("NO_COLOR"):
         return False
@@ -43,14 +44,14 @@ def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> 
 
 
 def painted(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """Return the text in a style, or unchanged if the stream (default: output) has no colours."""
+    """Return the text in a style, or unchanged if the stream (standard output) has no colours."""
     if not text or not has_colours(stream or sys.stdout):
         return text
     return f"\x1b[{_CODES[style]}m{text}\x1b[0m"
 
 
 def coloured_problem(problem: Problem) -> str:
-    """Return a problem as text for standard output, with colours if it has any."""
+    """Return a problem as text for standard output, with colours if they are enabled."""
     text = to_text(problem)
     if not has_colours(sys.stdout):
         return text

@@ -1,6 +1,6 @@
 """The parser of all subcommands together, for completion, the manual page and the reference.
 
-Layer 6. `urc` itself never builds this parser: a subcommand loads its own parser only.
+Layer 6. `urc` itself never builds this parser, because each subcommand loads only its own parser.
 """
 
 import argparse
@@ -19,8 +19,8 @@ def command_tree(only: Container[str] | None = None) -> argparse.ArgumentParser:
     """Return the parser of `urc` with its subcommands.
 
     Args:
-        only: subcommands with arguments; None means all. The others have their names alone, so
-            that their modules need not be loaded.
+        only: subcommands to include with their arguments; None means all. Other subcommands are
+            included by name only, so that their modules are not loaded.
     """
     parser = argparse.ArgumentParser(prog="urc", description=DESCRIPTION, allow_abbrev=False)
     parser.add_argument("--version", "-V", action="store_true", help="print the version")

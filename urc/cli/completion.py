@@ -1,7 +1,7 @@
 """`urc completion`: print the script that completes `urc` in a shell.
 
-argcomplete runs `urc` at each press of Tab, with the line in the environment. The answer therefore
-fits the installed version, and knows the robots of this machine.
+At each press of Tab, argcomplete runs `urc` with the command line in the environment. The
+completions therefore match the installed version and include the robots of this machine.
 """
 
 import argparse
@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def answer() -> None:
-    """Answer one press of Tab, and exit. argcomplete's variables describe the line."""
+    """Print the completions for one press of Tab, using argcomplete's variables, and exit."""
     import argcomplete
 
     from urc.cli.command_tree import command_tree
@@ -53,7 +53,7 @@ def _parsers_of(tree: argparse.ArgumentParser) -> Iterable[argparse.ArgumentPars
 
 
 def _robots(prefix: str, **_: object) -> list[str]:
-    """Return the robots' names and the documents that begin with `prefix`."""
+    """Return all robot names, and the documents that begin with `prefix`."""
     from urc._folders import data_folder
     from urc.packages.store import Store
 
@@ -78,4 +78,4 @@ def _documents(prefix: str, **_: object) -> list[str]:
 
 
 _COMPLETERS: dict[str, Callable[..., list[str]]] = {"PROFILE": _robots, "PATH": _robots}
-"""Completion of an argument, by its name in the usage. Others complete file names."""
+"""Completion function by metavar; other arguments complete file names."""

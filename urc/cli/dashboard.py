@@ -1,4 +1,4 @@
-"""Start of a dashboard for profiles, shared by `urc serve` and `urc demo`."""
+"""Functions that start a dashboard for profiles, shared by `urc serve` and `urc demo`."""
 
 import asyncio
 import gc
@@ -69,19 +69,19 @@ class DashboardAddress:
     shows_installed: bool = False
     """Whether the menu lists installed robots and drivers."""
     trusted: Sequence[str] = ()
-    """Third-party widgets that run in the page without a sandbox."""
+    """Third-party widgets that may run in the page without a sandbox."""
     recordings: Path | None = None
     """Folder for recordings of all sessions; None disables recording."""
     recorder: ServerRecorder | None = None
-    """Receiver of audit entries about recordings."""
+    """Destination of audit entries about recordings."""
     tls: TlsOptions = PLAIN
-    """Certificate of HTTPS, and public names of a web server in front of this one."""
+    """HTTPS certificate, and public names of a web server in front of this server."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
-    """Options of the ways to sign in."""
+    """Sign-in options."""
     monitors: bool = False
-    """Whether robots stay connected for their alarms, unless their settings say otherwise."""
+    """Default for robots: whether they stay connected for their alarms."""
     notify: NotifyOptions | None = None
-    """Hook for notifications of alarms; None sends no notification."""
+    """Hook for alarm notifications; None disables notifications."""
 
 
 def run_dashboard(
@@ -103,7 +103,7 @@ def run_dashboard(
         on_ready: callback that receives the start addresses once.
         given: function that returns the command-line settings of a profile.
         is_dev: whether to serve developer pages and reload changed documents.
-        faults: faults of emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
+        faults: faults to inject into emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
 
     Raises:
         UrcError: the port is not available, two robots have the same name, or a fault is
@@ -169,7 +169,7 @@ async def _serve(
         )
         app = build_app(robots, options)
         gc.collect()
-        gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us
+        gc.freeze()  # exclude loaded objects from later garbage collections, to avoid delays
         await serve(
             place.tls.around(app),
             host=place.host,
@@ -194,7 +194,7 @@ def _options(place: DashboardAddress) -> DashboardOptions:
 
 
 async def _warn_of(data: Path) -> None:
-    """Report a wrong clock, and a data folder that is only partly restored."""
+    """Print warnings about a wrong clock and about an interrupted restore of the data folder."""
     if warning := await asyncio.to_thread(clock_warning, data):
         complain(f"urc: {warning}")
     if is_interrupted(data):
@@ -202,7 +202,7 @@ async def _warn_of(data: Path) -> None:
 
 
 def _begin_heartbeats(stack: AsyncExitStack, manager: ServiceManager, url: str) -> None:
-    """Tell systemd that the server is ready, and send heartbeats until the end of `stack`."""
+    """Notify systemd that the server is ready, and send heartbeats until `stack` closes."""
     manager.tell("READY=1", f"STATUS=dashboard {url}")
     watch = asyncio.ensure_future(manager.watch(partial(answers, url)))
     stack.callback(watch.cancel)
@@ -215,7 +215,7 @@ async def _robot_at_start(
     profile: Profile,
     faulty: FaultInjector | None,
 ) -> Robot:
-    """Return the robot of a profile; with `faulty`, emulated from the start, without a viewer."""
+    """Return a profile's robot; with `faulty`, emulate it from the start, even without a viewer."""
     robot = _first(factory, profile)
     if faulty is None:
         return robot
@@ -277,7 +277,7 @@ def _robot(
     profile: Profile,
     values: Mapping[str, Value],
 ) -> Robot:
-    """Return a robot with a session that opens together with its first page."""
+    """Return a robot whose session opens when its first page opens."""
     settings = values if faulty is None else _complete(profile, values)
     keep = None if place.recordings is None else partial(_kept, place.recordings, place.recorder)
     opened = partial(_session, _motion(place), keep, faulty, profile, settings)
@@ -313,7 +313,7 @@ async def _session(
             profile = await stack.enter_async_context(stand_in(profile, settings, emulated_robot))
         session = Session(profile, settings, transports, motion=motion)
         if keep is not None:
-            # Opened first and closed last, so that both ends of the session are recorded.
+            # Opened first and closed last, to record the start and end of the session.
             await stack.enter_async_context(keep(session))
         yield await stack.enter_async_context(session)
 
@@ -323,7 +323,7 @@ async def _kept(
     folder: Path, audit: ServerRecorder | None, session: Session
 ) -> AsyncIterator[None]:
     """Record a session. Report a failed recording and continue without it."""
-    from urc.runtime.recording.recorder import recorded  # most record nothing
+    from urc.runtime.recording.recorder import recorded  # rarely needed
 
     profile = session.profile
     on_step = partial(audit.recording, NO_ACTOR, profile.name) if audit is not None else None
@@ -339,5 +339,5 @@ async def _kept(
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the settings, with sample values for missing settings of a real robot."""
+    """Return the settings, with sample values for the missing settings of a real robot."""
     return sample_settings(profile.settings) | dict(values)

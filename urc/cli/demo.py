@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _invite_phone(address: str) -> None:
-    """Print a link and a QR code that pair one device, which may then drive."""
+    """Print a link and a QR code that pair one device with the role drive."""
     from urc.cli.devices import invite_device
     from urc.cli.identities import opened, roles_in
 
@@ -98,7 +98,7 @@ def _invite_phone(address: str) -> None:
 
 
 def _port(arguments: argparse.Namespace) -> int:
-    """Return the given port, or the default port if it is free, or any free port."""
+    """Return the given port; by default, the default port if it is free, or any free port."""
     if arguments.port is not None:
         return int(arguments.port)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
@@ -110,7 +110,7 @@ def _port(arguments: argparse.Namespace) -> int:
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:
-    """Return whether a graphical browser can open. A text browser would block the terminal."""
+    """Return whether a graphical browser can open; a text browser would block the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environment.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

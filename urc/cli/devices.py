@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the devices with their owners, roles and last use."""
+    """List the devices with their owners, roles and times of last use."""
     from urc.access.administration import overview
 
     words_of(arguments, "devices")
@@ -100,7 +100,7 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Print a link that pairs one device."""
+    """Print a link for pairing one device."""
     from urc.access.administration import principal_named
     from urc.access.store import parse_name
     from urc.cli.invitation_links import server_address
@@ -126,14 +126,14 @@ def invite_device(
     name: str = "",
     owner: "Principal | None" = None,
 ) -> None:
-    """Print a link and a QR code that pair one device.
+    """Print a link and a QR code for pairing one device.
 
     Args:
         store: the open store.
         address: address of the server for other devices; "" if no server is running.
-        roles: roles of the device; empty for a device with an owner.
-        name: suggested name; "" lets the device choose.
-        owner: person whose device pairs.
+        roles: roles of the device; empty if the device has an owner.
+        name: suggested name; "" lets the user choose a name on the device.
+        owner: person who owns the device.
     """
     from urc.access.store import Invitation
     from urc.cli.invitation_links import print_link
@@ -148,17 +148,17 @@ def invite_device(
 
 
 def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add roles to a device, or take roles away."""
+    """Add roles to a device, or remove roles."""
     return change_roles(store, "device", arguments, "devices")
 
 
 def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Give a device another name."""
+    """Rename a device."""
     return rename(store, "device", arguments, "devices")
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a device; its key is worthless from now on."""
+    """Remove a device and invalidate its key."""
     return remove(store, "device", arguments, "devices", ": this device must be paired again")
 
 

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Search for robots and print the results; return 1 without a result."""
+    """Search for robots and print the results; return 1 if nothing was found."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings, settings_given
 
@@ -133,9 +133,9 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
 async def _nearby(
     profiles: Sequence["Profile"], settings: Sequence[Mapping[str, "Value"]], typed: set[str]
 ) -> tuple[list[Row], str]:
-    """Return the open ports of shipped robots on this machine, or at the given hosts.
+    """Return the open ports of shipped robots on this machine or on the given hosts.
 
-    All settings have their default values.
+    The search uses the default values of all settings.
 
     For each rosbridge that replies, the result includes its topics.
     """
@@ -167,7 +167,7 @@ async def _nearby(
 def _places(
     profile: "Profile", settings: Mapping[str, "Value"]
 ) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield the type, host and port of each transport with complete settings."""
+    """Yield the type, host and port of each transport whose settings are complete."""
     from urc.runtime.settings import options_of
     from urc.transports.ros.choice import PORTS
 

@@ -41,7 +41,7 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""Packages of extras: the extra, and what it is for."""
+"""Extra and purpose of each optional package."""
 OPTIONAL = {
     "google-re2": "patterns without provably linear run time; refused without this package",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print one line per check; return 1 if a requirement is missing."""
+    """Print one line for each check; return 1 if a requirement is missing."""
     problems = list(_problems(arguments.port, arguments.data or data_folder()))
     width = max(len(finding.name) for finding in problems)
     for finding in problems:

@@ -32,8 +32,8 @@ def explain(error: Exception, program: str) -> int:
 
 
 def _mistake(bug: Exception) -> str:
-    """Return one line for developers about a bug in URC."""
-    from traceback import extract_tb  # slow to load, and only now needed
+    """Return one line about a bug in URC, for developers."""
+    from traceback import extract_tb  # slow to load, and needed only here
 
     frames = extract_tb(bug.__traceback__)
     place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""

@@ -25,8 +25,8 @@ def run_loop(
 
     Args:
         work: coroutine that returns the exit code; its cleanup after cancellation must be short.
-        code_when_ended: exit code after a signal; the default is 128 plus the signal number, as in
-            a shell.
+        code_when_ended: exit code after a signal; by default 128 plus the signal number, as in a
+            shell.
         is_fast: whether to use the fastest installed event loop. Loading the fastest loop delays
             the start slightly.
     """
@@ -48,7 +48,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
         task.cancel()
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # Windows has no such handlers: Ctrl-C arrives as KeyboardInterrupt.
+        # Windows has no such handlers; there, Ctrl-C raises KeyboardInterrupt.
         with suppress(NotImplementedError):
             loop.add_signal_handler(number, end, number)
     try:
@@ -60,7 +60,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
 
 
 class _OneLine(logging.Formatter):
-    """A formatter of log lines for people: exception names, but no tracebacks."""
+    """A formatter of readable log lines with exception names, but without tracebacks."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -77,7 +77,7 @@ class _Job(NamedTuple):
 
 
 class LineWriter:
-    """A writer for standard streams that a slow reader cannot block.
+    """A writer for standard streams that does not block the event loop if the reader is slow.
 
     A daemon thread writes directly to the file descriptor. Other threads and buffered `print`
     output could block Python's exit indefinitely.
@@ -91,7 +91,7 @@ class LineWriter:
         """Write all of `text` before returning.
 
         Raises:
-            OSError: writing failed; `BrokenPipeError` if the reader has closed the stream.
+            OSError: writing failed. A closed stream raises `BrokenPipeError`.
         """
         loop = asyncio.get_running_loop()
         data = text.encode(stream.encoding, "backslashreplace")

@@ -79,7 +79,7 @@ async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
 
 
 def _is_ours(handle: int) -> bool:
-    """Return whether the process may read the stream.
+    """Return whether the process can read the stream without being suspended.
 
     Only foreground processes may read a terminal.
     """
@@ -132,7 +132,7 @@ class FaultInjector:
         """Inject the stored faults of a robot while the context is active."""
         emulated_robots = self._emulated_robots.setdefault(name, [])
         for text in self._wrong.get(name, {}).values():
-            with suppress(UrcError):  # another version may lack that signal
+            with suppress(UrcError):  # another version may not have the signal
                 emulated_robot.inject(text, self._now())
         emulated_robots.append(emulated_robot)
         try:

@@ -1,4 +1,4 @@
-"""Names, roles, times and tables of the commands for people, devices, tokens and sign-ins."""
+"""Functions shared by the commands for people, devices, tokens and sign-ins."""
 
 import argparse
 import re
@@ -39,9 +39,9 @@ __all__ = [
 ]
 
 Action = Callable[["AccessStore", argparse.Namespace], int]
-"""One action of a command, such as ``add``."""
+"""Function that runs one action of a command, such as ``add``."""
 _FIRST_ACTIONS = ("add", "invite", "pair")
-"""Actions that may create the data folder."""
+"""Actions that are permitted to create the data folder."""
 _LONGEST_DAYS = 3650
 _SPAN = re.compile(r"([0-9]{1,5})(m|h|d)")
 _SECONDS = {"m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -76,7 +76,7 @@ def add_format(parser: argparse.ArgumentParser) -> None:
 
 
 def run_action(actions: Mapping[str, Action], arguments: argparse.Namespace) -> int:
-    """Open the store of the data folder, and run the action of the command line.
+    """Open the store in the data folder, and run the action from the command line.
 
     Raises:
         UrcError: the action needs an existing entry, but the data folder is missing.
@@ -89,7 +89,7 @@ def run_action(actions: Mapping[str, Action], arguments: argparse.Namespace) -> 
 
 @contextmanager
 def opened(data: Path | None) -> Iterator["AccessStore"]:
-    """Open the store of a data folder; create the store if it is missing.
+    """Open the store in a data folder; create a missing store.
 
     Args:
         data: value of `--data-dir`; None means the default folder.
@@ -105,7 +105,7 @@ def opened(data: Path | None) -> Iterator["AccessStore"]:
 
 
 def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]:
-    """Return the words after the action; raise `Misuse` unless each of `names` has one."""
+    """Return the words after the action; raise `Misuse` unless their number matches `names`."""
     words: list[str] = arguments.words
     if len(words) != len(names):
         wanted = " ".join(("urc", verb, arguments.action, *names))
@@ -114,7 +114,7 @@ def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]
 
 
 def named(store: "AccessStore", kind: "Kind", name: str) -> "Principal":
-    """Return the principal of a kind with this name; raise `UrcError` with a suggestion."""
+    """Return the principal of this kind and name; raise `UrcError` with a suggestion."""
     from urc.access.administration import principal_named
     from urc.cli.arguments import what_it_has
 
@@ -140,7 +140,7 @@ def roles_in(texts: Sequence[str] | None) -> tuple["Grant", ...]:
 def change_roles(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str
 ) -> int:
-    """Run ``grant`` or ``revoke``: add roles to a person or device, or take roles away."""
+    """Run ``grant`` or ``revoke``: add roles to a person or device, or remove roles."""
     from urc.access.administration import change_grants
 
     (name,) = words_of(arguments, verb, "NAME")
@@ -167,7 +167,7 @@ def change_roles(
 
 
 def rename(store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str) -> int:
-    """Run ``rename``: give a person or device another name."""
+    """Run ``rename``: rename a person or device."""
     old, new = words_of(arguments, verb, "NAME", "NEW")
     principal = named(store, kind, old)
     store.rename(principal.id, new)
@@ -179,7 +179,7 @@ def rename(store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, ve
 def remove(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str, result: str
 ) -> int:
-    """Run ``remove``: remove a person, device or program; `result` is the rest of the message."""
+    """Run ``remove``: remove a person, device or program; `result` ends the printed message."""
     (name,) = words_of(arguments, verb, "NAME")
     principal = named(store, kind, name)
     store.remove(principal.id)
@@ -196,7 +196,7 @@ def roles_text(grants: Iterable["Grant"]) -> str:
 def ends_at(text: str) -> float | None:
     """Return the UTC time at which ``30d``, ``8h``, ``2027-01-31`` or ``never`` ends.
 
-    A date lasts until the end of that day, in local time.
+    A date means the end of that day in local time.
     """
     if text == "never":
         return None
@@ -218,12 +218,12 @@ def ends_at(text: str) -> float | None:
 
 
 def local_time(at: float | None, without: str = "never") -> str:
-    """Return a UTC time in seconds as local time, to the minute."""
+    """Return a UTC time in seconds as text in local time, without seconds."""
     return without if at is None else time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
 
 
 def minutes_of(seconds: float) -> str:
-    """Return a duration for people, such as ``2 minutes`` or ``24 hours``."""
+    """Return a readable duration, such as ``2 minutes`` or ``24 hours``."""
     for unit, length in (("day", 86400.0), ("hour", 3600.0), ("minute", 60.0)):
         count = round(seconds / length)
         if seconds >= 2 * length or (count == 1 and seconds >= length):
@@ -232,7 +232,7 @@ def minutes_of(seconds: float) -> str:
 
 
 def iso(at: float | None) -> str | None:
-    """Return a UTC time in seconds in ISO 8601, for JSON."""
+    """Return a UTC time in seconds as ISO 8601 text, for JSON."""
     return None if at is None else time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(at))
 
 
@@ -246,7 +246,7 @@ def show(
 
     Args:
         rows: one object for each entry, for JSON.
-        table: the title row, then one row of texts for each entry.
+        table: the header row, then one row of texts for each entry.
         arguments: arguments with `--format`.
         empty: message for an empty list.
     """
@@ -266,5 +266,5 @@ def show(
 
 
 def record(store: "AccessStore", command: str, **arguments: object) -> None:
-    """Write one entry into the audit log of the store's data folder."""
+    """Write one entry to the audit log in the store's data folder."""
     audit_access(store.file.parent, command, **arguments)

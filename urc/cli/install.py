@@ -151,7 +151,7 @@ def _compare(
 def _show(
     plan: "InstallPlan", folder: Path, origins: list[str], look: "PreviewWorker"
 ) -> list[str]:
-    """Print the permissions of a package; return the local resources named by the package."""
+    """Print the permissions of a package; return the local resources that the package specifies."""
     from urc.packages.store import kinds_in
     from urc.problems import printable
 

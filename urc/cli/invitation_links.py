@@ -1,7 +1,7 @@
-"""Links with a code that works once, as text and as a QR code in the terminal.
+"""Links with a one-time code, as text and as a QR code in the terminal.
 
-The code is in the fragment of the link. Browsers never send the fragment to a server, so no log
-contains the code.
+The code is in the link's fragment, which browsers never send to a server. Server logs therefore do
+not contain the code.
 """
 
 import os
@@ -18,29 +18,30 @@ __all__ = ["print_link", "qr_lines", "server_address"]
 _BORDER = 4
 """Width of the quiet zone in modules (ISO/IEC 18004, 6.3.8)."""
 _DARK, _LIGHT = "16", "231"
-"""Black and white of the 256-colour palette, which themes of terminals leave alone."""
+"""Black and white of the 256-colour palette, which terminal themes do not change."""
 
 
 def server_address(data: Path, address: str | None) -> str:
-    """Return the address of the server for other devices, without a slash at its end.
+    """Return the server's address for other devices, without a trailing slash.
 
     Args:
-        data: data folder, with the addresses of running servers.
-        address: value of `--address`; None means the newest running server, or "" without one.
+        data: data folder that contains the addresses of running servers.
+        address: value of `--address`; None selects the newest running server. Without a running
+            server, the result is "".
 
     Raises:
-        Misuse: `address` is not the address of a server.
+        Misuse: `address` is not a valid server address.
     """
     return _parsed(address) if address else _running(data)
 
 
 def print_link(data: Path, address: str, page: str, code: str) -> None:
-    """Print the link of a code, and its QR code if standard output is a terminal.
+    """Print the link with a code; on a terminal, also print a QR code.
 
     Args:
-        data: data folder, with the local certificate authority, if any.
-        address: result of `server_address`; if it is "", the code is printed alone.
-        page: page of the link: ``pair`` or ``join``.
+        data: data folder, possibly with a local certificate authority.
+        address: result of `server_address`; "" prints only the code.
+        page: target page of the link: ``pair`` or ``join``.
         code: the code.
     """
     if not address:
@@ -62,8 +63,8 @@ def print_link(data: Path, address: str, page: str, code: str) -> None:
 def qr_lines(text: str, columns: int) -> Iterator[str]:
     """Yield the lines of a QR code, black on white on any background.
 
-    One line has two rows of modules. Yield nothing if the terminal is too narrow, or cannot show
-    half blocks.
+    Each line shows two rows of modules. If the terminal is too narrow or cannot show half blocks,
+    yield nothing.
     """
     import segno
 
@@ -100,7 +101,7 @@ def _parsed(address: str) -> str:
 
 
 def _running(data: Path) -> str:
-    """Return the address of the newest server, preferably one for other devices; "" without one."""
+    """Return the newest server's address, preferably for other devices; "" without a server."""
     from urc.runtime.running_servers import servers
 
     running = list(servers(data).values())
@@ -114,7 +115,7 @@ def _running(data: Path) -> str:
 
 
 def _fingerprint(data: Path) -> str:
-    """Return the fingerprint of the local certificate authority, or "" without one."""
+    """Return the fingerprint of the local certificate authority; "" without an authority."""
     from urc.access.authority import AUTHORITY_FOLDER, fingerprint
 
     file = data / AUTHORITY_FOLDER / "authority.pem"

@@ -1,6 +1,6 @@
-"""The `urc` program: imports only the requested subcommand and reports every failure in one line.
+"""The `urc` program, which imports only the requested subcommand and reports failures in one line.
 
-Layer 6. For a fast start, this module must not import large modules, not even `typing`. `urc
+Layer 6. For a fast start, this module must not import large modules such as `typing`. `urc
 --version` loads no subcommand, and each subcommand loads only its own imports.
 """
 
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Exit codes are 0 for success, 1 for problems or failure, and 2 for invalid use.
     """
     _mend_streams()
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions of its line
+    if "_ARGCOMPLETE" in os.environ:  # a shell requests completions
         from urc.cli.completion import answer
 
         answer()
@@ -39,10 +39,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code = _answer(words)
     except KeyboardInterrupt:
-        _discard_output()  # the rest could block
+        _discard_output()  # pending output could block
         return _INTERRUPTED
     except BrokenPipeError:
-        code = 0  # the reader has enough, as in `urc watch … | head`
+        code = 0  # the reader has closed the pipe, as in `urc watch … | head`
     except Exception as error:  # supervisor: the last resort
         from urc.cli.error_report import explain
 
@@ -125,7 +125,7 @@ def _unknown(verb: str) -> int:
 
 
 def _mend_streams() -> None:
-    """Open missing standard streams, and let all streams accept any text.
+    """Open missing standard streams, and make all streams accept any text.
 
     WARNING: missing streams must be opened first. If a standard stream is missing, the next file or
         socket receives its number, and printed text could reach a robot.
@@ -137,14 +137,14 @@ def _mend_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8", closefd=False)
     sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
-    # Names of files and robots may have characters that the terminal's encoding lacks.
+    # Names of files and robots may contain characters outside the terminal's encoding.
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure:
         reconfigure(errors="backslashreplace")
 
 
 def _flush(code: int) -> int:
-    """Flush the output, so that write errors are reported like other errors."""
+    """Flush the output, so that write errors are reported like all other errors."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _migrate(file: str, *, is_check: bool) -> bool:
-    """Migrate one file, or only check it; return whether it contains an old name."""
+    """Migrate or check one file; return whether the file contained an old name."""
     from urc.config.migrate import migrate
 
     migrated = migrate(file)

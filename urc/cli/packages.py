@@ -1,4 +1,4 @@
-"""Code shared by the package subcommands: store, repositories, confirmation and installed names."""
+"""Functions shared by the package subcommands: store, repositories, confirmation and names."""
 
 import argparse
 import sys
@@ -70,7 +70,8 @@ def known_repositories() -> "list[Repository]":
 def installed_document(word: str) -> Path | None:
     """Return the document of an installed robot or driver by name, or None.
 
-    Without a version, the version in use is returned; see `urc.runtime.settings_store.in_use`.
+    If `word` contains no version, return the version in use; see
+    `urc.runtime.settings_store.in_use`.
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
@@ -93,7 +94,7 @@ def installed_document(word: str) -> Path | None:
 
 
 def is_path(word: str) -> bool:
-    """Return whether a word is the path of a file or folder instead of a package name."""
+    """Return whether a word is the path of a file or folder, and not a package name."""
     path = Path(word)
     is_told = path.suffix in (".urcof", ".zip") or word.startswith((".", "/", "~"))
     return is_told or (path / "package.yaml").is_file()
@@ -122,7 +123,7 @@ def planned(
 
 @contextmanager
 def _working(title: str) -> Iterator[Callable[[str], None]]:
-    """Show a status line; messages to the yielded function appear after the work."""
+    """Show a status line; the yielded function stores messages and prints them after the work."""
     from urc.cli.progress import Progress
 
     notes: list[str] = []
@@ -135,7 +136,7 @@ def _working(title: str) -> Iterator[Callable[[str], None]]:
 
 
 def known_entries() -> "list[IndexEntry]":
-    """Return the stored indexes of the repositories, without network requests."""
+    """Return the entries of all stored indexes, without network requests."""
     from urc.packages.names import PackageError
 
     try:
@@ -170,7 +171,7 @@ def add_waivers(parser: argparse.ArgumentParser) -> None:
 
 
 def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
-    """Return the plan with the waivers of `--allow-unsigned`; raise `PackageError`."""
+    """Return the plan with the waivers of `--allow-unsigned`; raise `PackageError` on failure."""
     from urc.packages.names import parse_requirement
 
     words = [parse_requirement(word) for word in arguments.allow_unsigned]

@@ -1,4 +1,4 @@
-"""Actions of `urc people` on passkeys: the list of a person's passkeys, and the removal of one."""
+"""Passkey actions of `urc people`, which list and remove a person's passkeys."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["list_passkeys", "remove_passkey"]
 
 _SHOWN: int = 8
-"""Characters of an id in a table."""
+"""Number of characters of an id in a table."""
 
 
 def list_passkeys(store: "AccessStore", arguments: argparse.Namespace) -> int:
@@ -42,10 +42,10 @@ def list_passkeys(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def remove_passkey(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a passkey, such as that of a lost phone, and end the person's sign-ins with passkeys.
+    """Remove a passkey, for example of a lost phone, and end the person's passkey sign-ins.
 
     Raises:
-        UrcError: the person has no passkey, or several ones, with this name or start of an id.
+        UrcError: the name or id prefix matches no passkey of the person, or several passkeys.
     """
     from urc.access.administration import end_sign_ins
     from urc.access.passkey_table import PasskeyTable

@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the people with their roles, credentials and last use."""
+    """List the people with their roles, credentials and times of last use."""
     from urc.access.administration import overview
 
     words_of(arguments, "people")
@@ -132,22 +132,22 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add roles to a person, or take roles away."""
+    """Add roles to a person, or remove roles."""
     return change_roles(store, "person", arguments, "people")
 
 
 def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Give a person another name."""
+    """Rename a person."""
     return rename(store, "person", arguments, "people")
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a person with all devices and sign-ins."""
+    """Remove a person with all of their devices and sign-ins."""
     return remove(store, "person", arguments, "people", ", with all sign-ins and devices")
 
 
 def _passphrase(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Set the passphrase of a person, and end the person's sign-ins."""
+    """Set a person's passphrase, and end the person's sign-ins."""
     from urc.access.administration import replace_passphrase
     from urc.access.passphrases import hash_of
 
@@ -161,7 +161,7 @@ def _passphrase(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _typed(name: str) -> str:
-    """Return a passphrase: typed twice without echo in a terminal, else the first line of input."""
+    """Return a passphrase, typed twice on a terminal without echo, or read from standard input."""
     if not sys.stdin.isatty():
         line = sys.stdin.buffer.readline(_MOST_BYTES)
         try:
@@ -181,7 +181,7 @@ def _typed(name: str) -> str:
 
 
 def _invite(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Print a link with which a person chooses a passphrase in a browser."""
+    """Print a link that lets a person choose a passphrase in a browser."""
     from urc.access.administration import invite_person
     from urc.cli.invitation_links import print_link, server_address
 

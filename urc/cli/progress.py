@@ -1,7 +1,7 @@
-"""A status line for long work on a terminal: the present step and its duration.
+"""A status line on a terminal with the current step and the duration of long work.
 
-Layer 6. The line is on standard error, and is erased at the end. Without a terminal, nothing is
-printed, so logs and pipes stay clean.
+Layer 6. The line is printed to standard error and erased at the end. Without a terminal, nothing is
+printed, so logs and pipes contain no status lines.
 """
 
 import sys
@@ -16,17 +16,17 @@ from urc.problems import printable
 __all__ = ["Progress"]
 
 _FIRST_S = 0.4
-"""Time before the first status line, in seconds: short work shows none."""
+"""Delay before the first status line, in seconds, so that short work shows no status line."""
 _EVERY_S = 0.2
 _COLUMNS = 78
 _ERASE = "\r\x1b[K"
 
 
 class Progress:
-    """A context with a status line; `step` sets the text of the line.
+    """A context manager with a status line; `step` sets the line's text.
 
-    A thread prints the line, because the work may block. All output of the command must wait until
-    the context ends.
+    A thread prints the line, because the work may block. The command must not print other output
+    before the context ends.
 
     Args:
         title: name of the work, such as ``loading robots``.
@@ -61,12 +61,12 @@ class Progress:
             self._thread.join()
 
     def step(self, detail: str = "") -> None:
-        """Begin the next step, such as the robot ``puppet``."""
+        """Start the next step, such as the robot ``puppet``."""
         self._done += 1
         self._detail = detail
 
     def line(self) -> str:
-        """Return the present status line, without control sequences."""
+        """Return the current status line, without control sequences."""
         parts = [self._title]
         if self._total:
             parts.append(f"{self._done} of {self._total}")

@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
-    """Return the origin of the packages, if given."""
+    """Return the origin of the packages, or None if no origin is given."""
     import msgspec
 
     from urc import __version__

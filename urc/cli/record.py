@@ -60,7 +60,7 @@ async def _record(
     session = Session(profile, settings, built_in_catalog().transports)
     check_installed()
     file = arguments.output or named(Path(), profile.name)
-    # The recording starts before the session and ends after it, so both ends are recorded.
+    # The recording starts before the session and ends after the session, to record both ends.
     async with recorded(session.hub, file, profile) as recorder:
         await _until_begun(recorder)
         async with session:
@@ -94,7 +94,7 @@ async def _record_server(arguments: argparse.Namespace) -> int:
 
 
 async def _until_begun(recorder: "Recorder") -> None:
-    """Wait until the file is there, and name it."""
+    """Wait until the file exists, and print its name."""
     while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread sets them
         await asyncio.sleep(_SOON_S)
     if recorder.fault:
@@ -114,8 +114,8 @@ async def _until_over(
     except TimeoutError:
         pass
     except asyncio.CancelledError:
-        # Ctrl-C is the normal end without a time: the file is completed, and its contents are
-        # printed.
+        # Without a duration, Ctrl-C is the normal end: complete the file and print a summary of its
+        # contents.
         task = asyncio.current_task()
         if task is not None:
             task.uncancel()

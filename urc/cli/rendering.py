@@ -1,6 +1,6 @@
 """The warning about emulated robots without cameras and laser scanners.
 
-Layer 6. The packages for them are an extra, because robots in the real world need neither: see
+Layer 6. These simulated sensors need an extra, because real robots do not use it; see
 docs/decisions/0045.
 """
 
@@ -15,7 +15,7 @@ __all__ = ["warn_without_rendering"]
 
 
 def warn_without_rendering(profiles: Iterable[Profile]) -> None:
-    """Report emulated robots whose cameras or laser scanners show nothing on this machine."""
+    """Report emulated robots whose cameras or laser scanners do not work on this machine."""
     if has_rendering():
         return
     blind = [one.name for one in profiles if one.world and rendered_signals(one.world)]

@@ -1,4 +1,4 @@
-"""`urc replay`: show a recording in the dashboard like live values."""
+"""`urc replay`: show a recording in the dashboard as if it were live."""
 
 import argparse
 from pathlib import Path
@@ -100,7 +100,7 @@ async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int
 
 
 def _profile_in(recording: "Recording") -> "Profile":
-    """Return the profile in a recording."""
+    """Return the profile stored in a recording."""
     with TemporaryDirectory(prefix="urc-replay-") as folder:
         file = Path(folder, "profile.yaml")
         file.write_text(recording.document, encoding="utf-8")

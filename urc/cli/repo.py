@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of those who publish packages: keys, upload tokens and reasons."""
+    """Declare the options for publishing packages: keys, upload tokens and reasons."""
     parser.add_argument("--name", metavar="TEXT", help="index, serve: title of the repository")
     parser.add_argument(
         "--tokens",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from urc.packages.index_head import IndexSigner
 
 _AUDITED_MOST = 20
-"""Maximum number of entries of a list in the audit log."""
+"""Maximum number of blocked packages in one audit log entry."""
 
 __all__ = ["block", "blocks", "unblock"]
 
@@ -41,7 +41,7 @@ def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
 
 def _entry(arguments: argparse.Namespace) -> "tuple[Path, Block]":
-    """Return the folder and the entry of the words DIR PACKAGE [RANGE]; raise `Misuse`."""
+    """Return the folder and the entry from DIR PACKAGE [RANGE]; raise `Misuse` on failure."""
     import msgspec
 
     from urc.packages.blocks import Block
@@ -67,7 +67,7 @@ def _entry(arguments: argparse.Namespace) -> "tuple[Path, Block]":
 
 
 def blocks(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """List, import, export or forget block lists."""
+    """List, import, export or delete block lists."""
     from urc.cli.packages import open_store
 
     known = open_store().blocks

@@ -1,4 +1,4 @@
-"""`urc repo key` and `urc repo unsigned`: own key, pinned keys, and waivers of signatures."""
+"""`urc repo key` and `urc repo unsigned`: the user's key, pinned keys, and signature waivers."""
 
 import argparse
 from pathlib import Path

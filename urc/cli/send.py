@@ -1,7 +1,7 @@
 """`urc send`: run one command of a robot and print the reply as JSON.
 
-Motion is refused or stopped while STOP is latched or an operator has the controls. If another
-process latches STOP, this module informs the engine.
+While STOP is latched or an operator is in control, motion is refused or stopped. If another process
+latches STOP, this module notifies the engine.
 """
 
 import argparse
@@ -116,7 +116,7 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
 
 
 def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
-    """Return the elements of an array in the form ``1,2,3`` or JSON, such as ``["a, b", "c"]``."""
+    """Return the elements of an array from text: ``1,2,3``, or JSON like ``["a, b", "c"]``."""
     if text.startswith("["):
         import json
 
@@ -129,12 +129,12 @@ def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return a text in the type of its argument. The engine checks ranges and choices."""
+    """Return a text converted to the type of its argument. The engine checks ranges and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)
         if argument.type == "number":
-            # "20" stays a whole number, as in a document, because templates print it.
+            # "20" stays an integer, as in a document, because templates print the number.
             return int(text) if _WHOLE.fullmatch(text) else float(text)
     except ValueError:
         raise Misuse(f"{argument.name}: expected {argument.type}, found {text!r}") from None
@@ -146,7 +146,7 @@ def _value(argument: "Argument", text: str) -> "Value":
 
 
 async def _send_server(arguments: argparse.Namespace) -> int:
-    """Run the command at a robot of a server, under the rules of the server."""
+    """Run the command on a server's robot, under the server's rules."""
     from urc.runtime.command_failed import CommandFailed
 
     name, hold_s = arguments.command, arguments.hold_s
@@ -168,9 +168,9 @@ async def _send_server(arguments: argparse.Namespace) -> int:
 
 
 def _json_argument(word: str) -> tuple[str, "Reading"]:
-    """Return name and value of an argument; the value is JSON, or else a text.
+    """Return the name and value of an argument; a value that is not JSON is text.
 
-    The server knows the types, and refuses a value of the wrong type.
+    The server checks the types and rejects a value of the wrong type.
     """
     import json
 
@@ -275,7 +275,7 @@ async def _known(session: "Session", command: "Command") -> None:
     with (
         session.hub.tap() as tap,
         suppress(TimeoutError),
-    ):  # then the engine reports it
+    ):  # the engine then reports the missing signals
         async with asyncio.timeout(KNOWN_S):
             while not is_known():
                 await tap.filled()
@@ -283,7 +283,7 @@ async def _known(session: "Session", command: "Command") -> None:
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
-    """Return the reason for a failure.
+    """Return the reason for a failure as text.
 
     If the robot is not connected, the reason includes the state of its links.
     """

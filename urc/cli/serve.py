@@ -137,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _add_sign_in(parser: argparse.ArgumentParser) -> None:
-    """Declare the ways to sign in that need options; `_sign_in` reads them."""
+    """Declare the options of sign-in methods; `_sign_in` reads these options."""
     parser.add_argument(
         "--oidc",
         metavar="FILE",
@@ -160,10 +160,10 @@ def _add_sign_in(parser: argparse.ArgumentParser) -> None:
 
 
 def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
-    """Return the ways to sign in that need options.
+    """Return the sign-in options from the command line.
 
     Raises:
-        ProblemsError: a file has mistakes.
+        ProblemsError: a file contains mistakes.
     """
     from urc.access.oidc_options import read_oidc_options
     from urc.access.proxies import read_proxy_options
@@ -174,7 +174,7 @@ def _sign_in(arguments: argparse.Namespace) -> "SignInOptions":
 
 
 def _add_alarms(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of alarms; `_notify` reads the file of the hook."""
+    """Declare the options for alarms; `_notify` reads the hook's file."""
     parser.add_argument(
         "--monitor-alarms",
         dest="monitors",
@@ -190,10 +190,10 @@ def _add_alarms(parser: argparse.ArgumentParser) -> None:
 
 
 def _notify(arguments: argparse.Namespace) -> "NotifyOptions | None":
-    """Return the hook for notifications of alarms.
+    """Return the hook for alarm notifications.
 
     Raises:
-        ProblemsError: the file has mistakes.
+        ProblemsError: the file contains mistakes.
     """
     if not arguments.notify:
         return None

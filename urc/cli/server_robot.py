@@ -1,7 +1,7 @@
-"""The robot of a server, in place of a robot that the command connects itself.
+"""Options for a server's robot, which the command uses instead of connecting a robot itself.
 
-Layer 6. A token never stands in the command line, because every user of a computer can read the
-command lines of all processes. A token comes from a file, or from the environment.
+Layer 6. A token is read from a file or from the environment, but never from the command line. Every
+user of a computer can read the command lines of all processes.
 """
 
 import argparse
@@ -21,7 +21,7 @@ __all__ = ["add_server", "opened_robot", "refuse_local_options"]
 
 
 def add_server(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of a robot that a server connects."""
+    """Declare the options for a robot that is connected to a server."""
     parser.add_argument(
         "--server",
         metavar="URL",
@@ -47,12 +47,12 @@ def add_server(parser: argparse.ArgumentParser) -> None:
 
 
 def refuse_local_options(arguments: argparse.Namespace, options: Sequence[str]) -> None:
-    """Raise `Misuse` if an option does not fit the choice of a server.
+    """Raise `Misuse` for an option that works only with, or only without, a server.
 
     Args:
         arguments: the parsed arguments.
-        options: options that only work without a server, such as ``--wire``; the name of the
-            attribute follows from the option.
+        options: options that work only without a server, such as ``--wire``. The attribute's name
+            is derived from the option.
     """
     if arguments.server is None:
         for option in ("--token-file", "--authority", "--allow-unencrypted"):
@@ -72,7 +72,7 @@ def _is_given(arguments: argparse.Namespace, option: str) -> bool:
 
 
 def opened_robot(arguments: argparse.Namespace) -> "AbstractAsyncContextManager[RemoteRobot]":
-    """Return the context of the robot of the server in `arguments`."""
+    """Return a context manager for the server's robot that `arguments` specify."""
     from urc.client.remote import open
 
     token = "" if arguments.token_file else os.environ.get(TOKEN, "").strip()

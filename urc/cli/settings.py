@@ -18,7 +18,7 @@ __all__ = ["complete_settings", "settings_given"]
 def settings_given(
     profiles: Sequence[Profile], arguments: argparse.Namespace, *, allows_any_port: bool = False
 ) -> list[tuple[dict[str, Value], tuple[str, ...]]]:
-    """Return the settings of each profile, and the names of its settings without a value.
+    """Return the settings of each profile, and the names of settings without a value.
 
     The order of precedence is `--set`, the environment, the settings file, and the profile's
     defaults. With several profiles, a setting applies to each profile that declares it.
@@ -26,7 +26,7 @@ def settings_given(
     Args:
         profiles: one or more profiles.
         arguments: parsed arguments with the options of `add_settings`.
-        allows_any_port: whether a port may be 0, for any free port.
+        allows_any_port: whether a port may be 0, which selects a free port.
 
     Raises:
         Misuse: no profile declares the name, or the text is not a value of the setting's type.
@@ -34,7 +34,7 @@ def settings_given(
     """
     given: dict[str, str] = dict(arguments.settings)
     _warn_of_secrets(profiles, arguments)
-    # A single profile gives the better hint for an unknown name.
+    # With a single profile, the hint for an unknown name is better.
     if len(profiles) > 1:
         for name in given:
             if not any(name in profile.settings for profile in profiles):
@@ -84,7 +84,7 @@ def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[s
 def _settings_in(
     file: str | None, profiles: Sequence[Profile], *, allows_any_port: bool
 ) -> dict[str, str]:
-    """Return the texts in a settings file, checked against all profiles with the setting."""
+    """Return the values in a settings file after checking them against all profiles."""
     if file is None:
         return {}
     document = read_document(file)

@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the sign-ins with device, place and last use, the most recently used first."""
+    """List the sign-ins with device, place and last use, beginning with the most recently used."""
     words_of(arguments, "sign-ins")
     directory, now = store.directory(), time.time()
     of = _principals_of(directory, arguments.of)
@@ -89,13 +89,13 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _end(one: "SignIn") -> float | None:
-    """Return the UTC time at which a sign-in ends without further use; None: never."""
+    """Return the UTC time at which a sign-in ends without further use; None for no end."""
     ends = [one.ends_at, None if one.idle_s is None else one.used_at + one.idle_s]
     return min((each for each in ends if each is not None), default=None)
 
 
 def _close(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """End the chosen sign-ins."""
+    """End the selected sign-ins."""
     from urc.access.administration import KEYS, end_sign_ins
 
     chosen = (bool(arguments.words), arguments.of is not None, arguments.all)
@@ -117,7 +117,7 @@ def _close(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _principals_of(directory: "Directory", name: str | None) -> set[str] | None:
-    """Return the ids of all principals with a name; None without a name.
+    """Return the ids of all principals called `name`; None if no name is given.
 
     Raises:
         UrcError: no person, device, program or guest has this name.

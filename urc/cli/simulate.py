@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     profile = load(arguments.profile)
     ((values, missing),) = settings_given([profile], arguments, allows_any_port=True)
-    # Samples replace the values that only a real robot needs.
+    # Sample values replace values that only a real robot needs.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
     warn_without_rendering([profile])
@@ -86,7 +86,7 @@ async def _simulate(
 
 
 class UnansweredLog(logging.Handler):
-    """A reporter of frames without a reply. Each frame gets one line with a count.
+    """A reporter of frames without a reply. Identical warnings share one line with a count.
 
     Args:
         tell: function that prints one line.
@@ -124,7 +124,7 @@ class UnansweredLog(logging.Handler):
             self._told_at[text] = now
 
     def finish(self) -> None:
-        """Print the counted warnings, the most frequent warnings first."""
+        """Print the counted warnings in order of decreasing frequency."""
         left = sorted(self._counts.items(), key=lambda item: -item[1])
         for text, count in left[:_LAST_LINES]:
             if count:

@@ -26,13 +26,13 @@ class ReadyDashboard(NamedTuple):
     """Address for this machine, without a key."""
     access: "Access"
     others: str = ""
-    """Address for other machines; "" if only this machine reaches the dashboard."""
+    """Address for other machines; "" if only this machine can reach the dashboard."""
     certificate: "LoadedCertificate | None" = None
-    """Certificate of HTTPS; None for plain HTTP."""
+    """HTTPS certificate; None for plain HTTP."""
 
     @property
     def address(self) -> str:
-        """Address with all rights, for the user who started the dashboard."""
+        """Address that grants all rights, for the user who started the dashboard."""
         return self.access.address(self.url)
 
     @property
@@ -41,7 +41,7 @@ class ReadyDashboard(NamedTuple):
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines of the start message. The first line is the address with all rights."""
+        """Yield the lines of the start message; the first contains the address with all rights."""
         yield f"dashboard {self.address}"
         if self.others and self.access.anonymous:
             yield f"for others {self.others} (without a sign-in: {self.access.anonymous})"
@@ -55,7 +55,7 @@ def _certificate_lines(certificate: "LoadedCertificate", url: str) -> Iterator[s
     if not certificate.authority:
         yield f"certificate {certificate.fingerprint}"
         return
-    # Plain HTTP: browsers warn of the certificate until the device trusts the authority.
+    # Use plain HTTP, because browsers show a warning until the device trusts the authority.
     plain = url.replace("https://", "http://", 1)
     yield f"new devices {plain}trust (once, before the first visit)"
     yield f"authority {certificate.fingerprint}"
@@ -70,7 +70,7 @@ def ready_addresses(
         url: first address of the dashboard, without a key.
         host: value of `--host`.
         access: the keys of the dashboard.
-        certificates: certificates of HTTPS; None for plain HTTP.
+        certificates: HTTPS certificates; None for plain HTTP.
         tls: public names of a web server in front of the dashboard.
     """
     others = "" if is_loopback(host) else url
@@ -89,7 +89,7 @@ def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
     """Return the identities and rights of a dashboard.
 
     Args:
-        data: folder with the store of people, devices and programs; None for the local user alone.
+        data: folder with the store of people, devices and programs; None for only the local user.
         is_open: whether visitors without a sign-in may watch and drive.
 
     Raises:
@@ -130,8 +130,8 @@ def announce(
 def _near(url: str, host: str) -> str:
     """Return the dashboard's address for this machine.
 
-    A server for all addresses accepts plain HTTP of this machine, even with a certificate. Browsers
-    then show no warning, and treat the address as secure.
+    A server that listens on all addresses accepts plain HTTP from this machine, even with a
+    certificate. Browsers then show no warning and treat the address as secure.
     """
     port = urlsplit(url).port
     try:

@@ -1,4 +1,4 @@
-"""The options of `urc serve`, `urc demo` and `urc replay` for HTTPS."""
+"""The HTTPS options of `urc serve`, `urc demo` and `urc replay`."""
 
 import argparse
 from collections.abc import Sequence
@@ -25,16 +25,16 @@ class TlsOptions(NamedTuple):
     chain: Path = Path()
     key: Path = Path()
     public_names: Sequence[str] = ()
-    """Host names with an optional port, for which another web server provides HTTPS."""
+    """Host names, with optional ports, for which another web server provides HTTPS."""
 
     def around(self, app: "ASGIApp") -> "ASGIApp":
-        """Return the application with secure public names."""
+        """Return an application that treats the public names as secure."""
         from urc.web.serve.tls_port import BehindProxy
 
         return BehindProxy(app, self.public_names) if self.public_names else app
 
     def hosts(self) -> list[str]:
-        """Return the public names without ports, for the check of Host."""
+        """Return the public names without ports, for the check of the Host header."""
         from urc.web.serve.policy import parse_host
 
         return [one.host for one in map(parse_host, self.public_names) if one is not None]
@@ -44,7 +44,7 @@ PLAIN = TlsOptions()
 
 
 def add_tls(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of HTTPS."""
+    """Declare the HTTPS options."""
     parser.add_argument(
         "--tls",
         choices=("auto",),
@@ -76,7 +76,7 @@ def add_tls(parser: argparse.ArgumentParser) -> None:
 
 
 def tls_of(arguments: argparse.Namespace) -> TlsOptions:
-    """Return the kind of certificate.
+    """Return the kind of certificate and the public names.
 
     Raises:
         Misuse: the options contradict each other, or a name is invalid.
@@ -107,7 +107,7 @@ async def certificates_of(
     """Return the certificates of a server; None for plain HTTP.
 
     Raises:
-        UrcError: a certificate cannot be made or read.
+        UrcError: a certificate cannot be created or read.
     """
     if options.kind == "plain":
         if not is_loopback(host):

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the programs with roles, commands, end and last use."""
+    """List the programs with their roles, commands, end times and last use."""
     from urc.access.administration import overview
 
     words_of(arguments, "tokens")
@@ -106,7 +106,7 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add a program and print its token."""
+    """Add a program, and print its token."""
     (name,) = words_of(arguments, "tokens", "NAME")
     roles = roles_in(arguments.roles)
     if not roles:
@@ -129,7 +129,7 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a program with its token."""
+    """Remove a program and its token."""
     return remove(store, "program", arguments, "tokens", ": its token is invalid")
 
 

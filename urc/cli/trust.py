@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EXAMPLE = "urc trust my-robot.yaml --set host=192.168.1.20"
 
 _NOT_ASKED_FOR = "-"
-"""Placeholder for a password, because reading a host key requires no login."""
+"""Placeholder for a password; reading a host key requires no login."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -76,7 +76,7 @@ def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
 
 def _all(store: "Store") -> "list[tuple[Lock, str]]":
     """Return the newest installed version of every package."""
-    newest = {lock.root: lock for lock in store.installed()}  # in the order of versions
+    newest = {lock.root: lock for lock in store.installed()}  # newest version last
     if not newest:
         print("nothing is installed")
     return [(lock, "*") for lock in newest.values()]

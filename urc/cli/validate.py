@@ -1,6 +1,6 @@
 """`urc validate`: check documents and run their tests.
 
-The command needs no robot and no network. This module imports little, because editors run the
+The command needs no robot and no network. This module imports few modules, because editors run the
 command on every save.
 """
 
@@ -34,7 +34,7 @@ class _Report:
         self.files = 0
         self.tests = 0
         self.failed = 0
-        """Tests that failed."""
+        """Number of failed tests."""
         self.is_cut_short = False
         """Whether errors prevented later checks."""
         self.problems: list[Problem] = []
@@ -108,7 +108,7 @@ def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
 
 
 def _examined(paths: list[str], *, with_tests: bool) -> _Report:
-    """Check the documents; on a terminal, many documents show a status line."""
+    """Check the documents; for several documents on a terminal, show a status line."""
     if not paths[1:] or not is_terminal(sys.stderr):
         return _examine(paths, with_tests=with_tests)
     from urc.cli.progress import Progress
@@ -169,7 +169,7 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 
 
 def _document_in(path: str) -> str:
-    """Return the document for a path or a robot name.
+    """Return the path of the document for a path or a robot name.
 
     For the folder of a widget, the document is the manifest. A missing file is reported like other
     problems.

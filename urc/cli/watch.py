@@ -85,7 +85,7 @@ async def _watch(
 
 
 async def _watch_server(arguments: argparse.Namespace) -> int:
-    """Print the readings of a server's robot, beginning with the present ones."""
+    """Print the readings of a server's robot, beginning with the current readings."""
     from urc.cli.event_loop import LineWriter
 
     async with opened_robot(arguments) as robot:
@@ -113,9 +113,10 @@ async def _follow(
         with suppress(TimeoutError):
             async with asyncio.timeout_at(ends):
                 await tap.filled()
-        is_over = now() >= ends  # a tap that is never empty never waits
+        is_over = now() >= ends  # checked here, because a tap that is never empty never waits
         try:
-            # The end of the time does not cut a line, but a blocked reader has a time limit.
+            # The end of the duration does not cut off a line, but a blocked reader has a time
+            # limit.
             async with asyncio.timeout_at(ends + _LAST_WORDS_S):
                 await printer.print_events(tap.drain())
                 await printer.tell_losses(tap.dropped, is_last=is_over)
@@ -135,7 +136,7 @@ class _Printer:
 
     def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
         self.received = 0
-        """Number of printed lines with data of the robot."""
+        """Number of printed lines that contain data from the robot."""
         self._writer = writer
         self._signals = frozenset(signals)
         self._dropped = 0

@@ -1,8 +1,7 @@
-"""The address and the secrets of a server, and the encryption of the connection to it.
+"""The address and the secrets of a server, and the encryption of its connections.
 
-Layer 5. A certificate is always checked: against the trust store of the system, or against the
-authority in a file. A token never crosses a network without encryption, unless the program allows
-this by name.
+Layer 5. Certificates are always checked, against the system's trust store or the authority in a
+file. A token never crosses a network unencrypted, unless the program explicitly allows it.
 """
 
 import ssl
@@ -38,7 +37,7 @@ class ServerAddress(NamedTuple):
         return self.url
 
     def socket(self, robot: str) -> str:
-        """Return the address of a robot's WebSocket; "" for the only robot of the server."""
+        """Return the address of a robot's WebSocket; "" means the server's only robot."""
         scheme = "wss" if self.scheme == "https" else "ws"
         query = f"?robot={quote(robot, safe='')}" if robot else ""
         return f"{scheme}://{self.netloc}/ws{query}"
@@ -57,10 +56,10 @@ def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAdd
 
     Args:
         server: address such as ``https://robots.lab:8080``, without a path.
-        allow_unencrypted: whether ``http`` may lead to another computer.
+        allow_unencrypted: whether ``http`` is also allowed to another computer.
 
     Raises:
-        UrcError: the address is not the address of a server, or is not encrypted.
+        UrcError: the address is not a server's address, or requires encryption.
     """
     try:
         parts = urlsplit(server)
@@ -99,7 +98,7 @@ def trust(authority: Path | None) -> ssl.SSLContext:
 
 
 def read_token(token: str, file: Path | None) -> str:
-    """Return the token of a program, given itself or in a file.
+    """Return a program's token, from the argument or from a file.
 
     Raises:
         UrcError: the file cannot be read, or the token is not one word of printable ASCII.

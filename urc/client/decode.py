@@ -40,7 +40,7 @@ _LEVELS = ("info", "warning", "error")
 
 
 def decode_message(text: str | bytes) -> ServerMessage | None:
-    """Return a message; None for a message that this version does not know."""
+    """Return a message; None for a message unknown to this version."""
     try:
         return _decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError):
@@ -53,7 +53,7 @@ def signals_of(hello: HelloMessage) -> dict[str, Signal]:
 
 
 def samples_of(message: ValuesMessage, signals: Sequence[Signal], now_s: float) -> Iterator[Sample]:
-    """Yield the readings of a message; ages count back from `now_s`."""
+    """Yield the readings of a message; their ages are relative to `now_s`."""
     indexes = _indexes.decode(message.i)
     ages = message.a if isinstance(message.a, Sequence) else [message.a] * len(indexes)
     alarms = message.s or [""] * len(indexes)
@@ -65,12 +65,12 @@ def samples_of(message: ValuesMessage, signals: Sequence[Signal], now_s: float) 
 
 
 def readings_of(values: Mapping[str, object], signals: Mapping[str, Signal]) -> dict[str, Reading]:
-    """Return the values of a reply, each in the type of its signal."""
+    """Return the values of a reply, each converted to its signal's type."""
     return {name: reading_of(value, signals.get(name)) for name, value in values.items()}
 
 
 def reading_of(value: object, signal: Signal | None) -> Reading:
-    """Return a value in the type of its signal; None for a value of an unknown signal."""
+    """Return a value converted to its signal's type; `signal` may be None for an unknown signal."""
     kind = signal.type if signal is not None else ""
     if kind == "integer" and isinstance(value, str):
         try:

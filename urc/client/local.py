@@ -10,7 +10,7 @@
 
     asyncio.run(main())
 
-Layer 5. Lost connections are reopened. Motion is written by a guard process, which stops the robot
+Layer 5. Lost connections are reopened. A guard process sends all motion to the robot, and stops it
 if this process hangs or dies.
 """
 
@@ -77,7 +77,7 @@ async def connect(
 
 
 class ConnectedRobot(HubReadings):
-    """A robot that this process has connected: `urc.client.robot.RobotInterface`.
+    """A robot connected by this process; see `urc.client.robot.RobotInterface`.
 
     The attribute `session` offers all other functions.
     """
@@ -101,17 +101,17 @@ class ConnectedRobot(HubReadings):
 
     @property
     def operator(self) -> str:
-        """Name of the holder of the controls in this process; "" for none."""
+        """Name of the controls' holder in this process; "" without a holder."""
         holder = self.motion.controller.lease.state.holder
         return holder.name if holder is not None else ""
 
     @property
     def latched_by(self) -> str:
-        """Name of the holder of a latched STOP of this process; "" while STOP is not latched."""
+        """Name of the person or program that latched STOP in this process; "" if not latched."""
         return self.motion.controller.lease.state.latched_by
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command and return the values of its reply; the wait has a time limit.
+        """Run a command, and return the values of its reply; the wait has a time limit.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.
@@ -133,12 +133,12 @@ class ConnectedRobot(HubReadings):
             Whether all connections of the robot accepted the stop within two seconds.
 
         Raises:
-            UrcError: the robot has no motion.
+            UrcError: the robot has no motion to stop.
         """
         return await self.motion.stop()
 
     async def reset(self) -> None:
-        """Reset STOP of this process; nothing moves before new input.
+        """Reset this process's STOP; the robot does not move before new input.
 
         Raises:
             CommandFailed: the reset was refused.

@@ -1,4 +1,4 @@
-"""The controls of a robot that this process has connected, under the same rules as a server's.
+"""The controls of a robot connected by this process, under the same rules as on a server.
 
 Layer 5. A `urc.runtime.motion_controller.MotionController` checks each tick, and a guard process
 writes the frames and the stops. Motion is refused while STOP is latched, or while an operator
@@ -43,7 +43,7 @@ class LocalMotion(ProgramControls):
     """The controls of one connected robot."""
 
     def __init__(self, session: Session) -> None:
-        """Prepare the controls; nothing moves before `running`."""
+        """Prepare the controls; the robot cannot move before `running`."""
         super().__init__()
         self._session = session
         self._clock = LoopClock()
@@ -65,7 +65,7 @@ class LocalMotion(ProgramControls):
 
     @asynccontextmanager
     async def running(self, interlock: MotionInterlock) -> AsyncIterator[None]:
-        """Let the program move the robot while the context is open, unless `interlock` refuses."""
+        """Allow the program to move the robot during the context, unless `interlock` refuses."""
         if not self.controller.can_move:
             yield
             return
@@ -92,7 +92,7 @@ class LocalMotion(ProgramControls):
             self.controller.detach()
 
     def admit(self, command: str, arguments: Mapping[str, Reading]) -> tuple[str, ...]:
-        """Return the names of the people who confirm a command: this program.
+        """Return the names of a command's confirmers: only this program.
 
         Raises:
             CommandFailed: the command is held, or STOP refuses its motion.
@@ -115,7 +115,7 @@ class LocalMotion(ProgramControls):
         return self.controller.is_confirmed
 
     def reset(self) -> None:
-        """Reset STOP of this process."""
+        """Reset this process's STOP."""
         if not self.controller.lease.state.latched_by:
             return
         if reason := self.controller.drive(_US.id, "reset", self._clock.now()):
@@ -127,7 +127,7 @@ class LocalMotion(ProgramControls):
     # -- motion
 
     async def take(self, command: str) -> None:
-        """Wait until the robot is ready, and take the controls."""
+        """Wait until the robot is ready, then take the controls."""
         backend = self._session.backend
         if backend is None or self._interlock is None:
             raise MotionEnded("the robot is not connected")
@@ -159,7 +159,7 @@ class LocalMotion(ProgramControls):
         self.controller.release(_US.id, command)
 
     async def leave(self, command: str) -> None:
-        """Wait until the stop is written; give the controls back after the last stick."""
+        """Wait until the stop is written; release the controls after the last stick."""
         ends_s = self._clock.now() + _STILL_S
         try:
             while not self.controller.rests(command):
@@ -202,4 +202,4 @@ class LocalMotion(ProgramControls):
 
 
 def _unread(entry: AuditEntry) -> None:
-    """Ignore the entry: only a server keeps an audit log."""
+    """Ignore the entry, because only a server has an audit log."""

@@ -20,7 +20,7 @@ _Entered = TypeVar("_Entered")
 
 
 class LoopThread:
-    """A daemon thread with an event loop: it never delays the end of the process."""
+    """A daemon thread with an event loop, which never delays the end of the process."""
 
     def __init__(self, timeout_s: float) -> None:
         self.timeout_s = timeout_s
@@ -32,7 +32,7 @@ class LoopThread:
         """Run `work` on the loop and return its result.
 
         Raises:
-            TimeoutError: the time limit is over; `work` was cancelled.
+            TimeoutError: the time limit has passed; `work` was cancelled.
         """
         limit_s = self.timeout_s if timeout_s is None else timeout_s
         found: Future[_Result] = asyncio.run_coroutine_threadsafe(work, self.loop)
@@ -43,7 +43,7 @@ class LoopThread:
                 raise  # a limit inside the call
             found.cancel()
             raise TimeoutError(f"the call took longer than {limit_s:g} s") from None
-        except BaseException:  # Ctrl-C: the call must not go on by itself
+        except BaseException:  # Ctrl-C: the call must not continue
             found.cancel()
             raise
 
@@ -52,7 +52,7 @@ class LoopThread:
         self, opening: "Callable[[], AbstractAsyncContextManager[_Entered]]"
     ) -> "Iterator[_Entered]":
         """Keep an asynchronous context open; its exit always runs, within a time limit."""
-        # One task enters and leaves the context: time limits inside belong to a task.
+        # One task enters and leaves the context, because time limits inside it belong to a task.
         inside: Future[_Entered] = Future()
         leave = asyncio.Event()
 
@@ -101,6 +101,6 @@ def _tell(inside: "Future[_Entered]", ended: "Future[None]") -> None:
 
 
 def _wait_quietly(staying: "Future[None]") -> None:
-    """Wait for the end of a context whose block has raised: the error of the block passes on."""
+    """Wait for the end of a context whose block raised an error; ignore further errors."""
     with suppress(Exception, CancelledError):
         staying.result(_CLOSE_S)

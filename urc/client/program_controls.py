@@ -1,7 +1,7 @@
-"""The context of driving, which both openings share: one stick for each held command.
+"""The driving context, shared by both openings, with one stick for each held command.
 
 Layer 5. The context takes the controls, samples its stick, and always ends with a release. The
-release leaves before any wait, also after an exception or a cancellation.
+release is sent before any wait, even after an exception or a cancellation.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ _LEFT: Final = "the context of drive has ended"
 
 
 def only_control(controls: tuple[str, ...], command: str) -> str:
-    """Return the held command that a program means; raise `UrcError` if none fits."""
+    """Return the held command `command`; "" selects the only one; raise `UrcError` for no match."""
     known = ", ".join(controls)
     if not controls:
         raise UrcError("this robot has no held command")
@@ -57,7 +57,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     def release(self, command: str) -> None:
-        """Stop the command; never wait."""
+        """Stop the command without waiting."""
 
     @abstractmethod
     async def take(self, command: str) -> None:
@@ -69,7 +69,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     async def leave(self, command: str) -> None:
-        """Wait until a released command stands still; the last stick also gives the controls back.
+        """Wait until a released command has stopped; the last stick also releases the controls.
 
         Raises:
             MotionEnded: the stop was not confirmed in time.

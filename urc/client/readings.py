@@ -1,7 +1,7 @@
 """Readings of a robot from a hub: latest values, waits, streams and the log.
 
-Layer 5. Both openings of a robot keep a `urc.runtime.hub.Hub`: the hub of a session, or a hub that
-a server's messages fill. So both openings share this code.
+Layer 5. Both openings of a robot share this code. Each has a `urc.runtime.hub.Hub`: the hub of a
+session, or a hub filled by a server's messages.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ __all__ = ["HubReadings"]
 
 
 class HubReadings:
-    """The reading half of `urc.client.robot.RobotInterface`."""
+    """The part of `urc.client.robot.RobotInterface` that reads values."""
 
     def __init__(self, hub: Hub) -> None:
         """Store the hub."""
@@ -60,10 +60,10 @@ class HubReadings:
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition; the present reading counts.
+        """Return the first reading that meets the condition, starting with the present reading.
 
         Raises:
-            TimeoutError: the time is over.
+            TimeoutError: the timeout has passed.
             UrcError: the robot has no signal of this name, or the connection has ended for good.
         """
         self._check(name)
@@ -80,8 +80,8 @@ class HubReadings:
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
         """Yield the readings of the named signals, or of all signals, until the caller stops.
 
-        The first readings are the present ones. Only the newest reading is kept, so a slow program
-        skips readings and never falls behind.
+        The first readings are the present readings. Only the newest reading is kept, so a slow
+        program skips readings and never falls behind.
 
         Raises:
             UrcError: the robot has no signal of this name, or the connection has ended for good.
@@ -97,9 +97,9 @@ class HubReadings:
                 await subscription.changed()
 
     def log(self) -> AsyncIterator[LogEntry]:
-        """Yield the lines of the robot's log that follow this call, until the caller stops.
+        """Yield each new line of the robot's log, until the caller stops.
 
-        A warning takes the place of lines that were lost, with their number.
+        A warning with the number of lost lines replaces these lines.
 
         Raises:
             UrcError: the connection has ended for good.

@@ -1,4 +1,4 @@
-"""The opening of a robot of a server: values, log, commands and motion over one WebSocket.
+"""The opening of a server's robot: values, log, commands and motion over one WebSocket.
 
     import asyncio
     import urc.client
@@ -84,15 +84,15 @@ async def open(
     allow_unencrypted: bool = False,
     timeout: float = 10.0,
 ) -> AsyncIterator["RemoteRobot"]:
-    """Open a robot of a server while the context is active; a lost connection is reopened.
+    """Open a server's robot while the context is active; a lost connection is reopened.
 
     Args:
         server: address such as ``https://robots.lab:8080``.
-        robot: name of the robot in its URL; "" for the only robot of the server.
+        robot: name of the robot in its URL; "" for the server's only robot.
         token: token of this program; "" for none.
-        token_file: file with the token, in place of `token`.
+        token_file: file with the token, instead of `token`.
         authority: PEM file with the certificate of the server's local authority; None for the
-            trust store of the system. Certificates are always checked.
+        system's trust store. Certificates are always checked.
         allow_unencrypted: whether to send the token to another computer over plain HTTP, where
             others on the network can read it.
         timeout: longest duration of one attempt to connect, in seconds.
@@ -124,7 +124,7 @@ async def open(
 
 
 class RemoteRobot(HubReadings):
-    """A robot of a server: `urc.client.robot.RobotInterface`."""
+    """A server's robot; see `urc.client.robot.RobotInterface`."""
 
     def __init__(
         self,
@@ -141,7 +141,7 @@ class RemoteRobot(HubReadings):
         """The controls of this program."""
         self.motion.is_connecting = self._is_connecting
         self.alarms = RemoteAlarms(self._post_alarms)
-        """The robot's alarms as the server lists them."""
+        """The robot's alarms, as listed by the server."""
         self._commands = RemoteCommands(socket)
         self._socket = socket
         self._address = address
@@ -154,7 +154,7 @@ class RemoteRobot(HubReadings):
         self._over: ConnectionLost | None = None
         self._session = ""
         self._next_line: int | None = None
-        """Number of the next line of the log; None before the first line."""
+        """Number of the next log line; None before the first line."""
         self._images: Counter[str] = Counter()
         socket.on_message = self._handle
         socket.on_lost = self._lost
@@ -213,20 +213,20 @@ class RemoteRobot(HubReadings):
         return self.motion.drive(command, valid_s)
 
     async def stop(self) -> bool:
-        """Stop the robot and latch STOP, over the socket, and over HTTP if the socket is silent.
+        """Stop the robot and latch STOP over the socket, plus over HTTP if the socket is silent.
 
         Returns:
             Whether all connections of the robot accepted the stop within two seconds.
 
         Raises:
-            UrcError: the robot has no motion.
+            UrcError: the robot has no motion to stop.
             ConnectionLost: the server could not be reached.
         """
         is_confirmed = await self.motion.stop()
         return await self._post_stop() if is_confirmed is None else is_confirmed
 
     async def reset(self) -> None:
-        """Reset a latched STOP; nothing moves before new input.
+        """Reset a latched STOP; the robot does not move before new input.
 
         Raises:
             CommandFailed: the reset was refused.
@@ -318,7 +318,7 @@ class RemoteRobot(HubReadings):
     def _hello(self, hello: HelloMessage) -> None:
         signals = signals_of(hello)
         if self._ready.is_set() and signals != self.hub.signals:
-            # Readers hold names and types of the signals that they know.
+            # Readers store the names and types of the signals from the first message.
             self._socket.fail("the robot's signals have changed: open the robot again")
             return
         self._socket.is_up = True
@@ -336,7 +336,7 @@ class RemoteRobot(HubReadings):
         self._ready.set()
 
     def _add_lines(self, message: LogMessage, now: float) -> None:
-        """Add the new lines of the log; tell how many lines the server has dropped."""
+        """Add the new lines of the log, and report how many lines the server has dropped."""
         known = message.first if self._next_line is None else self._next_line
         if message.first > known:
             self._note("warning", f"{message.first - known} lines of the log were lost")
@@ -367,7 +367,7 @@ class RemoteRobot(HubReadings):
                 self._select_images()
 
     def _select_images(self) -> None:
-        """Ask for the images that the program reads; the server sends no other images."""
+        """Request the images that the program reads; the server sends no other images."""
         names = sorted(+self._images)[:_MOST_IMAGES]
         if names or self._images:
             self._socket.send(ImageSelection(tuple(names)))

@@ -1,7 +1,7 @@
-"""The alarms of a robot of a server, and the actions of a program on them.
+"""The alarms of a server's robot, and a program's actions on these alarms.
 
-Layer 5. The WebSocket brings the list; actions are HTTP requests, whose answer comes after the
-server has stored the change.
+Layer 5. The list arrives over the WebSocket. Actions are HTTP requests; the server answers after it
+has stored the change.
 """
 
 from collections.abc import Awaitable, Callable, Mapping
@@ -18,19 +18,19 @@ Post = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
 
 
 class RemoteAlarms:
-    """The alarms of one robot that are not normal."""
+    """The non-normal alarms of one robot."""
 
     def __init__(self, post: Post) -> None:
         """Begin without alarms.
 
         Args:
-            post: sends the JSON of a request to a path below the robot's alarms.
+            post: function that sends a request's JSON to a path below the robot's alarms.
         """
         self._post = post
         self.rows: dict[str, AlarmRow] = {}
         """Alarms by signal; times are in milliseconds since 1970."""
         self.is_flooded = False
-        """Whether more than 10 alarms have come in 10 minutes."""
+        """Whether more than 10 alarms began within 10 minutes."""
 
     @property
     def active(self) -> tuple[AlarmRow, ...]:
@@ -39,10 +39,10 @@ class RemoteAlarms:
         return tuple(sorted(shown, key=lambda row: row.number))
 
     async def acknowledge(self, *signals: str) -> tuple[str, ...]:
-        """Acknowledge alarms as this program knows them; without names, all that wait for it.
+        """Acknowledge alarms that this program has received; without names, all pending alarms.
 
         Returns:
-            The signals whose alarm was acknowledged; an alarm that was raised again is left out.
+            The signals of the acknowledged alarms, without alarms that were raised again meanwhile.
 
         Raises:
             UrcError: the server refused, or could not be reached.
@@ -63,7 +63,7 @@ class RemoteAlarms:
         return await self._act("shelve", {"signals": signals, "for_s": for_s})
 
     async def unshelve(self, *signals: str) -> tuple[str, ...]:
-        """End the shelves of alarms; return the signals that were shelved.
+        """Unshelve alarms; return the signals that were shelved.
 
         Raises:
             UrcError: the server refused, or could not be reached.
@@ -80,7 +80,7 @@ class RemoteAlarms:
         self.is_flooded = message.flood
 
     def clear(self) -> None:
-        """Forget the list: after a new connection the server sends all alarms."""
+        """Clear the list; after a new connection, the server sends all alarms."""
         self.rows.clear()
         self.is_flooded = False
 

@@ -1,4 +1,4 @@
-"""The commands that a program sends to a server, and the replies that it waits for.
+"""The commands that a program sends to a server, and their pending replies.
 
 Layer 5. The server sends exactly one reply to each command. After a loss of the connection, the
 outcome of a pending command is unknown, so it fails and is never repeated.
@@ -21,7 +21,7 @@ _Answer = TypeVar("_Answer")
 
 
 class RemoteCommands:
-    """The pending commands of one robot of a server."""
+    """The pending commands of a server's robot."""
 
     def __init__(self, socket: RobotSocket) -> None:
         """Prepare the commands; nothing is sent."""
@@ -36,20 +36,21 @@ class RemoteCommands:
         Args:
             name: name of the command.
             arguments: its arguments.
-            stops: number of STOPs that the program knows; None to skip the check.
+            stops: number of STOPs known to the program; None to skip the check.
 
         Raises:
             CommandFailed: the connection is down, or was lost before the reply.
         """
         reply = await self._run(name, arguments, stops, "")
         if reply.code == "not-confirmed" and reply.message.startswith(_MISSING):
-            # The call of a program is the confirmation; the server asks for a second person.
+            # The program's call is the confirmation; the server requests a second person's
+            # approval.
             token = await self._token(name, arguments, stops)
             reply = await self._run(name, arguments, stops, token)
         return reply
 
     def handle(self, message: ReplyMessage | TokenMessage) -> None:
-        """Pass a message on to the call that waits for it."""
+        """Pass a message to the waiting call."""
         if isinstance(message, ReplyMessage):
             _resolve(self._replies.get(message.id), message)
         else:

@@ -1,7 +1,7 @@
-"""The controls of a robot of a server: the lease, heartbeats, ticks and STOP.
+"""The controls of a server's robot: the lease, heartbeats, ticks and STOP.
 
-Layer 5. Each tick carries the epoch of the lease, a number, and the newest heartbeat of the server,
-so the server refuses late and repeated ticks. After a loss of the connection, motion never resumes:
+Layer 5. Each tick contains the lease epoch, a number, and the server's newest heartbeat, so that
+the server can refuse late and repeated ticks. After a loss of the connection, motion never resumes:
 every stick ends, and the server stops the robot.
 """
 
@@ -29,11 +29,11 @@ from urc.wire.server_messages import (
 __all__ = ["ControlMessage", "RemoteMotion", "plain_arguments"]
 
 ControlMessage = LeaseMessage | HeartbeatMessage | StoppedMessage | RefusedMessage
-"""Messages of the server about the controls."""
+"""Server messages about the controls."""
 _ASK_S: Final = 2.0
 """Maximum time for the answer to a request about the controls, in seconds."""
 STOP_AGAIN_S: Final = 0.3
-"""Silence of the server after which STOP is also sent by HTTP, in seconds."""
+"""Silence of the server after which STOP is also sent over HTTP, in seconds."""
 _CONFIRM_S: Final = 2.0
 _CONNECT_S: Final = 10.0
 """Maximum wait for the robot's first connection, in seconds."""
@@ -41,7 +41,7 @@ _CUT: Final = "the connection to the server was lost"
 
 
 class RemoteMotion(ProgramControls):
-    """The controls of one robot of a server."""
+    """The controls of one server's robot."""
 
     def __init__(self, socket: RobotSocket) -> None:
         """Prepare the controls."""
@@ -49,9 +49,9 @@ class RemoteMotion(ProgramControls):
         self.names: tuple[str, ...] = ()
         """Names of the held commands, from the server's first message."""
         self.lease: LeaseMessage | None = None
-        """Newest lease; None before the first, and for a robot without motion."""
+        """Newest lease; None before the first lease, and for a robot without motion."""
         self.is_connecting: Callable[[], bool] = lambda: False
-        """Function that returns whether the server still connects the robot for the first time."""
+        """Function that returns whether the server is still connecting to the robot initially."""
         self._socket = socket
         self._beat = 0
         self._beat_s = 0.0
@@ -67,7 +67,7 @@ class RemoteMotion(ProgramControls):
 
     @property
     def stops(self) -> int | None:
-        """Number of STOPs that this program knows; None before the first lease."""
+        """Number of STOPs known to this program; None before the first lease."""
         return self.lease.stops if self.lease is not None else None
 
     # -- messages
@@ -92,7 +92,7 @@ class RemoteMotion(ProgramControls):
         self.wake()
 
     def wake(self) -> None:
-        """Let waiting calls check their conditions again."""
+        """Make waiting calls check their conditions again."""
         self._changed.set()
 
     def lost(self) -> None:
@@ -109,7 +109,7 @@ class RemoteMotion(ProgramControls):
             return
         for command, stick in self.sticks.items():
             if command not in self._epochs:
-                continue  # it still takes the controls
+                continue  # it is still taking the controls
             if not _is_ours(lease):
                 stick.end(_taken(lease))
             elif lease.epoch != self._epochs[command]:
@@ -163,13 +163,13 @@ class RemoteMotion(ProgramControls):
         return ""
 
     def release(self, command: str) -> None:
-        """Send the release; a tick that still waits is dropped."""
+        """Send the release, and drop a waiting tick."""
         self._socket.drop_tick(command)
         if command in self._epochs:
             self._socket.send(Release(command))
 
     async def leave(self, command: str) -> None:
-        """Give the controls back after the last stick, and wait for the server."""
+        """Release the controls after the last stick, and wait for the server."""
         self._epochs.pop(command, None)
         lease = self.lease
         if self._epochs or lease is None or not _is_ours(lease):
@@ -227,7 +227,7 @@ class RemoteMotion(ProgramControls):
         return self._refusals.pop(verb, _CUT)
 
     async def _until(self, is_true: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a message makes `is_true` true; return whether it is true."""
+        """Wait until `is_true` returns True, or until the timeout; return its last result."""
         with suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
                 while not is_true():
@@ -240,7 +240,7 @@ def plain_arguments(arguments: Mapping[str, Reading]) -> Arguments:
     """Return arguments in a form that the server accepts.
 
     Raises:
-        UrcError: an argument is not a number, text, boolean or a list of these.
+        UrcError: an argument is not a number, text or boolean, or a list of such values.
     """
     return {name: _plain(name, value) for name, value in arguments.items()}
 

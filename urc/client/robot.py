@@ -1,7 +1,7 @@
 """The interface of a robot for Python programs, with the same meaning in every opening.
 
 Layer 5. `urc.connect` connects a robot in this process, and `urc.client.open` uses a robot of a
-server. Both return this interface, so a program changes from one to the other in one line. The
+server. Both return this interface, so a program switches between them by changing one line. The
 tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same
 dialogues against both.
 """
@@ -114,8 +114,8 @@ class RobotInterface(Protocol):
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
         """Run a command and return the values of its reply.
 
-        The call is the confirmation of a command with ``confirm``. A two-person command waits for
-        the approval of a person at a dashboard.
+        The call confirms a command with ``confirm``. A two-person command waits for the approval of
+        a person at a dashboard.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.
@@ -133,12 +133,13 @@ class RobotInterface(Protocol):
             valid_s: time for which one call of the stick moves the robot, 0.05 to 1 second.
 
         Raises:
-            UrcError: the robot has no such held command, or several and `command` is "".
-            MotionEnded: the controls were refused, or motion ended before the context did.
+            UrcError: the robot has no such held command, or `command` is "" and the robot has
+            several.
+            MotionEnded: the controls were refused, or motion ended before the context.
         """
 
     async def stop(self) -> bool:
-        """Stop the robot, and latch STOP. STOP needs no controls and is never refused.
+        """Stop the robot, and latch STOP. STOP does not require the controls and is never refused.
 
         Returns:
             Whether all connections of the robot accepted the stop within two seconds.

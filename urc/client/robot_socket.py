@@ -1,9 +1,9 @@
-"""The WebSocket of one robot of a server: reopened after each loss, with one writer.
+"""The WebSocket of a server's robot, reopened after each loss, with one writer.
 
 Layer 5. Theory of operation. `run` reopens the socket after increasing delays with jitter, so that
-many programs do not return at the same moment. Pings find a dead connection within 4 s; motion does
-not rely on them. The writer sends a message only after the kernel has accepted the previous one.
-Meanwhile, a newer tick of the same command replaces the waiting tick.
+many programs do not reconnect at the same moment. Pings detect a dead connection within 4 s; motion
+does not rely on them. The writer sends a message only after the kernel has accepted the previous
+one. Meanwhile, a newer tick of the same command replaces the waiting tick.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ _encode = msgspec.json.Encoder().encode
 
 
 class RobotSocket:
-    """The socket of one robot of a server."""
+    """The socket of a server's robot."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class RobotSocket:
 
         Args:
             address: the server.
-            robot: name of the robot; "" for the only robot of the server.
+            robot: name of the robot; "" for the server's only robot.
             token: token of the program; "" for none.
             context: rules for certificates; None without encryption.
             timeout_s: longest duration of one attempt to connect, in seconds.
@@ -92,13 +92,13 @@ class RobotSocket:
         return self.is_up
 
     def offer_tick(self, command: str, message: msgspec.Struct) -> None:
-        """Send a tick as soon as possible; replace a tick of `command` that still waits."""
+        """Send a tick as soon as possible; replace a waiting tick of `command`."""
         if self.is_up:
             self._ticks[command] = _encode(message)
             self._filled.set()
 
     def drop_tick(self, command: str) -> None:
-        """Forget a tick of `command` that still waits."""
+        """Drop a waiting tick of `command`."""
         self._ticks.pop(command, None)
 
     async def _write(self, line: ClientConnection) -> None:
@@ -138,7 +138,7 @@ class RobotSocket:
             wait_s = min(wait_s * 2, _LONGEST_WAIT_S)
 
     async def _converse(self) -> ConnectionLost:
-        """Connect, and pass messages on until the connection is lost; return the reason."""
+        """Connect, and pass on messages until the connection is lost; return the reason."""
         try:
             async with self._connected() as line:
                 self._line = line

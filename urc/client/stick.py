@@ -1,12 +1,13 @@
-"""The stick of a program: sampled input of one held command, which keeps the motion contract.
+"""A program's stick: sampled input for one held command, under the motion contract.
 
-Layer 5. Theory of operation. A call of the stick sets the input and the time of the input. A
-sampler sends one tick every 50 ms, while the input is younger than `valid_s`. A program that hangs,
-sleeps too long, raises an exception or dies renews no input, so the robot stops. No timer sends
-ticks for a program that does not renew its input.
+Layer 5. Theory of operation. Calling the stick sets the input and its time. A sampler sends one
+tick every 50 ms, while the input is younger than `valid_s`. A program that hangs, sleeps too long,
+raises an exception or dies does not renew its input, so the robot stops. No timer sends ticks for a
+program that does not renew its input.
 
-After any end except `release` and the end of the context, the stick stays without effect. New
-motion then requires a new context, as a person must let go and press again.
+If motion ends for any reason except `release` or the end of the context, further calls of the stick
+fail. New motion then requires a new context, just as a person must release and press a control
+again.
 """
 
 import asyncio
@@ -37,15 +38,15 @@ TICK_S: Final = 0.05
 _SOONEST_S: Final = 0.01
 """Shortest interval between two ticks, in seconds; later input waits for its tick."""
 HELD_UP_S: Final = 0.25
-"""Gap in the sampling after which motion ends, in seconds: this process was stopped or blocked."""
+"""Sampling gap after which motion ends, in seconds; this process was suspended or blocked."""
 
 
 class MotionEnded(UrcError):
-    """The end of motion before its context: a stop, a refusal, a lost connection or late input."""
+    """Motion ended before its context: by a stop, a refusal, a lost connection or late input."""
 
 
 class MotionLine(Protocol):
-    """The way of ticks to the robot; one for each opening of a robot."""
+    """The path of ticks to the robot; each opening of a robot has its own class."""
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
         """Send one tick; return the reason why motion must end, or ""."""
@@ -58,7 +59,7 @@ class Stick:
     """The input of one held command, valid while the context of `drive` is open.
 
     ``stick(speed=0.5)`` moves the robot for at most `valid_s` seconds; call the stick again before
-    that time is over. Calls are cheap and may come from any thread.
+    that time ends. Calls are cheap and may come from any thread.
     """
 
     def __init__(self, command: str, valid_s: float = VALID_S) -> None:
@@ -84,12 +85,12 @@ class Stick:
         """Keep the same arguments for a time, while this call is awaited.
 
         Args:
-            seconds: the duration; the robot keeps its motion for `valid_s` seconds more, unless
-                the stick is called or released.
+            seconds: the duration; the robot then continues to move for `valid_s` seconds, unless
+            the stick is called or released.
             arguments: as in a call of the stick.
 
         Raises:
-            MotionEnded: motion has ended before the time was over.
+            MotionEnded: motion ended before the time had passed.
         """
         ends_s = time.monotonic() + seconds
         while (left_s := ends_s - time.monotonic()) > 0:
@@ -102,7 +103,7 @@ class Stick:
         """Stop the robot and keep the controls; the next call of the stick moves the robot again.
 
         Raises:
-            MotionEnded: motion has ended already.
+            MotionEnded: motion has already ended.
         """
         if self.ended:
             raise MotionEnded(self.ended)
@@ -122,11 +123,11 @@ class Stick:
         self._input = None
 
     def wake(self) -> None:
-        """Let the sampler see the input now; call this on the event loop."""
+        """Make the sampler read the input now; call this method on the event loop."""
         self._changed.set()
 
     def end(self, reason: str) -> None:
-        """End all motion of this stick; the first reason stays."""
+        """End all motion of this stick; keep the first reason."""
         self.ended = self.ended or reason
         self._input = None
         self.wake()
@@ -137,7 +138,7 @@ class Stick:
         return self._input
 
     async def changed(self, timeout_s: float) -> None:
-        """Return after input that follows the last `sample`, or after `timeout_s` seconds."""
+        """Wait for new input since the last `sample`, for at most `timeout_s` seconds."""
         with suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
                 await self._changed.wait()

@@ -1,4 +1,4 @@
-"""The same robots without ``async``: for scripts, notebooks and consoles.
+"""Robots without ``async``, for scripts, notebooks and consoles.
 
     from urc.client import sync
 
@@ -7,9 +7,9 @@
         with robot.drive() as stick:
             stick.hold(2.0, speed=0.3)
 
-Layer 5. One daemon thread runs the event loop of each robot. Every call has a time limit. Leaving
-the context, an exception or Ctrl-C releases the stick first, so the robot stops. A blocked program
-renews no input, so the robot stops as well.
+Layer 5. Each robot has its own daemon thread, which runs an event loop. Every call has a time
+limit. Leaving the context, an exception or Ctrl-C releases the stick first, so the robot stops. A
+blocked program does not renew its input, so the robot also stops.
 """
 
 import asyncio
@@ -66,7 +66,7 @@ def open(
     allow_unencrypted: bool = False,
     timeout: float = CALL_S,
 ) -> "AbstractContextManager[SyncRobot]":
-    """Open a robot of a server while the context is active; see `urc.client.open`.
+    """Open a server's robot while the context is active; see `urc.client.open`.
 
     `timeout` is the time limit of every call, in seconds.
     """
@@ -99,7 +99,7 @@ def _opened(
 
 
 class SyncRobot:
-    """A robot without ``async``; the members of `urc.client.robot.RobotInterface`."""
+    """A robot without ``async``, with the members of `urc.client.robot.RobotInterface`."""
 
     def __init__(self, robot: RobotInterface, thread: LoopThread) -> None:
         """Store the robot and its thread; programs call `open` or `connect` instead."""
@@ -164,7 +164,7 @@ class SyncRobot:
 
         Args:
             name: name of the signal.
-            is_met: the condition, which runs in the thread of the robot; None for any reading.
+            is_met: the condition, which runs in the robot's thread; None for any reading.
             timeout: longest wait, in seconds; None for the time limit of every call.
 
         Raises:
@@ -199,7 +199,7 @@ class SyncRobot:
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.
-            TimeoutError: the time limit of every call is over; the outcome is unknown.
+            TimeoutError: the call exceeded the time limit; the outcome is unknown.
         """
         return self._thread.call(self._robot.command(name, **arguments))
 
@@ -238,7 +238,7 @@ class SyncRobot:
 
     @property
     def alarms(self) -> "SyncAlarms":
-        """The robot's alarms; raise `UrcError` for a robot that no server lists."""
+        """The robot's alarms; raise `UrcError` for a robot without a server."""
         found = getattr(self._robot, "alarms", None)
         if not isinstance(found, RemoteAlarms):
             raise UrcError("alarms are listed by a server: use urc.client.sync.open")
@@ -271,7 +271,7 @@ async def _closed(found: AsyncGenerator[Any, None]) -> None:
 
 
 class SyncAlarms:
-    """The alarms of a robot of a server; see `urc.client.remote_alarms.RemoteAlarms`."""
+    """The alarms of a server's robot; see `urc.client.remote_alarms.RemoteAlarms`."""
 
     def __init__(self, alarms: RemoteAlarms, thread: LoopThread) -> None:
         self._alarms = alarms
@@ -284,11 +284,11 @@ class SyncAlarms:
 
     @property
     def rows(self) -> dict[str, AlarmRow]:
-        """All alarms that are not normal, by signal."""
+        """All non-normal alarms, by signal."""
         return self._thread.call(self._read(lambda: dict(self._alarms.rows)))
 
     def acknowledge(self, *signals: str) -> tuple[str, ...]:
-        """Acknowledge alarms as this program knows them; without names, all that wait for it.
+        """Acknowledge alarms that this program has received; without names, all pending alarms.
 
         Raises:
             UrcError: the server refused, or could not be reached.
@@ -304,7 +304,7 @@ class SyncAlarms:
         return self._thread.call(self._alarms.shelve(*signals, for_s=for_s))
 
     def unshelve(self, *signals: str) -> tuple[str, ...]:
-        """End the shelves of alarms; return the signals that were shelved.
+        """Unshelve alarms; return the signals that were shelved.
 
         Raises:
             UrcError: the server refused, or could not be reached.
@@ -317,7 +317,7 @@ class SyncAlarms:
 
 
 class SyncStick:
-    """The input of one held command, as `urc.client.stick.Stick`, for any thread."""
+    """The input of one held command, like `urc.client.stick.Stick`, for any thread."""
 
     def __init__(self, stick: Stick, loop: asyncio.AbstractEventLoop) -> None:
         """Store the stick; programs call `SyncRobot.drive` instead."""
@@ -344,7 +344,7 @@ class SyncStick:
         self._loop.call_soon_threadsafe(self._stick.wake)
 
     def hold(self, seconds: float, /, **arguments: Reading) -> None:
-        """Keep the same arguments for a time, while this call lasts.
+        """Keep the same arguments for a time; the call returns afterwards.
 
         Raises:
             MotionEnded: motion has ended before the time was over.

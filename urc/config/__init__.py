@@ -1,1 +1,1 @@
-"""Conversion of YAML documents into a checked, linked and compiled model."""
+"""Conversion of YAML documents to a checked, linked and compiled model."""

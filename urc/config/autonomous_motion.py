@@ -1,4 +1,4 @@
-"""Parsing and checks of commands with autonomous motion."""
+"""Parser and checks for commands with autonomous motion."""
 
 from collections.abc import Mapping
 
@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return all commands; set `moves` of each sequence that runs a moving or held command."""
+    """Return all commands; set `moves` for sequences that run a moving or held command."""
     found = dict(commands)
 
     def does(step: object) -> bool:

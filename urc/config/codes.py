@@ -1,6 +1,6 @@
-"""Reader of ``codes.md``, the explanations of problem codes for `urc explain` and SARIF.
+"""Reads ``codes.md``, which explains the problem codes for `urc explain` and SARIF.
 
-Every page has the same four parts. An example is a fenced block of YAML, or text.
+Every page has the same four parts. An example is text or a fenced block of YAML.
 """
 
 from pathlib import Path
@@ -19,11 +19,11 @@ class CodePage(NamedTuple):
     what: str
     """The problem, in one sentence."""
     why: str
-    """Effect or cause of the problem."""
+    """The problem's effect or cause."""
     example: str
-    """All or part of a document with the problem; a description if YAML cannot show the problem."""
+    """All or part of a document with the problem, or a description in words."""
     instead: str
-    """The example without the problem, or instructions in words."""
+    """Corrected example, or instructions in words."""
 
     def __str__(self) -> str:
         parts = zip(_PARTS, (self.what, self.why, self.example, self.instead), strict=True)
@@ -52,7 +52,7 @@ def _page(text: str) -> CodePage:
 
 
 def _unfenced(text: str) -> str:
-    """Return the code in a fenced block, or other text joined into one line."""
+    """Return the code in a fenced block; join other text into one line."""
     _, fence, code = text.partition("```yaml\n")
     return code.partition("```")[0] if fence else " ".join(text.split())
 

@@ -11,7 +11,7 @@ __all__ = ["link_role", "with_roles_of_steps"]
 
 
 def with_roles_of_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return all commands; raise the role of each sequence to the highest role of its commands."""
+    """Return all commands, with each sequence's role raised to the highest role of its commands."""
     found = dict(commands)
     while True:
         raised = {

@@ -1,4 +1,4 @@
-"""The default interface: a widget for each signal and command, arranged in a grid.
+"""The default interface: a grid with a widget for each signal and command.
 
 The result depends only on the driver and the available widgets. If a widget is missing or does not
 fit its signal, a simpler widget replaces it. Commands with several arguments get no widget, because
@@ -44,7 +44,7 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widgets for several signals: name, endings of signal names by input, and required inputs."""
+"""Widgets for several signals: name, suffixes of signal names by input, and required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
 """Maximum number of columns in a default grid, by screen."""
@@ -58,13 +58,13 @@ _BIG: Final = frozenset(
 )
 """Widgets that span two rows and two columns."""
 _GROUNDS: Final = ("camera", "pano360", "map")
-"""Widgets that fill the page behind the others, the first one before the others."""
+"""Widgets that can fill the background, in order of preference."""
 _ACROSS: Final = (0, 4, 1, 3, 2)
 """Columns in front of a background, in the order in which displays fill them."""
 _MOST_OVER: Final = 14
 """Maximum number of widgets in front of a background."""
 _STEERED: Final = 2
-"""Position of steering controls in the order of widgets; see `_rank`."""
+"""Rank of steering controls in the order of widgets; see `_rank`."""
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
@@ -132,7 +132,7 @@ def _stems(
 
 
 def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the most specific widget that fits a signal."""
+    """Return the most specific suitable widget for a signal."""
     for name in _candidates(signal):
         use = _one_input(registry.get(name), signal)
         if use is not None:
@@ -155,7 +155,7 @@ def _candidates(signal: Signal) -> tuple[str, ...]:
 
 
 def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
-    """Return the widget, bound to the signal by one input; None if one input does not suffice."""
+    """Return the widget with one input bound to the signal; None if more inputs are required."""
     if widget is None:
         return None
     fitting = [
@@ -186,7 +186,7 @@ def _table(signals: list[Signal], registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _given(command: Command, driver: Driver, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the control of a command; None if no widget gives all required arguments."""
+    """Return the control of a command; None if no widget provides all required arguments."""
     if command.hold is not None:
         held = _held(command, registry)
         return held if held is not None and _is_complete(held, command) else None
@@ -232,7 +232,7 @@ def _held(command: Command, registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _is_complete(use: WidgetUse, command: Command) -> bool:
-    """Return whether the control gives every required argument of its command."""
+    """Return whether the control provides every required argument of its command."""
     given = {name for one in use.given.values() for name in one.names}
     needed = {
         name for name, one in command.arguments.items() if one.is_required and one.default is None
@@ -245,7 +245,7 @@ def _says(name: str, words: tuple[str, ...]) -> bool:
 
 
 def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -> WidgetUse | None:
-    """Return the widget, bound to the command by its first output with the values in `names`."""
+    """Bind the widget to the command by its first output that has the values in `names`."""
     if widget is None or any(port.is_required for port in widget.inputs.values()):
         return None
     is_held = command.hold is not None
@@ -260,7 +260,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 def _with_state(
     use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
-    """Return the widget, also bound to a signal with the name of the argument or command."""
+    """Also bind the widget to a signal with the same name as the argument or command, if any."""
     widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
@@ -287,7 +287,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
 
     Displays are at the top, with the largest displays first. Steering controls are at the bottom
     right, near the thumb. Other controls fill the free places. On a phone in landscape, steering
-    controls are in the first rows, at the right and left edge, and other widgets follow below.
+    controls are in the first rows at the right and left edges, and other widgets are below.
     """
     ground = _ground(slots)
     if ground:
@@ -298,7 +298,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
 
 
 def _ground(slots: Mapping[str, WidgetUse]) -> str:
-    """Return the slot of the background; "" if no widget fits, or too many would be in front."""
+    """Return the background slot; "" without a suitable widget or with too many other widgets."""
     if not 1 < len(slots) <= _MOST_OVER + 1:
         return ""
     found = {use.widget: name for name, use in reversed(list(slots.items()))}
@@ -308,7 +308,7 @@ def _ground(slots: Mapping[str, WidgetUse]) -> str:
 def _over_ground(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
     """Return the layout in front of a background: displays at the top, controls at the bottom.
 
-    Sticks are in the lower corners, the first one at the right. A phone in portrait has two
+    Sticks are in the lower corners, with the first stick at the right. A phone in portrait has two
     columns, with the displays first.
     """
     ranks = {name: _rank(use) for name, use in slots.items()}
@@ -341,7 +341,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
     taken: set[tuple[int, int]] = set()
     placed: dict[str, Slot] = {}
     ranks = {name: _rank(use) for name, use in slots.items()}
-    # In a narrow grid, controls that steer come last, at the bottom.
+    # In a narrow grid, steering controls are last, at the bottom.
     steered = -1 if is_low else _STEERED if columns > 2 else 4
     order = {name: steered if rank == _STEERED else rank for name, rank in ranks.items()}
     for number, name in enumerate(sorted(slots, key=lambda name: order[name])):
@@ -357,7 +357,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
 
 
 def _rank(use: WidgetUse) -> int:
-    """Return the rank of a widget: large display, small display, steering control, or other."""
+    """Return a widget's rank: 0 large display, 1 small display, 2 steering control, 3 other."""
     if use.widget in _BIG:
         return _STEERED if use.outputs and not use.inputs else 0
     return 3 if use.outputs else 1
@@ -366,7 +366,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return the row and the column of the first free square at or below the row `first`."""
+    """Return the row and column of the first free square in or below the row `first`."""
     places = range(columns - size + 1)
     row = first
     while True:

@@ -1,4 +1,4 @@
-"""Tables of the parser modules of frame forms, by key in a document."""
+"""Tables of the modules that parse frame forms, by key in a document."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -1,4 +1,4 @@
-"""The first passes over a document and its references: compose, expand and shape.
+"""The first passes over a document and the documents it refers to: compose, expand and shape.
 
 The compose pass merges a document with the documents under `extends` and `include`. The expand pass
 replaces `params` and `each`. The shape pass checks the result against the schema. Each pass is a
@@ -27,7 +27,7 @@ class LoadedSources(NamedTuple):
     """The parts and problems of a loaded profile."""
 
     sources: Sources | None
-    """The parts of the profile; None after an error, and for a partial document."""
+    """The parts of the profile; None on error and for a partial document."""
     problems: list[Problem]
     kind: str
     files: tuple[str, ...]
@@ -35,7 +35,7 @@ class LoadedSources(NamedTuple):
 
 
 def gather(path: str) -> LoadedSources:
-    """Return the parts of a document and of its references, or the problems."""
+    """Return the parts and problems of a document and of the documents it refers to."""
     library = Library()
     try:
         document = library.read(path)
@@ -65,7 +65,7 @@ def _is_part(document: Document) -> bool:
 def _prepared(
     document: Document, library: Library, given: Node | None = None, use: Node | None = None
 ) -> Document | None:
-    """Return a document after the compose, expand and shape passes; None after an error.
+    """Return the document after the compose, expand and shape passes; None on error.
 
     `given` is the robot's mapping with `params` and `overrides`. `use` is the robot's reference to
     the driver.

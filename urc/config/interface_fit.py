@@ -1,4 +1,4 @@
-"""Check whether an interface from a user fits a robot."""
+"""Checks whether a user's interface fits a robot."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,14 +19,14 @@ __all__ = ["InterfaceFit", "fit_interface"]
 
 
 class InterfaceFit(NamedTuple):
-    """The widgets of a suitable interface, or the reason why the interface does not fit."""
+    """The widgets of a suitable interface, or the reason for the rejection."""
 
     interface: Interface | None
-    """The linked interface; None when the interface does not fit."""
+    """The linked interface; None if the interface does not fit."""
     widgets: Mapping[str, Widget] = NOTHING
     """All widgets of the interface, by name."""
     fault: str = ""
-    """Reason why the interface does not fit, in one line; "" if it fits."""
+    """Reason for the rejection, in one line; "" if the interface fits."""
 
 
 class _CombinedWidgets(WidgetFolder):
@@ -43,7 +43,7 @@ class _CombinedWidgets(WidgetFolder):
         return sorted({*self._mine, *self._behind.names()})
 
     def get(self, name: str) -> Widget | None:
-        """Return the widget of this name, or None."""
+        """Return the widget with this name; None for an unknown name."""
         return self._mine.get(name) or self._behind.get(name)
 
     def has(self, name: str) -> bool:

@@ -1,7 +1,7 @@
-"""The passes that convert YAML documents into the model, and the collection of their problems.
+"""Runs the passes that convert YAML documents to the model, and collects their problems.
 
 The order of the passes is: compose, expand, shape, parse, link, rules. Every pass reports all its
-problems. A pass runs only if the earlier passes found no error; warnings stop no pass.
+problems. A pass runs only if the earlier passes found no errors. Warnings do not stop a pass.
 """
 
 from collections.abc import Iterable
@@ -40,7 +40,7 @@ class CheckResult(NamedTuple):
     """The profile of a robot or driver without errors; a driver gets the default interface."""
     problems: tuple[Problem, ...]
     kind: str
-    """Document kind: ``robot``, ``driver``, ``interface``, ``widget``, or "" after early errors."""
+    """Document kind: ``robot``, ``driver``, ``interface`` or ``widget``; "" after early errors."""
     files: tuple[str, ...] = ()
     """Paths of all requested files, including missing files; the checked document is first."""
     pages: tuple[str, ...] = ()
@@ -48,7 +48,7 @@ class CheckResult(NamedTuple):
     widget: Widget | None = None
     """The widget of a valid manifest; None for other documents and invalid manifests."""
     is_cut_short: bool = False
-    """Whether an error prevented later passes, which may find more problems."""
+    """Whether an error prevented later passes, which might find more problems."""
 
 
 def load_profile(
@@ -57,7 +57,7 @@ def load_profile(
     """Return the profile of a robot's or driver's document.
 
     Raises:
-        ProblemsError: the document has errors, which the exception contains.
+        ProblemsError: the document has errors; the exception contains them.
     """
     checked = check(path, catalog, registry)
     if checked.profile is not None:
@@ -132,7 +132,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without the duplicates from the copies of `each`."""
+    """Return the problems without the duplicates that copies of an `each` item cause."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem

@@ -9,12 +9,12 @@ __all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "MessageTransportRules"]
 
 
 class MessageTransportRules(NamedTuple):
-    """The allowed forms of messages on one transport type."""
+    """The allowed message forms of one transport type."""
 
     verbs: tuple[str, ...]
     """Allowed keys under ``send``, such as ``publish``."""
     listen: tuple[str, ...]
-    """Additional keys under ``subscribe``, next to ``topic``."""
+    """Allowed keys under ``subscribe``, in addition to ``topic``."""
 
 
 MESSAGING: Final = {

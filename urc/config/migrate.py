@@ -1,4 +1,4 @@
-"""Migration of documents: replacement of old keys and values, without any other change."""
+"""Migration of documents: only old keys and values are replaced."""
 
 import re
 from collections.abc import Iterator
@@ -37,11 +37,11 @@ class Migrated(NamedTuple):
 
     content: bytes
     changes: tuple[Change, ...]
-    """Changes in the order of their positions; empty for a document without old names."""
+    """Changes in document order; empty for a document without old names."""
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with new names; the file itself is not changed.
+    """Return the content of a file with new names; the file stays unchanged.
 
     Raises:
         ProblemsError: the file cannot be read, is not a document, or has a key under both names.
@@ -67,7 +67,7 @@ def migrate(path: str) -> Migrated:
 
 
 def _replaced(written: str, new: str) -> str:
-    """Return a scalar's source with new text, and keep its anchor, tag and quotes."""
+    """Return a scalar's source with new text and the original anchor, tag and quotes."""
     return _SCALAR.sub(
         lambda found: f"{found['head']}{found['quote']}{new}{found['quote']}", written, count=1
     )

@@ -1,4 +1,4 @@
-"""A typed view of a valid document for the parsers, and a collector of problems.
+"""A typed view of a valid document for the parsers, and a class that collects problems.
 
 The parsers read documents only through `Node`. Every value therefore has a position for problems,
 and a test can record the keys in use. All functions of this module assume a document that fits its
@@ -29,7 +29,7 @@ def duration_s(text: str) -> float:
     found = _DURATION.fullmatch(text)
     if found is None:
         raise ValueError(f"{text!r} is not a duration")
-    # A division is exact: 250 / 1000 is 0.25, and 250 * 0.001 is not.
+    # Division rounds correctly: 9 / 1000 is 0.009, but 9 * 0.001 is 0.009000000000000001.
     number, unit = float(found[1]), found[2]
     return number / 1000 if unit == "ms" else number * _UNITS_S[unit]
 
@@ -47,17 +47,17 @@ class Node(NamedTuple):
         return str(self.path[-1]) if self.path else ""
 
     def get(self, key: str) -> "Node | None":
-        """Return the child under `key`, or None when the key is missing."""
+        """Return the child under `key`; None if the key is missing."""
         if key not in self.data:
             return None
         return Node(self.document, (*self.path, key), self.data[key])
 
     def must(self, key: str) -> "Node":
-        """Return the child under `key`, a key that the schema requires."""
+        """Return the child under `key`, which the schema requires."""
         return Node(self.document, (*self.path, key), self.data[key])
 
     def named(self, key: str) -> dict[str, "Node"]:
-        """Return the entries of the mapping under `key`; empty when the key is missing."""
+        """Return the entries of the mapping under `key`; empty if the key is missing."""
         inner = self.get(key)
         return inner.entries() if inner else {}
 
@@ -68,7 +68,7 @@ class Node(NamedTuple):
         }
 
     def listed(self, key: str) -> list["Node"]:
-        """Return the items of the list under `key`; empty when the key is missing."""
+        """Return the items of the list under `key`; empty if the key is missing."""
         inner = self.get(key)
         return inner.items() if inner else []
 
@@ -89,7 +89,7 @@ class Node(NamedTuple):
         return default if inner is None else bool(inner.data)
 
     def number(self, key: str) -> float | None:
-        """Return the number under `key`, or None when the key is missing."""
+        """Return the number under `key`; None if the key is missing."""
         inner = self.get(key)
         return None if inner is None else inner.data
 
@@ -99,14 +99,14 @@ class Node(NamedTuple):
         return None if inner is None else int(inner.data)
 
     def scalar(self, key: str) -> Value:
-        """Return the scalar under `key`, or None when the key is missing."""
+        """Return the scalar under `key`; None if the key is missing."""
         inner = self.get(key)
         value: Value = None if inner is None else inner.data
         return value
 
 
 class Problems:
-    """A collector of the problems of one pass."""
+    """Collects the problems of one pass."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
@@ -115,7 +115,7 @@ class Problems:
         return iter(self.problems)
 
     def error(self, part: Node, code: str, message: str, **place: Any) -> None:
-        """Add an error; `place` takes ``at``, an inner key, and arguments of `Document.problem`."""
+        """Add an error; `place` may have ``at`` (an inner key) and `Document.problem` arguments."""
         self._add(part, code, message, "error", **place)
 
     def warn(self, part: Node, code: str, message: str, **place: Any) -> None:

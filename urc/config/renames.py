@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 Content = Literal["driver", "interface", "widget", "demo"]
-"""Kind of a document or of its parts; a robot contains a driver and interfaces."""
+"""Kind of a document or part of a document; a robot contains a driver and interfaces."""
 
 _TRANSPORT: Final = "transports/[^/]+"
 _ARRAY: Final = "signals/[^/]+|commands/[^/]+/args/[^/]+"
@@ -41,9 +41,9 @@ class KeyRename(NamedTuple):
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` in the mappings that this rename applies to; empty for all mappings.
+    """Values of `type` in the affected mappings; an empty tuple means all mappings.
 
-    Mappings without `type` always match.
+    Mappings without `type` are always affected.
     """
 
     def applies(self, mapping: Mapping[str, Any]) -> bool:
@@ -51,7 +51,7 @@ class KeyRename(NamedTuple):
         if self.old not in mapping:
             return False
         kind = mapping.get("type")
-        if self.old == "via":  # `via` of a ROS transport is a new key with a meaning of its own
+        if self.old == "via":  # `via` of a ROS transport is a new key with another meaning
             bridges = ("rosbridge", "foxglove", "auto")
             return kind != "ros" and (kind is not None or mapping["via"] not in bridges)
         return not self.types or kind is None or kind in self.types
@@ -123,7 +123,7 @@ CODES: Final = {
 
 
 def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]) -> str:
-    """Return a hint for a key with an old name in the mapping at `path`, or ""."""
+    """Return a hint for an old key in the mapping at `path`; "" for other keys."""
     where = "/".join(map(str, path))
     for one in KEYS:
         if one.old != key or one.new not in known:
@@ -134,7 +134,7 @@ def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]
 
 
 def renamed_value_hint(key: str, value: str) -> str:
-    """Return a hint for a value with an old name, or ""."""
+    """Return a hint for an old value; "" for other values."""
     for one in VALUES:
         if (one.key, one.old) == (key, value):
             return f"the new name is '{one.new}'; 'urc migrate' replaces old names"

@@ -1,6 +1,6 @@
 """Problem reports in SARIF 2.1.0, and as annotations of GitHub workflow runs.
 
-`urc.problems` has the report formats for text and JSON.
+`urc.problems` contains the text and JSON formats.
 """
 
 import os
@@ -19,7 +19,7 @@ _SCHEMA: Final = (
 _DATA: Final = {"%": "%25", "\r": "%0D", "\n": "%0A"}
 """Escape sequences in the message of a workflow command."""
 _PROPERTY: Final = str.maketrans(_DATA | {":": "%3A", ",": "%2C"})
-"""Escape sequences in the properties of a workflow command, including its separators."""
+"""Escape sequences in a workflow command's properties, including their separators."""
 _MESSAGE: Final = str.maketrans(_DATA)
 
 
@@ -106,6 +106,6 @@ def _slashed(file: str) -> str:
 
 
 def _uri(file: str) -> str:
-    """Return a file as a URI reference: relative to the folder of the run, or absolute."""
+    """Return a file as a URI reference, either relative to the folder of the run or absolute."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(_slashed(file))

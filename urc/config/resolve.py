@@ -1,4 +1,4 @@
-"""Conversion of a profile to one document, with the origin of every key.
+"""Converts a profile to one document with the origin of every key.
 
 The result is a valid document with the same meaning.
 """
@@ -27,7 +27,7 @@ _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interf
 _BESIDE: Final = ("settings", "widgets", "tests", "simulator")
 _PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)
 _WORDS: Final = frozenset(("null", "true", "false", "yes", "no", "on", "off", "y", "n"))
-"""Words that some YAML readers do not read as strings."""
+"""Words that some YAML readers do not interpret as strings."""
 _UNSAFE: Final = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
 _INLINE_MOST: Final = 60
@@ -47,7 +47,7 @@ def resolve(path: str, registry: WidgetFolder, profile: Profile | None = None) -
     Args:
         path: path of a robot, driver, interface or widget.
         registry: the available widgets.
-        profile: the loaded profile; needed for the default interface of a document without one.
+        profile: the loaded profile, which is needed only for the default interface.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:
@@ -92,7 +92,7 @@ def _sections(sources: Sources, registry: WidgetFolder) -> Iterator[tuple[str, o
 
 
 def _layout(part: Node) -> Mapping[str, Node]:
-    """Return the interface keys that a robot's document may have."""
+    """Return the interface's keys that are allowed in a robot's document."""
     keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
@@ -116,7 +116,7 @@ def _tree(part: Node) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
-    """Return the keys of a slot that stay valid for another widget: bindings without options."""
+    """Return the slot's keys that stay valid for another widget, without the options."""
     widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
@@ -130,7 +130,7 @@ def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
 
 
 def written(key: str, value: object) -> str:
-    """Return ``key: value`` in the notation of a document, without comments on the origin."""
+    """Return ``key: value`` in document notation, without origin comments."""
     return "\n".join(_entry(key, value, 0)) + "\n"
 
 
@@ -182,7 +182,7 @@ def _data(node: object) -> object:
 
 
 def _place(node: object) -> str:
-    """Return a comment with the origin of a value's key."""
+    """Return a comment with the origin of a key."""
     if not isinstance(node, Node):
         return ""
     mark = node.document.at(node.path)
@@ -201,17 +201,17 @@ def _scalar(value: object) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text in quotes, or without quotes if every YAML reader treats it as a string."""
+    """Quote a text, unless every YAML reader treats the unquoted text as a string."""
     if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
         return text
     if "\\" in text and text.isascii() and text.isprintable() and "'" not in text:
-        return f"'{text}'"  # a pattern, most likely
+        return f"'{text}'"  # probably a pattern
     quoted = json.dumps(text, ensure_ascii=False)
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)
 
 
 def _default_look(sources: Sources, profile: Profile | None) -> dict[str, object]:
-    """Return default ``widgets`` and ``interfaces`` for documents without interfaces."""
+    """Return the default ``widgets`` and ``interfaces`` for documents without interfaces."""
     if profile is None or sources.interfaces:
         return {}
     made: dict[str, object] = {}

@@ -1,11 +1,11 @@
-"""The schemas that ship with URC, and a fast check for valid documents.
+"""The schemas that ship with URC, and a fast check for documents.
 
-The library `jsonschema` is too slow for both speed goals of `urc validate` (decision 4).
+The library `jsonschema` is too slow for the two speed goals of `urc validate` (decision 4).
 
-This module compiles the keywords of the schemas to closures. A positive result of the fast check is
-always correct. In all other cases, including unknown keywords, URC uses `jsonschema`. A contract
-test compares the fast check with `jsonschema`. Each part of a schema is compiled at its first use,
-so small documents compile few parts.
+This module compiles the keywords of the schemas to closures. If the fast check accepts a document,
+the document is valid. In all other cases, including unknown keywords, URC uses `jsonschema`. A
+contract test compares the fast check with `jsonschema`. Each part of a schema is compiled on first
+use, so small documents need few compiled parts.
 """
 
 import json
@@ -44,10 +44,10 @@ def shipped_check() -> "QuickCheck":
 
 
 def fits(reference: str, value: object) -> bool:
-    """Return whether a value certainly matches the schema at ``file#/pointer``.
+    """Return True only if a value certainly matches the schema at ``file#/pointer``.
 
-    The passes before the shape pass call this function before they use a key. Each pass ignores a
-    value that does not match, and the shape pass reports the error.
+    The passes before the shape pass call this function before they use a key. They ignore values
+    that do not match, and the shape pass reports the error.
     """
     return shipped_check().is_valid_at(reference, value)
 
@@ -62,40 +62,40 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class _UncertainError(Exception):
-    """An error for a schema keyword that this module does not support."""
+    """This module does not support a keyword of the schema."""
 
 
 class QuickCheck:
     """Fast checks for a set of schemas that refer to each other by file name."""
 
     def __init__(self, read: Callable[[str], Mapping[str, Any]]) -> None:
-        """Prepare the checks; `read` returns the schema with a given file name."""
+        """Create the checks; `read` returns the schema with a given file name."""
         self._read = read
         self._references: dict[tuple[str, str], _Check] = {}
 
     def is_valid(self, file: str, data: object) -> bool:
-        """Return whether `data` certainly matches the schema in `file`."""
+        """Return True only if `data` certainly matches the schema in `file`."""
         try:
             return self.reference(file, "#")(data)
         except _UncertainError:
             return False
 
     def is_valid_at(self, reference: str, data: object) -> bool:
-        """Return whether `data` certainly matches the schema at ``file#/pointer``."""
+        """Return True only if `data` certainly matches the schema at ``file#/pointer``."""
         try:
             return self.reference("", reference)(data)
         except _UncertainError:
             return False
 
     def is_valid_inline(self, schema: Mapping[str, Any], data: object) -> bool:
-        """Return whether `data` certainly matches `schema`, which must not refer to a file."""
+        """Return True only if `data` certainly matches `schema`, which must not refer to a file."""
         try:
             return _compile(self, schema, "")(data)
         except _UncertainError:
             return False
 
     def reference(self, file: str, reference: str) -> _Check:
-        """Return the check of ``other.json#/pointer``, relative to `file`."""
+        """Return the check for ``other.json#/pointer``; the reference is relative to `file`."""
         other, _, pointer = reference.partition("#")
         place = (other or file, pointer)
         check = self._references.get(place)
@@ -128,7 +128,7 @@ def _compile(quick: QuickCheck, schema: Any, file: str) -> _Check:
 
 
 def _lazy(quick: QuickCheck, schema: Any, file: str) -> _Check:
-    """Return a check that is compiled at its first use."""
+    """Return a check that is compiled on first use."""
     compiled: list[_Check] = []
 
     def check(data: Any) -> bool:
@@ -162,7 +162,7 @@ def _type(quick: QuickCheck, value: Any, schema: Any, file: str) -> _Check:
 
 
 def _same(left: Any, right: Any) -> bool:
-    """Return whether two values are equal in JSON: 1 equals 1.0, but not true."""
+    """Return whether two values are equal in JSON, where 1 equals 1.0 but not true."""
     if isinstance(left, bool) or isinstance(right, bool):
         return left is right
     if isinstance(left, (dict, list)) or isinstance(right, (dict, list)):

@@ -27,16 +27,16 @@ class Sources:
         """Mapping with transports, signals, messages, commands and polls."""
         self.settings: dict[str, Node] = {}
         self.slots: dict[str, list[Node]] = {}
-        """Declarations of the widget in each slot; later declarations override earlier ones."""
+        """Widget declarations by slot; later declarations override earlier declarations."""
         self.interfaces: dict[str, Node] = {}
         self.tests: list[Node] = []
         self.simulator: dict[str, Node] = {}
         """Initial values and world of the emulated robot, by key."""
         self.rules: dict[str, Node] = {}
-        """Rules of the emulated robot by transport."""
+        """Rules of the emulated robot, by transport."""
 
     def add(self, part: Node) -> None:
-        """Add the settings, widgets, tests and simulator of `part`; they override earlier parts."""
+        """Add the settings, widgets, tests and simulator of `part`, overriding earlier parts."""
         self.settings |= part.named("settings")
         for slot, use in part.named("widgets").items():
             self.slots.setdefault(slot, []).append(use)
@@ -67,5 +67,5 @@ def _over(below: Node | None, part: Node) -> Node:
 
 def _tree(part: Node) -> Tree:
     mark = part.document.at(part.path)
-    assert mark is not None, part.path  # noqa: S101  # what stands there has a mark
+    assert mark is not None, part.path  # noqa: S101  # every existing value has a mark
     return Tree(part.data, mark, part.document.source_of(part.path))

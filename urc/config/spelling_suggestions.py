@@ -8,11 +8,11 @@ __all__ = ["closest", "did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Number of words by which a list may exceed its maximum before it is shortened."""
+"""Tolerance, in words: lists are shortened only above their maximum plus this number."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
-    """Return a hint with the most similar known word, or with all known words.
+    """Return a hint with the most similar known word, or with all known words if none is similar.
 
     Args:
         word: the unknown word.
@@ -33,13 +33,13 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
 
 def closest(word: str, names: Iterable[str]) -> list[str]:
     """Return the most similar name, or an empty list if none is similar."""
-    from difflib import get_close_matches  # 6 ms that only a broken document pays
+    from difflib import get_close_matches  # takes 6 ms, so only broken documents import it
 
     return get_close_matches(word[:80].lower(), sorted(names), 1, 0.6)
 
 
 def listed(names: Iterable[str], most: int | None = _MOST) -> str:
-    """Return names separated by commas; shorten a much longer list to `most` names."""
+    """Return the names separated by commas; shorten much longer lists to `most` names."""
     every = list(names)
     if most is None or len(every) <= most + _SPARE:
         return ", ".join(every)

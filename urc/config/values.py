@@ -1,4 +1,4 @@
-"""Checks of typed values in documents, such as defaults, choices and ranges."""
+"""Checks typed values in documents, such as defaults, choices and ranges."""
 
 from typing import Any, Final
 
@@ -46,7 +46,7 @@ def fraction_of(text: str) -> float:
 
 
 def given(data: Any) -> Reading:
-    """Return a document's data as a value: lists become tuples."""
+    """Return a document's data as a value, with lists converted to tuples."""
     return tuple(data) if isinstance(data, list) else data
 
 
@@ -96,7 +96,7 @@ def element_of(part: Node, kind: str, problems: Problems) -> str:
 
 
 def fit_hint(value: Value, kind: str) -> str:
-    """Return a hint for a value that needs quotes, or no quotes, to be of type `kind`."""
+    """Return a hint for converting a value to type `kind`, such as a change of quotes."""
     if kind in ("integer", "number") and isinstance(value, str):
         try:
             float(value)

@@ -1,1 +1,1 @@
-"""The filters of Jinja expressions, grouped by subject."""
+"""Filters for Jinja expressions, grouped by subject."""

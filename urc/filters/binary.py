@@ -1,8 +1,8 @@
-"""Filters of expressions that create bytes, hash bytes, or convert bytes to text.
+"""Expression filters that create bytes, hash bytes, or convert bytes to text.
 
 Private to `urc.filters.table`. Text is encoded as UTF-8 before it is hashed. Each filter accepts
-any value from a document, and returns a result or raises TypeError or ValueError with a message for
-people.
+any value from a document. It returns a result, or raises TypeError or ValueError with a
+human-readable message.
 """
 
 import binascii
@@ -91,7 +91,7 @@ def _b64decode(value: object) -> bytes:
 
 def _hash(name: str) -> Callable[[object], str]:
     def digest(value: object) -> str:
-        import hashlib  # 3 ms that only a document with a hash pays
+        import hashlib  # takes 3 ms, and only documents with a hash need it
 
         return hashlib.new(name, _data(value), usedforsecurity=False).hexdigest()
 
@@ -123,4 +123,4 @@ TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),
 }
-"""Function and number of arguments of each filter that returns text."""
+"""Function and argument count of each filter that returns text."""

@@ -1,8 +1,8 @@
-"""Filters and operators of expressions for lists and texts.
+"""Expression filters and operators for lists and text.
 
-Private to `urc.filters.table`. Each function accepts any value from a document, and returns a
-result or raises TypeError or ValueError with a message for people. The size of the input limits the
-size of the result.
+Private to `urc.filters.table`. Each function accepts any value from a document. It returns a
+result, or raises TypeError or ValueError with a human-readable message. The size of the input
+limits the size of the result.
 """
 
 import re
@@ -63,7 +63,7 @@ def sliced(value: Any, start: Any, stop: Any) -> Any:
 @lru_cache(maxsize=512)
 def compiled(source: str, test: str) -> "Pattern":
     """Return the pattern, anchored at the start for ``match``, or raise `PatternError`."""
-    from urc._patterns import compile_pattern  # 2 ms that only a driver with such a test pays
+    from urc._patterns import compile_pattern  # takes 2 ms; only needed for such tests
 
     pattern = compile_pattern(source)  # first, so that errors refer to the written text
     return compile_pattern(f"^(?:{source})") if test == "match" else pattern
@@ -113,7 +113,7 @@ def _sum(value: Any) -> Any:
 
 
 def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
-    """Return degrees from a number in the format DDMM.mmm; None for an empty value."""
+    """Convert a number in the format DDMM.mmm to degrees; return None for an empty value."""
     if value is None or value == "":
         return None
     sign = _HEMISPHERES.get(hemisphere) if isinstance(hemisphere, str) else None
@@ -136,5 +136,5 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
 value."""

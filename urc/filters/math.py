@@ -19,7 +19,7 @@ def _number(value: object) -> float:
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
-    """Return a filter that applies `function`; `where` is the valid range for error messages."""
+    """Return a filter that applies `function`; `where` names the valid range in error messages."""
 
     def filtered(*values: object) -> float:
         numbers = [_number(value) for value in values]
@@ -50,5 +50,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
 value."""

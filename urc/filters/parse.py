@@ -2,7 +2,7 @@
 
 Private to `urc.filters.table`. Each filter accepts any value from a document, runs in linear time,
 and returns at most `MAX_PARTS` values. A filter returns a result, or raises TypeError or ValueError
-with a message for people.
+with a human-readable message.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -72,7 +72,7 @@ def _is_place(row: Any, key: Any) -> bool:
 
 
 def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
-    """Return the part from `start` up to `stop` of each text or list in a list."""
+    """Return the slice from `start` up to `stop` of each text or list in a list."""
     begin = _whole(start, "the start", -MAX_PARTS, MAX_PARTS)
     end = None if stop is None else _whole(stop, "the end", -MAX_PARTS, MAX_PARTS)
     for row in _list(value):
@@ -83,7 +83,7 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Return numbers of `width` digits each from a text; the highest digit is first."""
+    """Split a text into numbers of `width` digits each, with the most significant digit first."""
     text, size = _text(value), _whole(width, "the width", 1, 16)
     radix = _whole(base, "the base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
@@ -103,17 +103,17 @@ def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
 
 
 def _signed(value: Any, bits: Any) -> int:
-    """Return the signed value of a two's complement number with `bits` bits."""
+    """Return the signed value of a `bits`-bit two's complement number."""
     size = _whole(bits, "the number of bits", 1, _MOST_BITS)
     number = _whole(value, "the number", 0, (1 << size) - 1)
     return number - (1 << size) if number >> size - 1 else number
 
 
 class _Short(ValueError):
-    """The error for fewer bytes than a number needs."""
+    """Error: there are fewer bytes than the number needs."""
 
 
-@cache  # the type names are few
+@cache  # there are few type names
 def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
     number = number_of(name)
     if number is None:
@@ -139,7 +139,7 @@ def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
 
 
 def _numbers(value: Any, name: Any) -> list[int | float]:
-    """Return all consecutive numbers of one type in the bytes."""
+    """Decode the bytes as consecutive numbers of one type."""
     read, data = _reader(_text(name)), _bytes(value)
     _check_count(len(data), "bytes")
     found, place = [], 0
@@ -174,5 +174,5 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
 value."""

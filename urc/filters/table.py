@@ -1,8 +1,8 @@
-"""Operators and filters of expressions: all functions that compiled templates call.
+"""Expression operators and filters: every function that compiled templates call.
 
-Private to `urc.expressions`. Every function accepts any value from a document, and returns a result
-or raises TypeError, ValueError or ArithmeticError with a message for people. No function produces a
-large result from small operands.
+Private to `urc.expressions`. Every function accepts any value from a document. It returns a result,
+or raises TypeError, ValueError or ArithmeticError with a human-readable message. No function
+produces a large result from small operands.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -210,7 +210,7 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter: its function, and its number of arguments after the filtered value."""
+    """A filter: its function, and its argument count, excluding the filtered value."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
@@ -265,7 +265,7 @@ def _refused_checksum(word: str) -> str:
 
 
 def _nearest(word: str, known: Iterable[str], otherwise: str) -> str:
-    from difflib import get_close_matches  # 6 ms that only a broken document pays
+    from difflib import get_close_matches  # takes 6 ms, and only broken documents need it
 
     near = get_close_matches(word[:80].lower(), sorted(known), 1, 0.5)
     return f"; did you mean {near[0]!r}?" if near else f", such as {otherwise!r}"
@@ -286,5 +286,5 @@ SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items
 
 
 def filter_names() -> str:
-    """Return the names of the filters for messages, except filters that return bytes."""
+    """Return the filter names for error messages, excluding filters that return bytes."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

@@ -1,4 +1,4 @@
-"""Protocols for the two sides of the channel between the guard client and the guard.
+"""Protocols for both sides of the channel between the guard client and the guard.
 
 `urc.guard.pipe_channel.PipeChannel` connects to a guard process, and
 `urc.guard.local_channel.LocalChannel` to a guard in this process. Only the client keeps the table
@@ -45,7 +45,7 @@ class ChannelListener(Protocol):
 
 
 class Channel(Protocol):
-    """The connection to a guard, and the guard's life cycle. Posting never waits."""
+    """The connection to a guard, with methods to start and end the guard. Posting never waits."""
 
     def start(self) -> None:
         """Start the guard; requires a running event loop."""

@@ -1,14 +1,14 @@
 """The client of the guard: the robot's guarded transports, and the table of held commands.
 
 Theory of operation. The guard's state is lost when the guard process dies. The client therefore
-keeps a table of all held commands that were armed or stopped. Each entry stores the terms of the
-command, and whether the command may be moving. A new guard is initialised from this table. The new
-guard receives the list of transports, a pending stop for each command that may be moving, and the
-terms of other armed commands. For each pending stop, the guard opens the connection and writes the
-stop first. Motion never resumes automatically.
+keeps a table of all held commands that were armed or stopped. Each entry stores the command's
+terms, and whether it may be moving. A new guard is initialised from this table. The new guard
+receives the list of transports, a pending stop for each command that may be moving, and the terms
+of other armed commands. For each pending stop, the guard opens the connection and writes the stop
+first. Motion never resumes automatically.
 
-The state *may be moving* of a control begins with its first tick or stop request. The state ends
-when the guard reports that the stop after the newest tick was written. A pending stop is therefore
+A control's state *may be moving* begins with its first tick or stop request. The state ends when
+the guard reports that it has written the stop after the newest tick. A pending stop is therefore
 not lost when the guard process dies.
 """
 
@@ -44,7 +44,7 @@ class HeldSpec(NamedTuple):
 
 @dataclass(slots=True)
 class _Control:
-    """A held command that was armed or stopped."""
+    """A held command after its first arming or stop."""
 
     line: str
     terms: HoldTerms
@@ -54,7 +54,7 @@ class _Control:
     at_s: float = 0.0
     """Time of the newest tick on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
-    """Frame of the newest tick, if the frame contains counters; otherwise None."""
+    """Frame of the newest tick, if it contains counters; otherwise None."""
     may_move: bool = False
     stopped_s: float = float("-inf")
     """Time of the last written stop, as reported by the guard, in seconds."""
@@ -75,7 +75,7 @@ class GuardClient:
         """Create the client; `start` starts the guard.
 
         Args:
-            lines: the guarded transports; a tunnel precedes the transports inside the tunnel.
+            lines: the guarded transports; a tunnel precedes the transports that it carries.
             held: the held commands by name.
             channel_to: function that creates the channel for this client.
         """
@@ -116,7 +116,7 @@ class GuardClient:
         """Accept ticks of `command` from now on.
 
         Raises:
-            UrcError: the terms contain no way to stop the motion.
+            UrcError: the terms contain no method to stop the motion.
         """
         try:
             HoldToRun(terms)
@@ -145,7 +145,7 @@ class GuardClient:
         self.channel.post(tick, slot=command)
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of `command` without arming the command."""
+        """Replace the stop frame of `command` without arming it."""
         control = self._controls.get(command)
         if control is not None:
             control.terms = terms = control.terms.stopped_by(stop)
@@ -158,7 +158,7 @@ class GuardClient:
         self.channel.post(messages.ReleaseControl(command))
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
-        """Stop commands immediately, even if idle. `stops` maps each command to its stop frame."""
+        """Stop commands immediately, even idle ones; `stops` maps each command to its frame."""
         told: list[tuple[str, str, HoldTerms]] = []
         for command, frame in stops.items():
             control = self._control(command)
@@ -268,7 +268,7 @@ class GuardClient:
         for command, number in counted.stale:
             control = self._controls.get(command)
             if control is None or control.counted is None or control.number != number:
-                continue  # it was let go, or a newer tick is on its way
+                continue  # it was released, or a newer tick is on its way
             numbered = control.counted.again()
             if numbered is not None:
                 self._post_tick(command, control, numbered)

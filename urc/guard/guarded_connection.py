@@ -1,11 +1,11 @@
 """The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
-closes the transport. The engine requests the opening and the closing of the connection. The guard
-sends received data to the engine within the engine's flow-control credit. If the connection is lost
-while the robot may be moving, the guard does not wait for the engine. The engine may be frozen or
-dead. The guard itself reopens the connection (a *rescue*) and writes the stop first. The open
-connection is then kept for the engine's next attempt.
+closes it. The engine requests the opening and the closing of the connection. The guard sends
+received data to the engine within the engine's flow-control credit. If the connection is lost while
+the robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead.
+The guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection
+is then kept for the engine's next attempt.
 """
 
 import asyncio
@@ -44,8 +44,7 @@ _RESCUE_S: Final = 90.0
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
-"""Minimum interval between two connection attempts, in seconds; five times as long for a transport
-that is slow to open."""
+"""Minimum interval between connection attempts, in seconds; five times that for slow transports."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
 """Maximum timeout of one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout
@@ -67,7 +66,7 @@ seconds."""
 _PAUSE_S: Final = 0.01
 
 Emit = Callable[[messages.FromGuard], int]
-"""Function that passes on a message and returns its approximate size in bytes."""
+"""Function that forwards a message and returns its approximate size in bytes."""
 
 log = logging.getLogger(__name__)
 
@@ -119,7 +118,7 @@ class GuardedConnection:
         self._handed = asyncio.Event()
         self._is_rescuing = False
         self._waiting: TimerHandle | None = None
-        """Timer of the engine's timeout while the engine waits for a rescue; otherwise None."""
+        """Timer for the engine's timeout while the engine waits for a rescue; otherwise None."""
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
@@ -132,7 +131,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the newest sent frame of the engine that contains counters."""
         self._round = 0
-        """Number of refusals of the engine's frames because of used counter values."""
+        """Number of times that the engine's frames were refused because of used counter values."""
 
     # -- requests of the engine
 
@@ -183,7 +182,7 @@ class GuardedConnection:
             self._refuse(said.number)
             return None
         self._count(said)
-        # Reported after the transport has the frame: the engine may reply at once.
+        # Reported after the transport has the frame, because the engine may reply immediately.
         asyncio.get_running_loop().call_soon(self.scheduler.tell_counted)
         return said.data
 
@@ -193,7 +192,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard the other frames of this round, because their counter values were used."""
+        """Discard the other frames of this round, because their counter values are used up."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
@@ -204,7 +203,7 @@ class GuardedConnection:
             self._credited.set()
 
     def settle(self) -> None:
-        """Report the results of a batch of messages, and watch the liveness during motion."""
+        """Report the results of a batch of messages, and watch liveness during motion."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))
@@ -280,7 +279,7 @@ class GuardedConnection:
         except TimeoutError:
             await self._close_transport()
             return f"no answer from {self.transport.address} within {timeout_s:g} s"
-        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+        except Exception as bug:  # supervisor: a third-party transport may raise anything
             return why_broken(bug)
         self._took_s.append(self._clock.now() - began_s)
         # The shortest duration is the least affected by delays of this machine.
@@ -312,7 +311,7 @@ class GuardedConnection:
             reason = str(fault)
         except Exception as bug:  # supervisor, as in `_attempt`
             reason = why_broken(bug)
-        # In a new task: recovering here would nest deeper with every cut.
+        # In a new task, because recovery here would nest deeper with every cut.
         self._switch(self._recover(reason))
 
     async def _read(self) -> str:
@@ -400,7 +399,7 @@ class GuardedConnection:
         try:
             while self.scheduler.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
-                # Overlapping attempts get more time: a slower network is not a reason to give up.
+                # Overlapping attempts get more time, so that a slower network does not end them.
                 enough_s = _LOG_IN_S if self._is_slow_to_open else _LONGEST_S
                 is_hurried = self._hurry.is_used
                 self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)

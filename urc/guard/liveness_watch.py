@@ -28,9 +28,9 @@ class LivenessWatch:
         """Prepare.
 
         Args:
-            transport: the transport; probed if the transport is a `SupportsProbe`.
+            transport: the transport, which is probed if it implements `SupportsProbe`.
             clock: the time.
-            silent_s: maximum silence of a robot that is not probed, in seconds; None for no limit.
+            silent_s: maximum silence of an unprobed robot, in seconds; None for no limit.
             is_moving: function that returns whether a control is moving.
             failed: callback with the reason when the program is frozen.
         """
@@ -46,7 +46,7 @@ class LivenessWatch:
 
     @property
     def is_able(self) -> bool:
-        """Whether the transport offers a way to judge liveness."""
+        """Whether the liveness of this transport can be judged."""
         return self._transport is not None or self._silent_s is not None
 
     def begin(self) -> None:
@@ -66,7 +66,7 @@ class LivenessWatch:
             self._asking = None
 
     def note_arrival(self) -> None:
-        """Record received bytes, or a pause in reading on this machine."""
+        """Record that bytes were received, or that this machine paused its reading."""
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
@@ -97,8 +97,8 @@ class LivenessWatch:
             await transport.probe()
             self.note_arrival()
         except TransportError:
-            pass  # the reader of the line reports it
-        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+            pass  # the connection's reader reports it
+        except Exception as bug:  # supervisor: a third-party transport may raise anything
             why_broken(bug)
         finally:
             if self._asking is asyncio.current_task():

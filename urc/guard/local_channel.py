@@ -24,7 +24,7 @@ class LocalChannel:
 
         Args:
             listener: the client.
-            lines: the transports; a tunnel precedes the transports inside the tunnel.
+            lines: the transports; a tunnel precedes the transports that it carries.
             clock: the time.
         """
         self._listener = listener

@@ -85,8 +85,8 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     """Counter values of the frame, or None. The frame is sent only if each value directly follows
     the last sent value."""
     round: int = 0
-    """Number of `SendStale` messages on this connection that the engine knows. The guard drops the
-    frame if the guard has sent a different number."""
+    """Number of `SendStale` messages that the engine has received on this connection. The guard
+    drops the frame if it has sent a different number."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
@@ -117,7 +117,7 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
 
     control: str
     number: int
-    """Sequence number of the tick of this control."""
+    """Number of this control's tick."""
     data: Payload
     at_s: float
     """Time of the sample on this machine's monotonic clock, in seconds. The time of a delayed tick
@@ -251,7 +251,7 @@ class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
     line: str
     turn: int
     number: int
-    """Number of the first frame that was not sent."""
+    """Number of the first unsent frame."""
     stand: dict[str, int]
 
 
@@ -292,7 +292,7 @@ def _plain(value: object) -> object:
 def encoder() -> msgspec.msgpack.Encoder:
     """Return a new encoder for messages of either side.
 
-    For a body that cannot be encoded, the encoder raises `TypeError`, `OverflowError` or
+    For an unsupported body, the encoder raises `TypeError`, `OverflowError` or
     `NotImplementedError`, never `msgspec.EncodeError`.
     """
     return msgspec.msgpack.Encoder(enc_hook=_plain)

@@ -2,9 +2,9 @@
 
 Theory of operation. `step` writes the due frames of every control. Stops are written first,
 regardless of unsent data. Motion frames are written only if no earlier data has been waiting too
-long. `step` runs after every message, and at the time when the next frame is due. Until the other
-side acknowledges a write, `step` also runs every few milliseconds, because the kernel does not
-report sent bytes.
+long. `step` runs after every message, and when the next frame is due. Until the other side
+acknowledges a write, `step` also runs every few milliseconds, because the kernel does not report
+sent bytes.
 
 A control is *in doubt* while a written frame may not have arrived at the robot. If the connection
 is lost while a control is in doubt, a stop becomes pending.
@@ -55,17 +55,17 @@ class MotionScheduler:
         """Create the scheduler; nothing is written before the call of `begin`.
 
         Args:
-            transport: the transport; `SupportsUnsent`, `SupportsOffer` and `SupportsForget` are
-                used if implemented.
+            transport: the transport, with optional support for `SupportsUnsent`, `SupportsOffer`
+            and `SupportsForget`.
             clock: the time.
             stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
             is_strict: whether motion waits until all earlier bytes are sent.
-            told: callback for each written stop; the arguments are the control, the reason and the
-                number of the newest tick.
+            told: callback for each written stop, with the control, the reason and the number of the
+            newest tick.
             failed: callback with the reason when the connection stalls or refuses data.
             sent_counters: counter values sent on the connection; None to create new counters.
-            counted: callback after a change of the counters; the argument lists the control and
-                number of each tick that became obsolete.
+            counted: callback after a change of the counters, with the control and number of each
+            obsolete tick.
         """
         self._clock = clock
         self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
@@ -94,7 +94,7 @@ class MotionScheduler:
 
     @property
     def owes(self) -> bool:
-        """Whether a control must be stopped as soon as the connection is open again."""
+        """Whether a control must be stopped when the connection reopens."""
         return any(hold_to_run.owes_stop for hold_to_run in self._holds.values())
 
     @property
@@ -154,7 +154,7 @@ class MotionScheduler:
             hold_to_run.cut()
 
     def owe(self, control: str, terms: HoldTerms) -> None:
-        """Record that `control` may be moving: stop it as soon as the connection is open."""
+        """Record that `control` may be moving, and stop it as soon as the connection opens."""
         self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
@@ -264,7 +264,7 @@ class MotionScheduler:
             # and that stop must not be dropped.
             self._forget()
             self._watch.gave_up()
-        if data == b"":  # each step of this robot ends by itself
+        if data == b"":  # each step of this robot ends automatically
             self._report_stop(control)
             return
         self._is_stop_under_way |= is_stop
@@ -347,7 +347,7 @@ class MotionScheduler:
         elif at_s == float("inf"):
             return
         if self._alarm is not None and self._alarm_s <= at_s:
-            return  # an early alarm finds nothing due, and is set again
+            return  # an early timer finds nothing due, and is set again
         if self._alarm is not None:
             self._alarm.cancel()
         self._alarm_s = at_s
@@ -372,7 +372,7 @@ class MotionScheduler:
             return False
         unsent = self._unsent()
         if not unsent and self._forget is not None and not self.queue.is_idle:
-            # What was given up has left nothing, and what came after it has no connection yet.
+            # The discarded data left no unsent bytes, and later data has no connection yet.
             return self._watch.age_s(now) >= self._watch.limit_s
         if not unsent and self.queue.is_idle:
             self._all_arrived()
@@ -381,15 +381,15 @@ class MotionScheduler:
 
     @property
     def _is_wanted(self) -> bool:
-        """Whether a motion frame is still unwritten."""
+        """Whether a motion frame is waiting to be written."""
         return any(hold_to_run.is_waiting for hold_to_run in self._holds.values())
 
     @property
     def _is_watched(self) -> bool:
         """Whether unsent bytes must be watched, because they contain or delay motion frames.
 
-        Motion frames wait for unsent bytes only on a transport that is slow to open. On other
-        transports, waiting for a ping sent during an interruption would block motion until the
-        interruption ends; the old motion would then continue.
+        Motion frames wait for unsent bytes only on slow-opening transports. On other transports, a
+        ping sent during an interruption would block motion until the interruption ends, and the old
+        motion would then continue.
         """
         return bool(self._doubtful) or (self._is_strict and self._is_wanted)

@@ -62,7 +62,7 @@ class Pipe:
         self._space = memoryview(bytearray(_READ_BYTES))
         self._held = bytearray()
         self._is_behind = False
-        """Whether received messages wait for the next iteration of the event loop."""
+        """Whether received messages are waiting for the next iteration of the event loop."""
         self._rest = b""
         """Unsent bytes of a message that was written in part."""
         self._urgent: deque[bytes] = deque()
@@ -129,7 +129,7 @@ class Pipe:
             self._line.close()
 
     def end(self) -> None:
-        """Signal the end of messages to the other side."""
+        """Signal to the other side that no more messages follow."""
         if self.is_open:
             try:
                 self._line.shutdown(socket.SHUT_WR)

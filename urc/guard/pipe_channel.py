@@ -1,9 +1,9 @@
-"""The channel to a guard in a separate process: starts, watches and restarts the process.
+"""The channel to a guard in a separate process, which it starts, watches and restarts.
 
 Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or has
-been silent for half a second, is killed and replaced immediately. A guard that is ready to run but
-gets no processor time is not replaced, because a new guard would get no processor time either. A
-new guard has no state, so the client initialises it first.
+been silent for half a second, is killed and replaced immediately. A guard that waits for processor
+time is not replaced, because a new guard would also wait. A new guard has no state, so the client
+initialises it first.
 """
 
 import asyncio
@@ -110,7 +110,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start the guard process and initialise the guard; requires a running event loop."""
+        """Start and initialise the guard process; requires a running event loop."""
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
@@ -168,14 +168,14 @@ class PipeChannel:
             self._entering.cancel()
             await asyncio.wait({self._entering})
             if self._door is not None:
-                self._door.close()  # the task may not even have begun to wait there
+                self._door.close()  # the task may not have begun to wait yet
             if self._process is not None:
-                self._process.kill()  # no line is open, nothing moves
+                self._process.kill()  # no connection is open, nothing moves
         if self._pipe is not None:
             self._pipe.end()
             is_idle = not self._listener.may_move
             if is_idle and not self._was_heard and self._process is not None:
-                self._process.kill()  # it has hardly begun: no line is open, nothing moves
+                self._process.kill()  # it has just started: no connection is open, nothing moves
             with suppress(TimeoutError):
                 async with asyncio.timeout(_FINISH_S):
                     await self._gone.wait()
@@ -194,7 +194,7 @@ class PipeChannel:
     def _watch(self) -> None:
         """Check the guard's heartbeat every `_LOOK_S`."""
         loop = asyncio.get_running_loop()
-        # A late look counts for nothing: this process slept, and beats may be unread.
+        # A late check is ignored, because this process slept and heartbeats may be unread.
         if loop.time() - self._look_s < _LOOK_S and not self._is_kept():
             self._silent_looks += 1
         limit = _SILENT_LOOKS if self._was_heard else _START_LOOKS
@@ -207,7 +207,7 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     def _is_kept(self) -> bool:
-        """Return whether a silent guard is ready to run but gets no processor time."""
+        """Return whether a silent guard is waiting for processor time."""
         if not self._silent_looks or self._kept_looks >= _MOST_KEPT_LOOKS:
             return False
         before, self._standing = self._standing, standing(self.pid)

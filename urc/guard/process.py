@@ -1,4 +1,4 @@
-"""Start and end of the guard process."""
+"""Start and end the guard process."""
 
 import asyncio
 import hmac
@@ -112,7 +112,7 @@ def _visitor() -> tuple["subprocess.Popen[bytes]", GuardAcceptor]:
 
 
 def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
-    # Ctrl-C of a terminal is for the server, which then ends the guard.
+    # Ctrl-C in a terminal is meant for the server, which then ends the guard.
     if sys.platform == "win32":
         more["creationflags"] = subprocess.CREATE_NEW_PROCESS_GROUP
     else:
@@ -123,7 +123,7 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
 
 
 class ProcessState(NamedTuple):
-    """The state of a process, as the system reports it."""
+    """The state of a process, as reported by the system."""
 
     wants_to_run: bool = False
     """Whether the process is running or waiting for a processor or a disk; false for a sleeping or
@@ -136,7 +136,7 @@ class ProcessState(NamedTuple):
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
     """Return the state of a process from ``/proc`` on Linux; on other systems, return a default."""
     try:
-        # The name before the state may hold anything, brackets and spaces too.
+        # The name before the state may contain any characters, including brackets and spaces.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]
         ran_ns = (proc / str(process) / "schedstat").read_text("ascii").split()[0]
         return ProcessState(state in "RD", int(ran_ns) / 1e9)

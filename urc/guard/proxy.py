@@ -34,7 +34,7 @@ Stands = Callable[[str, Mapping[str, int], bool], None]
 
 @dataclass(slots=True)
 class _Sent:
-    """Data that the guard has not yet reported as handed to the transport."""
+    """Data that the guard has not yet reported as passed to the transport."""
 
     number: int
     size: int
@@ -64,8 +64,8 @@ class GuardedTransport:
             address: address of the robot, for display.
             post: function that sends a message to the guard without waiting.
             ready: function that waits until a guard is ready.
-            stands: callback with the counters of the transport, and whether no frame with counters
-                is pending.
+            stands: callback with the transport's counters, and whether all frames with counters are
+            sent.
         """
         self._stands = stands
         self._name = name
@@ -75,7 +75,7 @@ class GuardedTransport:
         self._turn = 0
         self._is_open = False
         self._is_known = False
-        """Whether the guard may hold unsent data of the present connection."""
+        """Whether the guard may have unsent data for the present connection."""
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
@@ -83,11 +83,11 @@ class GuardedTransport:
         self._arrived = asyncio.Event()
         self._sink: Callable[[bytes], bool] | None = None
         self._taken_bytes = 0
-        """Number of received bytes that are not yet acknowledged to the guard."""
+        """Number of received bytes not yet acknowledged to the guard."""
         self._number = 0
         self._under_way: deque[_Sent] = deque()
         self._round = 0
-        """Number of refusals of pending frames by the guard."""
+        """Number of times that the guard refused pending frames."""
         self._under_way_bytes = 0
 
     @property
@@ -163,10 +163,10 @@ class GuardedTransport:
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Pass on a frame with counters; render it again if other frames use its counter values.
+        """Send a frame with counters; render it again if other frames use its counter values.
 
         Returns:
-            Whether the frame was accepted; `left` then receives the data that was handed over.
+            Whether the frame was accepted; `left` then receives the data given to the transport.
         """
         if not self._is_open or self._under_way_bytes > _OFFERED_BYTES:
             return False
@@ -174,7 +174,7 @@ class GuardedTransport:
         return True
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Pass on a frame with counters; wait while the queue is full.
+        """Send a frame with counters; wait while the queue is full.
 
         Raises:
             TransportError: the connection broke.
@@ -275,7 +275,7 @@ class GuardedTransport:
         sent = _Sent(self._number, size_of(data), data, taken, counted, left)
         self._under_way.append(sent)
         self._under_way_bytes += sent.size
-        try:  # recorded first: the reply may arrive at once
+        try:  # recorded first, because the reply may arrive immediately
             self._pass(sent, None if counted is None else counted.numbered)
         except UNFIT as fault:
             self._under_way.pop()
@@ -307,11 +307,11 @@ class GuardedTransport:
                 continue
             log.warning("%s: a frame cannot be rendered with the next counter value", self._address)
             sent.counted = sent.left = None  # settled together with the next frame that is sent
-        # Stops with the numbers after these frames must reach the guard before the frames do.
+        # Stops with the numbers after these frames must reach the guard before these frames.
         self._stands(self._name, said.stand, False)
         for sent, numbered in again:
             if self._round != this_round:
-                return  # refused again at once: the newer round has sent the rest
+                return  # refused again immediately: the newer round has sent the rest
             self._pass(sent, numbered)
 
     def _sent(self, number: int, fault: TransportError | None = None) -> None:

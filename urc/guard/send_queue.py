@@ -33,7 +33,7 @@ class LaneClock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> TimerHandle:
-        """Run `action` at `time_s`, or immediately if that time is past."""
+        """Run `action` at `time_s`, or immediately if that time has passed."""
 
 
 class Sender(Protocol):
@@ -61,8 +61,7 @@ class SendQueue(Generic[_Tag]):
             clock: the time.
             done: callback for each frame; the arguments are the tag of the frame, and the error or
                 None.
-            after: queue whose frames are sent before the frames of this queue; None for no such
-                queue.
+            after: queue whose frames are sent before this queue's frames; None for no other queue.
         """
         self._sender = sender
         self._clock = clock
@@ -138,7 +137,7 @@ class SendQueue(Generic[_Tag]):
             await self._sender.send(data)
         except TransportError as fault:
             return fault
-        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+        except Exception as bug:  # supervisor: a third-party transport may raise anything
             return PeerClosed(why_broken(bug))
         return None
 

@@ -1,4 +1,4 @@
-"""The counter values that were sent on one connection.
+"""The counter values sent on one connection.
 
 The guard evaluates no templates. Each rendered frame includes its effect on the counters. A frame
 is sent only if its counter values are the next in order. The values on the wire therefore increase
@@ -17,7 +17,7 @@ class SentCounters:
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
-        """Last sent value of each counter, by name; a counter without a sent value is missing."""
+        """Last sent value of each counter, by name; unsent counters are missing."""
         self.is_changed = False
         """Whether some sent values have not been reported to the engine yet."""
 

@@ -14,7 +14,7 @@ from urc.transports.base import TopicSubscription, Transport, TransportSetup
 __all__ = ["FINISH_S", "GuardServer"]
 
 FINISH_S: Final = 2.0
-"""Maximum time for the last stops and for closing the connections, in seconds."""
+"""Maximum time for writing the last stops and closing the connections, in seconds."""
 
 
 class GuardServer:

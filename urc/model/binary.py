@@ -1,8 +1,8 @@
 """Items of a binary frame, in frame order, for reading and writing.
 
 The loader creates the items from ``struct:`` and resolves every named type. The readers and writers
-of `urc.protocol` compile the items. The loader, the readers and the writers share the rules in this
-module, such as the names of nested fields.
+in `urc.protocol` compile the items. The loader, the readers and the writers share the rules in this
+module, such as the naming of nested fields.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,11 +32,11 @@ __all__ = [
 ]
 
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
-"""Names that expressions of a struct can use in addition to its items. `_size` is the size of the
+"""Names that a struct's expressions can use in addition to its items. `_size` is the size of the
 whole frame in bytes. `_left` is the number of bytes from the start of the item to the end of the
 frame."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
-"""Names that expressions inside a named type may use in addition to the items of the type."""
+"""Names that expressions inside a named type can use in addition to the type's items."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
@@ -49,7 +49,7 @@ class Extent(NamedTuple):
     prefix: Number | None = None
     """Number type of the length field before the data, for the kind ``prefix``."""
     expression: Template | None = None
-    """Formula over earlier items for the size or length, for the kind ``expression``."""
+    """Formula for the size or length, using earlier items, for the kind ``expression``."""
 
 
 class Item(NamedTuple):
@@ -59,41 +59,41 @@ class Item(NamedTuple):
         "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
     ]
     """The kind ``coded`` is a number with a special encoding. The kind ``packed`` is an array of
-    numbers without alignment to bytes."""
+    numbers that are not byte-aligned."""
     id: str = ""
     """Name of the field or argument; "" for a nameless item."""
     number: Number = Number("integer", 8)
     """Number type of a ``number``, or of the number that contains the ``bits``."""
     size: Extent | None = None
-    """Size of bytes, text, padding or a struct's window; None: unlimited."""
+    """Size of bytes, text, padding or a struct's window; None means unlimited."""
     times: Extent | None = None
-    """Number of elements of an array. The name ``count`` is unavailable, because tuples have a
-    ``count`` method."""
+    """Number of elements of an array. The attribute cannot be named ``count``, because tuples have
+    a ``count`` method."""
     condition: Template | None = None
-    """Condition under which the item is present; None: always present."""
+    """Condition under which the item is present; None means always present."""
     const: int | float | bool | bytes | None = None
-    """Required raw value; a frame with a different value does not match. None: any value
+    """Required raw value; a frame with a different value does not match. None means that any value
     matches."""
     scale: float = 1
     offset: float = 0
     """Offset of the value: value = raw · scale + offset."""
     enum: tuple[tuple[int, str], ...] = ()
-    """Pairs of a raw number and the corresponding word; a number without a word stays a number."""
+    """Pairs of a raw number and its word; a number without a word stays a number."""
     valid: tuple[float, float] | None = None
     """Valid range of the scaled value; a value outside the range is a violation."""
     value: Template | None = None
-    """Default value to send; None: the caller must give a value."""
+    """Default value to send; None means that the caller must provide a value."""
     encoding: str = ""
-    """Text encoding; "": the encoding of the connection."""
+    """Text encoding; "" means the connection's encoding."""
     pad: int = 0
     """Padding byte for text or bytes that are shorter than the fixed size."""
     until: bytes = b""
     """Terminator of bytes or text without a declared size."""
     trim: int | None = None
-    """Padding byte of a trimmed struct: any number of these bytes may be missing at the end of the
-    struct."""
+    """Padding byte of a trimmed struct. The end of the struct may lack any number of these
+    bytes."""
     is_lsb_first: bool = False
-    """Whether the first item of ``bits`` has the least significant bits."""
+    """Whether the first item of ``bits`` contains the least significant bits."""
     items: tuple["Item", ...] = ()
     """Items of a ``struct``, or the parts of ``bits``."""
     switch: "Switch | None" = None
@@ -105,12 +105,12 @@ class Item(NamedTuple):
 
 
 class Switch(NamedTuple):
-    """A choice of items by the value of an expression over earlier items."""
+    """A choice between items, selected by an expression using earlier items."""
 
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """Items for values without a case; None: a frame with a value without a case does not match."""
+    """Items for values without a case; None means that a frame with such a value does not match."""
 
 
 def packed_size(number: Number, count: Extent) -> int:
@@ -136,7 +136,7 @@ def joined_name(outer: str, inner: str) -> str:
 
 
 def scope_of(items: tuple[Item, ...]) -> Iterator[Item]:
-    """Yield every item with an id in scope, including items of nameless structs and of cases."""
+    """Yield every item in scope, including the items of nameless structs and of cases."""
     for item in items:
         if item.switch is not None:
             for _, case in item.switch.cases:
@@ -212,7 +212,7 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the formulas for sizes and counts, by name of the item with the size or count.
+    """Return the formulas for sizes and counts, keyed by the name of the size or count item.
 
     URC computes sizes and counts from the data to send.
     """

@@ -1,7 +1,6 @@
-"""Mapping of the output values of a widget to the arguments of a command. Pure.
+"""Mapping of a widget's output values to a command's arguments. Pure.
 
-The loader and the dashboard both call `targets`, so both map the values of an output in the same
-way.
+The loader and the dashboard both call `targets`, so both map output values in the same way.
 """
 
 from urc.model.driver import Command
@@ -12,11 +11,11 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
-    """Return the name of the output argument for each command argument.
+    """Map the name of each command argument to the name of an output argument.
 
-    The binding decides. Without a binding, a value goes to the argument of the same name. A single
-    output value goes to the command's only free argument, even under a different name. Values of
-    hold-to-run controls go only to arguments of the same name.
+    An explicit binding takes precedence. Without a binding, a value goes to the argument of the
+    same name. A single output value goes to the command's only free argument, even under a
+    different name. Values of hold-to-run controls go only to arguments of the same name.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

@@ -46,10 +46,10 @@ class Timeouts(NamedTuple):
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Idle time before the connection is closed, in seconds; None: never."""
+    """Idle time before the connection is closed, in seconds; None means never."""
     on_connect_s: float | None = None
-    """Timeout for all steps of ``on_connect`` together, in seconds; None: only the timeouts of the
-    steps apply."""
+    """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the
+    timeouts of the steps apply."""
 
 
 class Backoff(NamedTuple):
@@ -67,8 +67,8 @@ class TransportSpec(NamedTuple):
     name: str
     type: str
     options: Mapping[str, object] = NOTHING
-    """Options of the transport, such as ``host`` and ``port``. The values of options are plain
-    values, templates over settings, or lists and mappings of plain values and templates."""
+    """Options of the transport, such as ``host`` and ``port``. Each option is a plain value, a
+    template using settings, or a list or mapping of plain values and templates."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
@@ -82,22 +82,24 @@ class TransportSpec(NamedTuple):
     on_connect: tuple[Step, ...] = ()
     """Steps that prepare a new connection; other requests wait until all steps are complete."""
     on_close: tuple[Step, ...] = ()
-    """Steps that run before an orderly close of the connection."""
+    """Steps that run before the connection is closed in an orderly way."""
     stale_after_s: float | None = None
-    """Time without received data before the connection is stale, in seconds; None: never."""
+    """Time without received data before the connection is stale, in seconds; None means never."""
     tunnel: str = ""
-    """Name of the transport that tunnels this connection; "": no tunnel."""
+    """Name of the transport that tunnels this connection; "" means no tunnel."""
     is_half_duplex: bool = False
-    """Whether the connection is half-duplex. In half duplex, only a stop may be sent before the
-    reply to the previous request."""
+    """Whether the connection is half-duplex. In half-duplex mode, only a stop may be sent before
+    the reply to the previous request arrives."""
     never_replies: bool = False
-    """Whether the robot never sends on this connection, so silence does not indicate a loss."""
+    """Whether the robot never sends on this connection, so that silence does not indicate a lost
+    connection."""
     errors: tuple[Pattern, ...] = ()
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
     """Further error replies to any request; each declares a form for decoding."""
     hint: str = ""
-    """Next step for the operator while the transport cannot connect; "": the step for the cause."""
+    """Next step for the operator while the transport cannot connect; "" means the default step for
+    the cause."""
 
 
 class Reply(NamedTuple):
@@ -106,9 +108,9 @@ class Reply(NamedTuple):
     read: ReadSpec
     errors: tuple[Pattern, ...] = ()
     timeout_s: float | None = None
-    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
+    """Reply timeout, in seconds; None means the transport's ``timeouts.reply``."""
     match: Template | None = None
-    """Condition that identifies the reply to a request, over the reply's fields, the command's
+    """Condition that identifies the reply to a request, using the reply's fields, the command's
     arguments, and the request's counters (``seq.NAME``). Without a condition, replies must arrive
     in the order of the requests."""
     stages: tuple[Stage, ...] = ()
@@ -116,7 +118,7 @@ class Reply(NamedTuple):
     faults: tuple[ErrorReply, ...] = ()
     """Error replies in addition to `errors`; each declares a form for decoding."""
     framing: FramingSpec | None = None
-    """Framing of the reply; None: the framing of the connection."""
+    """Framing of the reply; None means the connection's framing."""
     asides: ProvisionalReplies = ProvisionalReplies()
     """Provisional replies that may precede the first reply."""
 
@@ -135,7 +137,7 @@ class Reply(NamedTuple):
 
     @property
     def names(self) -> set[str]:
-        """Names that later steps can use after the request: each field as ``_field``."""
+        """Names that steps after the request can use: each field as ``_field``."""
         reads = (self.read, *(stage.read for stage in self.stages))
         return {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
 
@@ -168,13 +170,13 @@ class Argument(NamedTuple):
     items: ElementType = "number"
     """Type of the elements of an array; range and choices apply to each element."""
     size: int | None = None
-    """Required number of elements of an array; None: any number up to `MOST_ELEMENTS`."""
+    """Required number of elements of an array; None means any number up to `MOST_ELEMENTS`."""
     confirm: Mapping[str, Confirm] = NOTHING
-    """Confirmation questions, by argument value as written in the document."""
+    """Confirmation questions, keyed by argument value as written in the document."""
 
 
 STOPPED: Final = "STOP was pressed meanwhile: send it again"
-"""Reason for refusing a motion request that is older than the last STOP."""
+"""Reason for refusing a motion request made before the last STOP."""
 
 
 class Command(NamedTuple):
@@ -192,9 +194,9 @@ class Command(NamedTuple):
     description: str = ""
     priority: Priority = "normal"
     is_latest_only: bool = False
-    """Whether a new call of the command replaces a queued call."""
+    """Whether a new call of the command replaces a queued one."""
     rate_per_s: float | None = None
-    """Average rate limit in calls per second, with bursts of two calls; None: unlimited."""
+    """Average rate limit in calls per second, with bursts of two calls; None means unlimited."""
     is_idempotent: bool = False
     """Whether repeating the command has the same effect as sending the command once."""
     retries: int = 0
@@ -204,16 +206,16 @@ class Command(NamedTuple):
     """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. The attribute `moves` is also true for a
-    sequence with a held command, or with a command that starts autonomous motion."""
+    """Whether the command starts autonomous motion. `moves` is also true for a sequence with a held
+    command or a command that starts autonomous motion."""
     moves_if: Template | None = None
-    """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
-    true."""
+    """Condition on the arguments under which a call starts autonomous motion; None means that every
+    call does if `moves` is true."""
     stops: bool = False
     """Whether STOP sends this command; each STOP sends the command once."""
     role: Role = "drive"
     """Role that a visitor needs for the command: ``drive``, ``maintain`` or ``administer``. A
-    sequence needs at least the roles of the commands that it runs. STOP needs no role."""
+    sequence requires at least the roles of the commands that it runs. STOP requires no role."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None
@@ -244,24 +246,24 @@ class Poll(NamedTuple):
     phase_s: float = 0.0
     """Delay between connecting and the first request, in seconds."""
     run: str = ""
-    """Command that supplies the poll's `send` and `reply`; "": the poll declares both."""
+    """Command that supplies the poll's `send` and `reply`; "" means that the poll declares both."""
     arguments: Mapping[str, Reading] = NOTHING
     """Arguments of the command in `run`, including defaults."""
     when: Template | None = None
-    """Condition for sending the request, over fresh signals and settings; None: the poll always
-    sends."""
+    """Condition for sending the request, using fresh signals and settings; None means that the poll
+    always sends."""
     priority: Priority = "low"
     offline: Offline | None = None
 
 
 class Message(NamedTuple):
-    """A declared unsolicited frame, with the signals to update."""
+    """A declared unsolicited frame, and the signals that it updates."""
 
     name: str
     transport: str
     read: ReadSpec
     acknowledge: WriteSpec | None = None
-    """Frame that immediately acknowledges the message; None: no acknowledgement."""
+    """Frame that immediately acknowledges the message; None means no acknowledgement."""
 
 
 class Driver(NamedTuple):

@@ -1,7 +1,7 @@
 """Request handling: queues, reply stages and conditions.
 
-This module contains only data classes: `urc.config` creates the objects, and `urc.protocol` applies
-the objects.
+This module contains only data classes. `urc.config` creates their instances, and `urc.protocol`
+applies them.
 """
 
 from collections.abc import Mapping
@@ -45,22 +45,23 @@ class Queue(NamedTuple):
     depth: int = 64
     """Maximum number of queued requests; further requests are refused."""
     most_bytes: int | None = None
-    """Maximum number of unacknowledged request bytes, including framing; None: unlimited."""
+    """Maximum number of unacknowledged request bytes, including framing; None means unlimited."""
 
 
 class Keepalive(NamedTuple):
     """A frame that keeps an idle connection open."""
 
     every_s: float
-    """Maximum time without a sent frame, in seconds."""
+    """Maximum time without sending a frame, in seconds."""
     run: str = ""
     """Command to run; "" when `send` declares the frame."""
     send: WriteSpec | None = None
     watchdog_s: float | None = None
-    """Watchdog timeout of the robot, in seconds, according to its manufacturer. After a watchdog
+    """The robot's watchdog timeout as specified by its manufacturer, in seconds. After a watchdog
     timeout, the robot closes the connection or stops."""
     after: tuple[str, ...] = ()
-    """Commands that reset the watchdog of the robot; (): every frame resets the watchdog."""
+    """Commands that reset the watchdog of the robot; () means that every frame resets the
+    watchdog."""
 
 
 class ErrorReply(NamedTuple):
@@ -68,16 +69,17 @@ class ErrorReply(NamedTuple):
 
     read: ReadSpec
     text: Template | None = None
-    """Message for the operator, a template over the reply fields; None: the raw reply."""
+    """Message for the operator, a template using the reply fields; None means the raw reply."""
 
 
 class ProvisionalReplies(NamedTuple):
     """Provisional replies that may arrive before the final reply to a request."""
 
     resend: ReadSpec | None = None
-    """Frame that requests a retransmission; None: not supported."""
+    """Frame that requests a retransmission; None means not supported."""
     extend: ReadSpec | None = None
-    """Frame that reports a busy robot and extends the timeout; None: not supported."""
+    """Frame that reports that the robot is busy and extends the timeout; None means not
+    supported."""
     extend_s: float = 600.0
     """Maximum total extension of the timeout by `extend` frames, in seconds, 0.001 to 3600."""
 
@@ -89,7 +91,7 @@ class Stage(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     faults: tuple[ErrorReply, ...] = ()
     timeout_s: float | None = None
-    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
+    """Reply timeout, in seconds; None means the transport's ``timeouts.reply``."""
     asides: ProvisionalReplies = ProvisionalReplies()
 
 
@@ -108,15 +110,15 @@ class Hold(NamedTuple):
     """Duration of the motion lease without a renewal by the operator, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
     """Watchdog timeout of the robot, in seconds: motion continues for this time after the last
-    setpoint. The value ``inf`` means that the robot has no watchdog, and None that the watchdog is
-    unknown. Only rules of the loader use the watchdog timeout."""
+    setpoint. ``inf`` means that the robot has no watchdog; None means that the watchdog is unknown.
+    Only the loader's rules use the watchdog timeout."""
     slew: Mapping[str, float] = NOTHING
-    """Maximum change per second in the direction away from the stop value, by argument."""
+    """Maximum change per second away from the stop value, keyed by argument."""
     on_stall: Literal["abort", "wait"] | None = None
-    """Reaction to a stalled connection during motion; None: the default of the transport."""
+    """Reaction to a stalled connection during motion; None means the transport's default."""
     step_s: float | None = None
-    """Maximum duration, in seconds, of a motion step that the robot ends itself, without a stop.
-    None: the robot moves until a stop arrives."""
+    """Maximum duration, in seconds, of a motion step that the robot ends by itself, without a stop.
+    None means that the robot moves until a stop arrives."""
 
 
 class Confirm(NamedTuple):
@@ -143,7 +145,7 @@ class Requirement(NamedTuple):
     """A precondition for sending a command."""
 
     condition: Template
-    """Condition over fresh signals, settings and the command's arguments."""
+    """Condition on fresh signals, settings and the command's arguments."""
     text: str
     """Message for the operator when the condition is false."""
 
@@ -152,12 +154,12 @@ class Verify(NamedTuple):
     """A condition that confirms the effect of a command."""
 
     condition: Template
-    """Condition over settings, arguments, and signals received after the command."""
+    """Condition on settings, arguments, and signals received after the command."""
     within_s: float
 
 
 class Offline(NamedTuple):
-    """Polling of a robot, or part of a robot, that does not reply."""
+    """Polling of a robot, or part of a robot, that is not replying."""
 
     after: int
     """Number of consecutive missed replies before the robot is offline."""

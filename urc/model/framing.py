@@ -41,21 +41,21 @@ class ByteRange(NamedTuple):
 
 
 class Salt(NamedTuple):
-    """Secret bytes that follow the range in the input of the checksum."""
+    """Secret bytes after the range in the checksum input."""
 
     constant: bytes = b""
     offset: int = 0
-    """Offset in the frame of the number that selects an entry of `table`."""
+    """Frame offset of the number that selects an entry in `table`."""
     size: int = 1
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
-    """Secret bytes, by the number in the frame that selects the secret bytes."""
+    """Secret bytes, keyed by the selecting number in the frame."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Handling of a frame with a number that is missing in `table`: report and drop (``fault``),
+    """Handling of a frame whose number is not in `table`: report and drop (``fault``),
     drop silently (``skip``), or accept unchecked (``pass``)."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
-        """Return the number that selects the secret bytes; None when the frame is too short."""
+        """Return the number that selects the secret bytes; None if the frame is too short."""
         field = frame[self.offset : self.offset + self.size]
         if len(field) < self.size:
             return None
@@ -78,7 +78,7 @@ class ChecksumSpec(NamedTuple):
     closes: bool = False
     """Whether a mismatch closes the connection instead of dropping the frame."""
     before: bytes = b""
-    """Secret bytes that precede the range in the input of the checksum."""
+    """Secret bytes before the range in the checksum input."""
 
     @property
     def size(self) -> int:
@@ -87,7 +87,7 @@ class ChecksumSpec(NamedTuple):
 
 
 class TrailerSpec(NamedTuple):
-    """A checksum after a text of variable length."""
+    """A checksum after variable-length text."""
 
     checksum: ChecksumSpec
     """Checksum parameters. The range refers to the text without the checksum. The attribute `at` of
@@ -97,7 +97,7 @@ class TrailerSpec(NamedTuple):
     is_padded: bool = True
     """Whether the digits of the checksum have leading zeros."""
     is_optional: bool = False
-    """Whether a text without separator and checksum is also valid."""
+    """Whether text without a separator and checksum is also valid."""
     each: bytes = b""
     """Line separator of a frame with one checksum per line."""
     skip: int = 0
@@ -120,13 +120,13 @@ class LengthSpec(NamedTuple):
     is_counted: bool = False
     """Whether the first `size` digits state the number of digits in the length."""
     until: bytes = b""
-    """Terminator of a length field with at most `size` digits; b"": no terminator."""
+    """Terminator of a length field with at most `size` digits; b"" means no terminator."""
     flag_at: int = -1
-    """Offset of the flag byte that marks a valid length field; -1: the length field is always
-    valid."""
+    """Offset of the flag byte that marks a valid length field; -1 means that the length field is
+    always valid."""
     flag_mask: int = 0
     """Mask of the flag byte. The length field is valid if any masked bit of the flag byte is set.
-    If the length field is invalid, the frame has `adjust` bytes."""
+    If the length field is invalid, the frame is `adjust` bytes long."""
 
     @property
     def is_loose(self) -> bool:
@@ -140,16 +140,15 @@ class EscapeSpec(NamedTuple):
     byte: int = 0
     """Escape byte before a stuffed byte."""
     table: Mapping[Any, int] = NOTHING
-    """Replacements that follow the escape byte, by stuffed byte."""
+    """Replacements that follow the escape byte, keyed by stuffed byte."""
     xor: int | None = None
     """XOR mask for decoding any stuffed byte, because a robot may stuff bytes outside `table`.
     Without an XOR mask, only bytes of `table` may be stuffed."""
     after: bytes = b""
-    """Sequence after which the byte `insert` is stuffed; with a sequence, `byte` and `table` are
-    unused."""
+    """Sequence after which the byte `insert` is stuffed; if set, `byte` and `table` are unused."""
     insert: int = 0
     is_of_payload: bool = False
-    """Whether length field and checksum refer to the stuffed bytes instead of the original
+    """Whether the length field and the checksum refer to the stuffed bytes instead of the original
     bytes."""
 
 
@@ -170,17 +169,17 @@ class FrameLayout(NamedTuple):
     checksums: tuple[ChecksumSpec, ...] = ()
     """Checksums computed before `checksum`."""
     escape: EscapeSpec | None = None
-    """Byte stuffing of the payload only; None: no stuffing."""
+    """Byte stuffing of the payload only; None means no stuffing."""
     trailer: TrailerSpec | None = None
-    """Trailing checksum: the first check of a received frame, and the last part added to a sent
-    frame."""
+    """Trailing checksum, checked first in a received frame and added last to a sent frame."""
     digits: Digits = ""
-    """Notation of the bytes between start and end. All positions and `checksums` refer to the
+    """Notation of the bytes between the start and end markers. All positions and `checksums` refer
+    to the
     decoded bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:
-    """Return the size in bytes that a number with `bits` bits has in the frame."""
+    """Return the number of bytes that a `bits`-bit number occupies in the frame."""
     size = (bits + 7) // 8
     if spelling == "raw":
         return size

@@ -18,10 +18,9 @@ class OutputBinding(NamedTuple):
     """The mapping of a widget output's values to command arguments."""
 
     names: Mapping[str, str] = NOTHING
-    """Name of the output's value, by argument of the command; only for pairs with different
-    names."""
+    """Name of the output value for each command argument, only where the names differ."""
     fixed: Mapping[str, Value] = NOTHING
-    """Constant values for command arguments, by argument."""
+    """Constant values of command arguments, keyed by argument."""
 
 
 class WidgetUse(NamedTuple):
@@ -31,20 +30,20 @@ class WidgetUse(NamedTuple):
     widget: str
     """Name of the widget, equal to the name of its folder."""
     inputs: Mapping[str, str] = NOTHING
-    """Signals of the driver, by widget input."""
+    """Driver signals, keyed by widget input."""
     outputs: Mapping[str, str] = NOTHING
-    """Commands of the driver, by widget output."""
+    """Driver commands, keyed by widget output."""
     options: Mapping[str, object] = NOTHING
     """Option values including defaults, validated against the widget's schema."""
     title: str = ""
     given: Mapping[str, OutputBinding] = NOTHING
-    """Declared argument mappings, by widget output."""
+    """Declared argument mappings, keyed by widget output."""
     lists: Mapping[str, tuple[str, ...]] = NOTHING
-    """Lists of driver signals, by multiple input of the widget."""
+    """Lists of driver signals, keyed by multiple input of the widget."""
     files: Mapping[str, str] = NOTHING
-    """Paths of the files that options refer to, by the file name in the option."""
+    """Paths of the files named in options, keyed by the file name in the option."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING
-    """Validated URLs of third-party pages, by option."""
+    """Validated URLs of third-party pages, keyed by option."""
 
 
 class Slot(NamedTuple):
@@ -68,11 +67,11 @@ class Layout(NamedTuple):
 class Tab(NamedTuple):
     """One page of an interface.
 
-    `layouts` contains the declared layouts, by screen of `SCREENS`.
+    `layouts` contains the declared layouts, keyed by the screens in `SCREENS`.
     """
 
     name: str = ""
-    """Name of the page; "": an interface without tabs."""
+    """Name of the page; "" means an interface without tabs."""
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
     left_handed: Mapping[str, Layout] = NOTHING
@@ -89,9 +88,9 @@ class Interface(NamedTuple):
     layouts: Mapping[str, Layout] = NOTHING
     """Layouts by screen; empty for an interface with tabs."""
     background: str = ""
-    """Name of the background slot; "": no background."""
+    """Name of the background slot; "" means no background."""
     widgets: Mapping[str, WidgetUse] = NOTHING
-    """Widgets that override the driver's widgets, by slot."""
+    """Widgets that override the driver's widgets, keyed by slot."""
     summary: str = ""
     licence: str = ""
     """SPDX licence identifier from the document."""
@@ -109,7 +108,7 @@ class Interface(NamedTuple):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Names of all visible slots: the background first, then in reading order."""
+        """Names of all visible slots: the background first, then the others in reading order."""
         names = dict.fromkeys((self.background,) if self.background else ())
         for page in self.pages:
             for grid in (*page.layouts.values(), *page.left_handed.values()):

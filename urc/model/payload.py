@@ -59,9 +59,9 @@ class Count(NamedTuple):
     """The counters of a connection before and after a frame."""
 
     before: dict[str, int]
-    """Last number of each used counter before the frame, by counter."""
+    """Last number before the frame, for each used counter."""
     after: dict[str, int]
-    """Last number of each counter after the frame, by counter."""
+    """Last number after the frame, for each counter."""
 
 
 class Numbered(NamedTuple):
@@ -94,11 +94,11 @@ class FramingSpec(NamedTuple):
     max_bytes: int = 65536
     """Maximum size of a frame, in bytes; a larger frame is dropped and counted."""
     timeout_s: float | None = None
-    """Timeout after which an incomplete frame is dropped, in seconds; None: never."""
+    """Timeout after which an incomplete frame is dropped, in seconds; None means never."""
     strips_ansi: bool = False
     """Whether terminal escape sequences are removed from received data."""
     sent: "FramingSpec | None" = None
-    """Framing of sent data; None: the framing of received data."""
+    """Framing of sent data; None means the framing of received data."""
 
 
 def size_of(payload: Payload) -> int:
@@ -130,13 +130,13 @@ class Collect(NamedTuple):
     """A value assembled from several frames."""
 
     value: Template
-    """Expression over the fields of one frame; the result is one value, a list of values, or
+    """Expression using the fields of one frame; the result is one value, a list of values, or
     bytes."""
     begin: Template | None = None
     """Condition for the first frame of a new value."""
     end: Template | None = None
-    """Condition for the last frame of a value; None: the first frame of the next value ends the
-    previous value."""
+    """Condition for the last frame of a value; None means that the first frame of the next value
+    ends the previous value."""
     max: int = 4096
     """Maximum number of elements or bytes of the assembled value."""
 
@@ -150,22 +150,24 @@ class ReadSpec(NamedTuple):
     fields: tuple[str, ...] = ()
     """Names of all possible fields in frame order, followed by the names in `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
-    """Conversions of the frame's fields, by field, applied before the conversions of the
-    signals."""
+    """Conversions of the frame's fields, keyed by field, applied before the signals'
+    conversions."""
     sets: Mapping[str, Template] = NOTHING
-    """Expressions over the converted fields, by signal."""
+    """Expressions using the converted fields, keyed by signal."""
     when: Template | None = None
-    """Condition over the converted fields; if false, the frame does not match. Without a condition,
+    """Condition on the converted fields; if false, the frame does not match. Without a condition,
     every frame with the fields matches."""
     lines: int | Pattern | None = None
     """Number of frames in the reply, or a pattern that only the last frame matches. The reader
     receives the frames of a reply as one text, joined by LF."""
     topic: Template | None = None
-    """Template over settings for the source topic, on transports for messages; None: any topic."""
+    """Template for the source topic, which can use settings; only on message transports. None means
+    any topic."""
     collects: Mapping[str, Collect] = NOTHING
-    """Rules for values from several frames, by signal; these signals are last in `fields`."""
+    """Rules for values assembled from several frames, keyed by signal; these signals are last in
+    `fields`."""
     head: Mapping[str, str] = NOTHING
-    """Lower-case names of HTTP response headers, or ``status``, by field."""
+    """Lower-case names of HTTP response headers, or ``status``, keyed by field."""
     listen: Mapping[str, Value] = NOTHING
     """Subscription options of `topic`, such as type, throttle in seconds and quality of service."""
 
@@ -178,7 +180,7 @@ class WriteSpec(NamedTuple):
     of several frames."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
-    """Root names that the templates use."""
+    """Top-level names that the templates use."""
     settings: frozenset[str] = frozenset()
     """Names of the settings that the templates use as ``settings.NAME``."""
 

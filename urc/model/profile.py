@@ -27,13 +27,13 @@ __all__ = [
 
 
 class Setting(NamedTuple):
-    """A value of a robot that the operator fills in on a page or sets with ``--set``."""
+    """A robot's value, which the operator fills in on a page or sets with ``--set``."""
 
     name: str
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
     title: str = ""
     default: Value = None
-    """Default value; None: the operator must enter a value before connecting."""
+    """Default value; None means that the operator must enter a value before connecting."""
     choices: tuple[str, ...] = ()
     min: float | None = None
     max: float | None = None
@@ -42,7 +42,8 @@ class Setting(NamedTuple):
     is_required: bool = True
     """Whether a setting without a default must have a value before connecting."""
     group: str = ""
-    """Title of the group on the settings page; "": the group follows from the use."""
+    """Title of the group on the settings page; "" means that the group depends on the setting's
+    use."""
 
     @property
     def empty(self) -> Value:
@@ -58,7 +59,7 @@ class Setting(NamedTuple):
 
 
 Fed = str | bytes | Envelope
-"""Test data: text in the encoding of the connection, bytes, or an envelope."""
+"""Test data: text in the connection's encoding, bytes, or an envelope."""
 
 
 def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
@@ -70,12 +71,12 @@ class ExpectedState(NamedTuple):
     """The expected state of a signal: value, alarm and age."""
 
     has_value: bool = False
-    """Whether the test compares `value`."""
+    """Whether the test checks `value`."""
     value: Value | tuple[Value, ...] = None
     alarm: Alarm | None = None
-    """Expected alarm of a signal; "": no alarm; None: any."""
+    """Expected alarm of a signal; "" means no alarm, and None means any."""
     age: Literal["", "fresh", "stale", "never"] = ""
-    """Expected age of a signal: fresh, stale or never received; "": any."""
+    """Expected age of a signal: fresh, stale or never received; "" means any."""
 
 
 Expected = Value | tuple[Value, ...] | ExpectedState
@@ -92,7 +93,7 @@ class DialogueStep(NamedTuple):
     source: str = ""
     """Source line of the step in the document, for error messages."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Input from the robot, by transport."""
+    """Input from the robot, keyed by transport."""
     run: str = ""
     """Name of the command to run."""
     arguments: Mapping[str, Reading] = NOTHING
@@ -103,14 +104,14 @@ class DialogueStep(NamedTuple):
     closes: str = ""
     """Name of the transport that the robot disconnects."""
     leaves: bool = False
-    """Whether the operator disconnects: all connections close in an orderly way."""
+    """Whether the operator disconnects, which closes all connections in an orderly way."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Expected output of URC since the previous check, by transport; (): no output."""
+    """URC's expected output since the previous check, keyed by transport; () means no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
     """Expected reply values of the oldest completed command that no step has checked."""
     of: str = ""
-    """Name of the command that `reply` or `fails` refers to; "": any command."""
+    """Name of the command that `reply` or `fails` refers to; "" means any command."""
     fails: str = ""
     """Expected failure message."""
     closed: str = ""
@@ -124,19 +125,19 @@ class DocumentTest(NamedTuple):
     line: int
     """Line of the test in the document, 1-based."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Input from the robot, by transport, in one piece or several; see `pieces_of`."""
+    """Input from the robot, keyed by transport, in one or more pieces; see `pieces_of`."""
     reply_to: int | str | None = None
-    """Index of the poll or name of the command that waits for the reply."""
+    """Index of the poll, or name of the command, that is waiting for the reply."""
     run: str | None = None
     """Command to run."""
     arguments: Mapping[str, Reading] = NOTHING
     expect: Mapping[str, Expected] = NOTHING
-    """Expected values after the test, by signal."""
+    """Expected values after the test, keyed by signal."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Expected output, by transport: the exact payload without framing, or all bytes on the
+    """Expected output, keyed by transport: the exact payload without framing, or all bytes on the
     wire."""
     fails: str | None = None
-    """Expected failure message; None: the test expects success."""
+    """Expected failure message; None means that the test expects success."""
     file: str = ""
     """Path of the document file."""
     column: int = 1
@@ -144,7 +145,7 @@ class DocumentTest(NamedTuple):
     source: str = ""
     """Source line of the test in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
-    """Values of settings that differ from their defaults, by setting."""
+    """Setting values that differ from their defaults, keyed by setting."""
     steps: tuple[DialogueStep, ...] = ()
     """Steps of the test in order; () for a test without steps."""
     polls: tuple[str, ...] = ()
@@ -159,15 +160,15 @@ class Reaction(NamedTuple):
     after_s: float = 0.0
     """Delay after the previous reaction, in seconds."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """New values, or templates for new values, by signal or state variable."""
+    """New values, or templates for new values, keyed by signal or state variable."""
     answers: bool = False
     """Whether the robot sends the declared reply to the request."""
     send: WriteSpec | None = None
-    """Frame to send; None: no frame."""
+    """Frame to send; None means no frame."""
     message: str = ""
-    """Name of the message to send; "": no message."""
+    """Name of the message to send; "" means no message."""
     framing: FramingSpec | None = None
-    """Framing of `send`; None: the framing of the request's reply, or of the connection."""
+    """Framing of `send`; None means the framing of the request's reply, or of the connection."""
     closes: bool = False
     """Whether the robot closes the connection in this reaction."""
 
@@ -177,17 +178,17 @@ class SimulatorRule(NamedTuple):
 
     transport: str
     match: Pattern | ReadSpec | None = None
-    """Text pattern or form for the received frames; None: the rule does not match frames by
-    content."""
+    """Text pattern or form for the received frames; None means that the rule does not match frames
+    by content."""
     request: str = ""
     """Name of a command or poll; the rule matches the requests of the command or poll."""
     every_s: float | None = None
-    """Period of a timed rule, in seconds; None: the rule is not timed."""
+    """Period of a timed rule, in seconds; None means that the rule is not timed."""
     when: Template | None = None
     """Condition for the rule; the rule is inactive while the condition is false."""
     reactions: tuple[Reaction, ...] = (Reaction(),)
     name: str = ""
-    """Name by which other documents can override the rule; "": no name."""
+    """Name by which other documents can override the rule; "" means no name."""
 
 
 class Profile(NamedTuple):
@@ -200,19 +201,21 @@ class Profile(NamedTuple):
     settings: Mapping[str, Setting] = NOTHING
     driver: Driver = Driver()
     slots: Mapping[str, WidgetUse] = NOTHING
-    """Widgets of the driver, by slot, which an interface may override."""
+    """The driver's widgets, keyed by slot; an interface can override them."""
     interfaces: Mapping[str, Interface] = NOTHING
-    """Interfaces by name; never empty, because the loader adds a missing interface ``default``."""
+    """Interfaces by name; never empty, because the loader adds the interface ``default`` if it is
+    missing."""
     widgets: Mapping[str, Widget] = NOTHING
     """All widgets of the profile, by name."""
     tests: tuple[DocumentTest, ...] = ()
     simulator: tuple[SimulatorRule, ...] = ()
     emulated: Mapping[str, Reading] = NOTHING
-    """Initial values of the emulated robot, by signal or state variable."""
+    """Initial values of the emulated robot, keyed by signal or state variable."""
     world: WorldSpec | None = None
-    """Body and surroundings of the emulated robot; None: no world."""
+    """Body and surroundings of the emulated robot; None means no world."""
     licence: str = ""
     """SPDX licence identifier from the document."""
     author: str = ""
     tags: tuple[str, ...] = ()
-    """Groups of the robot, for rights that are granted for a tag; at most 16, all different."""
+    """Tags that put the robot into groups, for which rights can be granted; at most 16, all
+    different."""

@@ -1,4 +1,4 @@
-"""Roles of people, devices and programs, which define rights for a robot.
+"""Roles of people, devices and programs, which define their rights for a robot.
 
 Layer 2. Each role includes the rights of the previous roles.
 """
@@ -9,8 +9,8 @@ __all__ = ["ROLES", "Role", "includes"]
 
 Role = Literal["watch", "drive", "maintain", "administer"]
 """The role ``watch`` may read all values and press STOP. The role ``drive`` may also send commands,
-drive and reset STOP. The role ``maintain`` may also change settings and packages, and take the
-controls by force. The role ``administer`` may also manage people, devices and tokens."""
+drive and reset STOP. The role ``maintain`` may also change settings and packages, and take control
+by force. The role ``administer`` may also manage people, devices and tokens."""
 ROLES: Final[tuple[Role, ...]] = ("watch", "drive", "maintain", "administer")
 """All roles, in order of increasing rights."""
 _RANK: Final = {role: rank for rank, role in enumerate(ROLES)}

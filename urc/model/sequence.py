@@ -1,6 +1,6 @@
 """Steps of a sequence: one class for each kind of step, and the union type `Step`.
 
-Other modules import this module as `sequence` if they handle every kind of step.
+Modules that handle every kind of step import this module as `sequence`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ MAX_STEPS = 200
 MAX_STEPS_DONE = 10_000
 """Maximum number of steps in one run, counting every round of every ``repeat``."""
 MAX_STEP_S = 600.0
-"""Maximum duration of the wait in one step, in seconds."""
+"""Maximum wait in one step, in seconds."""
 
 
 class SendStep(NamedTuple):
@@ -56,13 +56,14 @@ class ExpectStep(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     faults: tuple[ErrorReply, ...] = ()
     timeout_s: float | None = None
-    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
+    """Reply timeout, in seconds; None means the transport's ``timeouts.reply``."""
     otherwise: "tuple[Step, ...] | None" = None
-    """Steps to run after a timeout; None: the sequence fails."""
+    """Steps to run after a timeout; None means that the sequence fails."""
     text: str = ""
-    """Error message after a timeout; "": a generated message."""
+    """Error message after a timeout; "" means a generated message."""
     framing: FramingSpec | None = None
-    """Framing of the connection during the wait; None: the framing that the transport declares."""
+    """Framing of the connection during the wait; None means the framing declared by the
+    transport."""
 
 
 class PromptStep(NamedTuple):
@@ -85,7 +86,7 @@ class UntilStep(NamedTuple):
     """Wait until a condition is true."""
 
     condition: Template
-    """Condition over fresh signals, settings and the fields from earlier steps."""
+    """Condition on fresh signals, settings and the fields from earlier steps."""
     timeout_s: float
     otherwise: "tuple[Step, ...] | None" = None
     text: str = ""
@@ -98,9 +99,9 @@ class RepeatStep(NamedTuple):
     times: int
     """Maximum number of rounds."""
     until: Template | None = None
-    """Condition that ends the loop, evaluated after each round; None: all rounds run."""
+    """Condition that ends the loop, evaluated after each round; None means that all rounds run."""
     otherwise: "tuple[Step, ...] | None" = None
-    """Steps to run if `until` is false after the last round; None: the sequence fails."""
+    """Steps to run if `until` is false after the last round; None means that the sequence fails."""
     text: str = ""
 
 

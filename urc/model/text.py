@@ -16,7 +16,7 @@ class PatternField(NamedTuple):
     """Name of the field; "" for a skipped field."""
     kind: FieldKind
     width: int = 0
-    """Fixed width of the field in characters; 0: variable width."""
+    """Fixed width of the field in characters; 0 means variable width."""
 
 
 JsonPath = tuple[str | int, ...]
@@ -40,4 +40,4 @@ class XmlPath(NamedTuple):
     steps: tuple[XmlStep, ...]
     """Elements on the path, from the root."""
     attribute: str = ""
-    """Name of an attribute of the last element; "": the text of the element."""
+    """Name of an attribute of the last element; "" means the element's text."""

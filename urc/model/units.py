@@ -1,7 +1,7 @@
 """Units by quantity, and the conversion of values between them. Pure.
 
-The table of units contains only units that occur in robot documents. Unit symbols follow UCUM,
-unless the UCUM symbol is uncommon. A value in an unknown unit converts only to the same unit.
+The unit table contains only units that occur in robot documents. Unit symbols follow UCUM, unless
+the UCUM symbol is uncommon. A value in an unknown unit can be converted only to the same unit.
 """
 
 import math
@@ -117,7 +117,7 @@ _KIND_OF: Final = {symbol: kind for kind, units in _KINDS.items() for symbol in 
 def conversion(have: str, want: str) -> Scale | None:
     """Return the conversion from unit `have` to unit `want`; None for incompatible units.
 
-    Two equal symbols are always compatible, even for an unknown unit.
+    Two identical symbols are always compatible, even for an unknown unit.
     """
     if have == want:
         return Scale(1)
@@ -129,7 +129,7 @@ def conversion(have: str, want: str) -> Scale | None:
 
 
 def are_apart(one: str, other: str) -> bool:
-    """Return whether equal numbers in the two units certainly represent different values.
+    """Return whether equal numbers in the two units definitely represent different values.
 
     If a unit is missing, the result is False.
     """

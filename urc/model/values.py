@@ -1,9 +1,9 @@
 """Signals (named, typed values of a robot) and their samples.
 
-All values in `urc.model` are named tuples. Named tuples are as immutable and typed as frozen
-dataclasses. Compared to a dataclass, a named tuple takes a tenth of the time to define, and a third
-of the time to construct. The definition time matters at every start of the command line, and the
-construction time at every sample.
+All values in `urc.model` are named tuples. Named tuples are immutable and typed, like frozen
+dataclasses. Compared to a dataclass, a named tuple takes a tenth of the time to define and a third
+of the time to construct. The definition time affects every start of the command line; the
+construction time affects every sample.
 """
 
 from collections.abc import Mapping
@@ -31,21 +31,21 @@ __all__ = [
 ]
 
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
-"""Immutable empty mapping, the default of every mapping attribute."""
+"""Immutable empty mapping, the default for every mapping attribute."""
 
 ElementType = Literal["integer", "number", "boolean", "string"]
 """Element types of an array, named as in JSON Schema."""
 SignalType = Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
 """Signal types: a single value, an array of one type, a mapping, or bytes."""
 Value = bool | int | float | str | None
-"""A plain value; None: the robot reports "not available"."""
+"""A plain value; None means that the robot reports "not available"."""
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
 """Value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
-"""Axis convention of a value; "": not declared."""
+"""Axis convention of a value; "" means not declared."""
 Alarm = Literal["", "lolo", "low", "high", "hihi", "minor", "major"]
-"""Alarm limit that a value has crossed, or severity of an alarm state, both named as in EPICS; "":
-no alarm."""
+"""Alarm limit that a value has crossed, or severity of an alarm state, both named as in EPICS; ""
+means no alarm."""
 AlarmPriority = Literal["low", "medium", "high"]
 """Priority of an alarm, as in ISA-18.2."""
 
@@ -59,7 +59,7 @@ class AlarmAttributes(NamedTuple):
     action: str = ""
     """Operator action."""
     suppressed_when: Template | None = None
-    """Expression over signals; the alarm is suppressed by design while it is true."""
+    """Expression using signals; while the expression is true, the alarm is suppressed by design."""
 
 
 class AlarmLimits(NamedTuple):
@@ -74,7 +74,7 @@ class AlarmLimits(NamedTuple):
     for_s: float = 0.0
     """On-delay: minimum time beyond a limit before the alarm begins, in seconds."""
     off_delay_s: float = 0.0
-    """Minimum time of normal values before the alarm ends, in seconds."""
+    """Minimum time that the value must be normal before the alarm ends, in seconds."""
     states: tuple[str, ...] = ()
     """Values that cause an alarm, as text; a boolean is ``true`` or ``false``."""
     attributes: tuple[tuple[str, AlarmAttributes], ...] = ()
@@ -98,7 +98,7 @@ class AlarmLimits(NamedTuple):
 
 
 def state_texts(value: Reading) -> tuple[str, ...]:
-    """Return a value, or each element of an array, as the text that alarm states compare."""
+    """Return a value, or each element of an array, as text to compare with alarm states."""
     if isinstance(value, bool):
         return ("true" if value else "false",)
     if isinstance(value, str):
@@ -111,19 +111,20 @@ def state_texts(value: Reading) -> tuple[str, ...]:
 
 
 class Conversion(NamedTuple):
-    """The conversion from a raw field to a value, step by step in the order of the attributes."""
+    """The conversion of a raw field to a value. The steps run in the order of the attributes."""
 
     base: int = 0
-    """Base of whole numbers in text, 2 to 36; 0: text is not converted."""
+    """Base of whole numbers in text, 2 to 36; 0 means that text is not converted."""
     not_available: tuple[Value, ...] = ()
     """Raw values that mean "not available"."""
     polynomial: tuple[float, ...] = ()
-    """Coefficients c0, c1, c2 … of the polynomial c0 + c1·raw + c2·raw² …; (): no polynomial."""
+    """Coefficients c0, c1, c2 … of the polynomial c0 + c1·raw + c2·raw² …; () means no
+    polynomial."""
     points: tuple[tuple[float, float], ...] = ()
     """Interpolation table of (raw, value) pairs with increasing raw values, linear between points
     and clamped outside the table."""
     states: tuple[tuple[str, str], ...] = ()
-    """Pairs of a raw text and the corresponding word."""
+    """Pairs of raw text and the corresponding word."""
 
 
 PLAIN = Conversion()
@@ -144,7 +145,7 @@ class Signal(NamedTuple):
     precision: int | None = None
     """Number of digits after the decimal point."""
     states: tuple[tuple[str, str], ...] = ()
-    """Pairs of a raw text and its displayed word, for enumerated signals."""
+    """Pairs of raw text and its displayed word, for enumerated signals."""
     limits: AlarmLimits = AlarmLimits()
     stale_after_s: float = 0.0
     """Age in seconds after which a sample is stale; greater than 0 in a loaded driver."""
@@ -158,10 +159,10 @@ class Signal(NamedTuple):
     axes: Axes = ""
     """Axis convention of the value."""
     formula: Template | None = None
-    """Formula over other signals; None: the signal is set by frames."""
+    """Formula using other signals; None means that frames set the signal."""
     deadband: float = 0.0
     """Dead band in `unit`: smaller changes are not reported. An array is reported when any element
-    changes by the dead band or more."""
+    changes by at least the dead band."""
     debounce_s: float = 0.0
     """Debounce time in seconds: a new value is reported only after this time."""
 

@@ -9,8 +9,8 @@ from urc.model.values import NOTHING
 __all__ = ["Footprint", "WidgetPort", "Widget"]
 
 Footprint = Literal["value", "button", "stick", "lever", "instrument", "view", "list"]
-"""Size class of a widget in front of a background. A lever is a slider, an instrument a round
-display, a view a camera or map, and a list has lines."""
+"""Size class of a widget in front of a background. A lever is a slider, an instrument is a round
+display, a view is a camera or map, and a list contains lines."""
 
 
 class WidgetPort(NamedTuple):
@@ -18,30 +18,32 @@ class WidgetPort(NamedTuple):
 
     name: str
     types: tuple[str, ...] = ("number",)
-    """Signal types accepted by an input, or value types of an output; (): any type."""
+    """Signal types accepted by an input, or value types of an output; () means any type."""
     unit: str = ""
-    """Required unit of an input or output; "": any unit."""
+    """Required unit of an input or output; "" means any unit."""
     quantity: str = ""
-    """For an input: required quantity, in any unit and without conversion; "": any quantity."""
+    """For an input: required quantity, in any unit and without conversion; "" means any
+    quantity."""
     unit_of: str = ""
-    """Name of another input or output that must have the same unit; "": no such port."""
+    """Name of another input or output that must have the same unit, or ""."""
     is_required: bool = True
     description: str = ""
     is_held: bool = False
-    """For an output: whether the output is a hold-to-run control. A hold-to-run output takes only
+    """For an output: whether the output is a hold-to-run control. A hold-to-run output accepts only
     motion commands."""
     arguments: tuple[str, ...] = ()
     """For an output: names of the values; hold-to-run values range from -1 to 1."""
     items: tuple[str, ...] = ()
-    """For an array input: accepted element types; (): any type."""
+    """For an array input: accepted element types; () means any type."""
     size: int | None = None
-    """For an array input: required number of elements; None: any number."""
+    """For an array input: required number of elements; None means any number."""
     is_multiple: bool = False
-    """For an input: whether the input takes a list of signals, all of an accepted type."""
+    """For an input: whether the input accepts a list of signals, each of an accepted type."""
     keeps_all: bool = False
     """For an input: whether the widget receives every sample, not only the newest."""
     replaces: tuple[str, ...] = ()
-    """For an input: inputs and options of the same widget that a bound input replaces."""
+    """For an input: inputs and options of the same widget that the input replaces when it is
+    bound."""
 
 
 class Widget(NamedTuple):

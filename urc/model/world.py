@@ -53,7 +53,7 @@ BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "climb": ("quadrotor",),
     "hover": ("quadrotor",),
 }
-"""Body types that support a key, by key; a key that is not listed applies to all body types."""
+"""Body types that support each key; an unlisted key applies to all body types."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -131,7 +131,7 @@ class BodySpec(NamedTuple):
     turn_acceleration: float = 6.0
     """Maximum angular acceleration, in rad/s²; for `ackermann`, the steering rate in rad/s."""
     track: float | None = None
-    """Distance between the left and right wheels, in metres; None: 1.6 times the radius."""
+    """Distance between the left and right wheels, in metres; None means 1.6 times the radius."""
     slip: float = 0.15
     """Fraction of a turn that the robot loses because its tracks slip."""
     roughness: float = 0.01
@@ -212,7 +212,7 @@ class Failsafe(NamedTuple):
     without: tuple[str, ...]
     """Commands that reset the fail-safe timer."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """New values of state variables, by variable; if empty, the body stops."""
+    """New values of state variables, keyed by variable; if empty, the body stops."""
 
 
 class WorldSpec(NamedTuple):
@@ -220,12 +220,12 @@ class WorldSpec(NamedTuple):
 
     body: BodySpec = BodySpec()
     drive: Mapping[str, Template | float | bool] = NOTHING
-    """Expressions for the inputs of the body, by input."""
+    """Expressions for the body's inputs, keyed by input."""
     senses: Mapping[str, Template] = NOTHING
-    """Expressions for sensor values, by signal."""
+    """Expressions for sensor values, keyed by signal."""
     failsafe: Failsafe | None = None
     map: PlanSpec | None = None
-    """Surroundings of the robot; None: the default room."""
+    """Surroundings of the robot; None means the default room."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Initial x and y of the robot, in metres, and its initial direction, in radians."""
     datum: tuple[float, float, float] = (46.5191, 6.5668, 400.0)

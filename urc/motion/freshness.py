@@ -1,9 +1,9 @@
-"""Freshness checks for control inputs that do not rely on the clock of the browser.
+"""Freshness checks for control inputs, independent of the browser's clock.
 
-The server sends numbered heartbeats to every page. Each input carries the number of the newest
-heartbeat that its page has received, the epoch of its lease, and a sequence number. The server can
+The server sends numbered heartbeats to every page. Each input contains the number of the newest
+heartbeat that its page has received, its lease epoch, and a sequence number. The server can
 therefore refuse inputs that were buffered, recorded and replayed, or sent under an earlier lease.
-Clocks of different machines are never compared.
+The clocks of different machines are never compared.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ class ControlInput(NamedTuple):
     epoch: int
     """Epoch of the lease under which the input was sent."""
     number: int
-    """Number of the tick, which grows with every tick of this page."""
+    """Number of the tick, which increases with every tick from this page."""
     echo: int
     """Number of the newest heartbeat that the page has received from the server."""
 
@@ -31,7 +31,7 @@ class Freshness:
     """The heartbeats sent to one page, and the page's newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
-        """Create a check without heartbeats.
+        """Create a check that has issued no heartbeats.
 
         Args:
             first: number of the first heartbeat. An unpredictable number invalidates inputs that
@@ -43,19 +43,19 @@ class Freshness:
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a new heartbeat, which the caller sends to the page now."""
+        """Return the number of a new heartbeat, for the caller to send to the page immediately."""
         self._number += 1
         self._issued.append(now)
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return the reason to refuse an input; store the number of a valid input and return "".
+        """Return the reason to refuse an input; for a valid input, store its number and return "".
 
         Args:
             given: the numbers sent with the input.
-            epoch: epoch of the present lease.
+            epoch: epoch of the current lease.
             now: the time.
-            of: the control. Sequence numbers are independent for each control.
+            of: the control. Sequence numbers are checked separately for each control.
         """
         if given.epoch != epoch:
             return f"the input belongs to lease {given.epoch}, but the present lease is {epoch}"
@@ -75,8 +75,9 @@ class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.
 
     Only the first copy of a message takes effect. A page's numbers only increase, and each
-    connection keeps their order. A message with a lower or equal number is therefore a copy or
-    outdated. A delayed tick must not move a control that was released over the other connection.
+    connection preserves their order. A message with a lower or equal number is therefore a copy or
+    outdated. A delayed tick must not reactivate a control that was released over the other
+    connection.
     """
 
     def __init__(self) -> None:

@@ -1,15 +1,14 @@
 """One hold-to-run control: its frames during motion, and its stop.
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
-while *ticks of sampled input* arrive. Each tick renews a short lease and replaces a value that was
-not written yet. Only the newest value is sent; values are never queued. The stop frame is sent
-before all other data when the lease expires, the control is released, or a stop is requested. The
-stop frame was rendered when the control was armed. After the stop, nothing is sent, because
-repeated stop frames would override other sources of motion.
+while *ticks of sampled input* arrive. Each tick renews a short lease and replaces any unsent value.
+Only the newest value is sent; values are never queued. The stop frame is sent before all other data
+when the lease expires, the control is released, or a stop is requested. The stop frame is already
+rendered when the control is armed. After the stop, nothing is sent, because repeated stop frames
+would override other sources of motion.
 
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
-are then refused. The operator must release the control and press again, which arms the control
-again.
+are refused. The operator must release the control and press it again to rearm it.
 
 If the connection is lost while the robot may be moving, the control owes a stop. The owed stop is
 the first frame on the restored connection. All other unsent values are dropped.
@@ -26,9 +25,9 @@ SHORTEST_LEASE_S: Final = 0.1
 LEASE_S: Final = 0.25
 LONGEST_LEASE_S: Final = 1.0
 STOP_EVERY_S: Final = 0.05
-"""Period of a repeated stop on lossy connections, in seconds."""
+"""Interval between repeated stops on lossy connections, in seconds."""
 STOP_FOR_S: Final = 0.5
-"""Time for which a stop is repeated, in seconds."""
+"""Duration of the repeated stops, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 
@@ -43,9 +42,9 @@ class HoldTerms(NamedTuple):
     """Complete frame that stops the motion. Empty for a robot that moves in steps, because each
     step ends without a stop frame."""
     period_s: float
-    """Minimum time between two writes on average, in seconds."""
+    """Minimum average time between two writes, in seconds."""
     lease_s: float = LEASE_S
-    """Time for which motion continues after the last tick, 0.1 to 1.0 seconds."""
+    """Time that motion continues after the last tick, 0.1 to 1.0 seconds."""
     is_lossy: bool = False
     """Whether the transport may lose frames, such as datagrams; if so, the stop is repeated."""
     stops: tuple[Numbered, ...] = ()
@@ -97,7 +96,7 @@ class HoldToRun:
 
     @property
     def deadline(self) -> float | None:
-        """Latest time for the next call of `due`; None while idle."""
+        """Latest time to call `due` next; None while idle."""
         if self.state == "moving":
             if self._waiting is None:
                 return self._expires_at
@@ -105,7 +104,7 @@ class HoldToRun:
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
-        """Replace the terms. A pending stop and the state of the rate limit stay unchanged.
+        """Replace the terms, but keep a pending stop. A new period resets the rate limiter.
 
         Raises:
             ValueError: as above.
@@ -122,11 +121,11 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        Without `data`, the tick renews the lease but stores no value, because the value of the
-        input cannot be sent.
+        Without `data`, the tick renews the lease but drops any unsent value, because the new input
+        value cannot be sent.
 
         Returns:
-            Whether the tick was accepted. If the result is False, the control must be armed again.
+            Whether the tick was accepted. If not, the control must be rearmed.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)  # a tick after the lease belongs to no motion
@@ -144,7 +143,7 @@ class HoldToRun:
     def stop(self, reason: Reason, now: float) -> None:
         """Stop.
 
-        A release has no effect on a control that is not moving; other stops always take effect.
+        A release has no effect unless the control is moving. Other stops always take effect.
         """
         if reason == "released" and self.state != "moving":
             return  # nothing moves, and an idle control is silent
@@ -188,7 +187,7 @@ class HoldToRun:
         """Record the loss of the connection: drop the unsent value, and owe a stop if needed.
 
         Args:
-            is_doubtful: whether the loss of the connection may have lost a written stop.
+            is_doubtful: whether a written stop may have been lost with the connection.
         """
         if self.state != "idle" or is_doubtful:
             self.owes_stop = True

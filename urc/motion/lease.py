@@ -1,10 +1,10 @@
 """The lease of one robot: the exclusive right of one operator to drive the robot.
 
-Theory of operation. At most one operator holds the lease. Every change of the holder and every stop
-first send a stop to the robot, and increase the epoch of the lease. Inputs with an older epoch are
-refused, so that no motion continues by mistake. A holder without input for `SILENT_S` loses the
-lease. STOP needs no lease and is latched: nothing moves until an operator resets the latch. A reset
-never starts motion.
+Theory of operation. At most one operator holds the lease. Every change of holder and every stop
+first sends a stop to the robot and increments the lease's epoch. Inputs with an older epoch are
+refused, so that no motion continues by mistake. A holder who sends no input for `SILENT_S` seconds
+loses the lease. STOP requires no lease and latches: the robot does not move until an operator
+resets the latch. A reset never starts motion.
 """
 
 from typing import Final, NamedTuple
@@ -30,15 +30,15 @@ class Operator(NamedTuple):
     name: str = ""
     """Name shown to other operators."""
     role: Role | None = "drive"
-    """Role at the last look; None without any right."""
+    """Role at the last check; None without any rights."""
     who: str = ""
     """Name of the person, device or program; "" without a sign-in."""
     principal: str = ""
     """Identifier of the person, device or program; "" without a sign-in."""
     person: str = ""
-    """Identifier of the person: the owner of a device, or else the principal; "" if unknown."""
+    """Identifier of the person: a device's owner, otherwise the principal; "" if unknown."""
     way: str = ""
-    """How the sign-in began, such as ``passkey``."""
+    """Sign-in method, such as ``passkey``."""
     place: str = ""
     """Network address; "" for this machine."""
     kind: str = ""
@@ -75,28 +75,28 @@ class LeaseRefused(NamedTuple):
     """A refusal to change the lease."""
 
     message: str
-    """Reason to display, with the name of the holder if the holder blocks the change."""
+    """Reason to display, including the holder's name if the holder blocks the change."""
 
 
 class Lease:
     """The lease of one robot."""
 
     def __init__(self, state: LeaseState | None = None) -> None:
-        """Restore a lease stored before a restart: keep the latch, drop the holder."""
+        """Restore a lease stored before a restart: keep the latch and drop the holder."""
         kept = state or LeaseState()
         self.state = LeaseState(kept.epoch + 1, latched_by=kept.latched_by, stops=kept.stops)
         self._touched_at = 0.0
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next change by `expire`; None if no change is pending."""
+        """Time at which `expire` next changes the lease; None if no change is pending."""
         if self.state.holder is None:
             return None
         silent_at = self._touched_at + SILENT_S
         return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
 
     def refusal(self, client: str, epoch: int) -> str:
-        """Return the reason to refuse motion of `client`, or ""."""
+        """Return the reason to refuse motion requested by `client`, or ""."""
         state = self.state
         if state.latched_by:
             return self.latched
@@ -115,7 +115,7 @@ class Lease:
         operator's lease prevents autonomous motion.
 
         Args:
-            client: the operator who gives the command.
+            client: the operator who issues the command.
             stops: number of stops when the command was requested; None for a request made now.
         """
         state = self.state
@@ -131,12 +131,12 @@ class Lease:
 
     @property
     def latched(self) -> str:
-        """Message about the latched stop, or "" without a latch."""
+        """Message about the latched stop, or "" if no stop is latched."""
         by = self.state.latched_by
         return f"Stopped by {by}. Reset to drive again." if by else ""
 
     def touch(self, now: float) -> None:
-        """Record an input of the holder, which renews the lease."""
+        """Record an input from the holder, which renews the lease."""
         self._touched_at = now
 
     def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
@@ -153,7 +153,7 @@ class Lease:
     def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
-        """Ask the holder for the lease; grant the lease after `for_s` seconds without an answer."""
+        """Ask the holder for the lease; without an answer, it is granted after `for_s` seconds."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
@@ -166,7 +166,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def answer(self, client: str, now: float, *, is_granted: bool) -> LeaseChanged | LeaseRefused:
-        """Hand over the lease or keep the lease, according to the holder's answer."""
+        """Hand over or keep the lease, according to the holder's answer."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
             return LeaseRefused("No screen asks you for control")
@@ -184,7 +184,7 @@ class Lease:
         return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
-        """Remove a client as holder or asker; return None for any other client."""
+        """Remove a client as holder or requester; return None for any other client."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)
@@ -195,7 +195,7 @@ class Lease:
         return None
 
     def stop(self, by: str) -> LeaseChanged:
-        """Stop and latch. A stop is never refused."""
+        """Stop the robot and latch the stop. A stop is never refused."""
         state = self.state
         by = state.latched_by or by
         self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
@@ -214,7 +214,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def expire(self, now: float) -> LeaseChanged | None:
-        """Apply timeouts: grant the lease to the asker, or withdraw a silent holder's lease."""
+        """Apply timeouts: grant the lease to the requester, or withdraw a silent holder's lease."""
         state = self.state
         if state.holder is None:
             return None
@@ -230,7 +230,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=True)
 
     def _next(self, holder: Operator | None = None, latched_by: str = "") -> LeaseState:
-        """Return a lease state with the next epoch and without an asker."""
+        """Return a lease state with the next epoch and without a requester."""
         return LeaseState(
             self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
         )

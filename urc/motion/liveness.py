@@ -1,8 +1,8 @@
 """The liveness of the program at the other end of a connection, judged by received bytes.
 
-The kernel of a frozen program still acknowledges bytes, although the program does not read the
-bytes. Acknowledgements therefore do not prove liveness. The guard instead sends probes, and
-measures the time until each reply.
+When a program freezes, the kernel still acknowledges bytes that the program never reads.
+Acknowledgements therefore do not prove liveness. Instead, the guard sends probes and measures the
+time until each reply.
 """
 
 from math import inf

@@ -1,9 +1,9 @@
 """A rate limiter that never delays values that arrive at the permitted rate.
 
 The limiter implements the generic cell rate algorithm (ITU-T I.371, annex A) with a tolerance of
-one period. Values that arrive at the permitted rate, with network jitter, pass immediately. In any
-second, the number of passed values is at most one above the permitted number. A fixed minimum
-interval would instead delay every second value.
+one period. Values that arrive at the permitted rate pass immediately, despite network jitter. In
+any second, at most one value more than the permitted number passes. A fixed minimum interval would
+instead delay every second value.
 """
 
 from typing import Final
@@ -23,7 +23,7 @@ class RateLimiter:
             raise ValueError(f"the period must be greater than 0 s, not {period_s:g}")
         self._period_s = period_s
         self._early_s = 0.0 if is_strict else period_s
-        """Maximum time by which a value may pass before its nominal time, in seconds."""
+        """Maximum time that a value may pass ahead of its nominal time, in seconds."""
         self._due = float("-inf")
         """Nominal time of the next value."""
 

@@ -1,8 +1,8 @@
-"""A slew rate limit for held commands, which limits acceleration and never limits braking.
+"""A slew rate limit for held commands that limits acceleration but never braking.
 
 Distances are measured from rest, the value at which the robot stands still. A change towards rest
-is applied immediately. A change away from rest is limited. A change from one side of rest to the
-other reaches rest immediately, and is limited only after rest.
+is applied immediately. A change away from rest is limited. A change across rest reaches rest
+immediately, and only the part beyond rest is limited.
 """
 
 import math
@@ -18,7 +18,7 @@ _LONGEST_S: Final = 1.0
 
 
 class SlewRateLimiter:
-    """The slew rate limits of one held command, and its present distance from rest."""
+    """The slew rate limits of one held command, and its current distance from rest."""
 
     __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
 
@@ -36,7 +36,7 @@ class SlewRateLimiter:
         self._rest = {name: rest.get(name) for name in per_s}
         self._first_s = first_s
         self._reached: dict[str, tuple[float, ...]] = {}
-        """Present distance of each array element from rest, by argument."""
+        """Current distance of each array element from rest, keyed by argument."""
         self._last_s: float | None = None
 
     def reset(self) -> None:
@@ -47,7 +47,7 @@ class SlewRateLimiter:
     def limit(self, values: Mapping[str, Reading], now: float) -> dict[str, Reading]:
         """Return `values`, each limited to its maximum distance from rest at the time `now`.
 
-        Values that are not numbers stay unchanged, because the argument check refuses them later.
+        Non-numeric values stay unchanged, because the argument check refuses them later.
         """
         last_s, self._last_s = self._last_s, now
         passed_s = self._first_s if last_s is None else min(max(0.0, now - last_s), _LONGEST_S)
@@ -88,7 +88,7 @@ def _grown(wanted: float, was: float, room: float) -> float:
 
 
 def _written(wanted: float, rest: float, far: float) -> float:
-    """Return the value at the distance `far` from rest; without a limit, return `wanted`."""
+    """Return `wanted`, or the value at the distance `far` from rest if `wanted` is farther away."""
     if abs(wanted - rest) <= abs(far):
         return wanted
     return int(rest) + math.trunc(far) if isinstance(wanted, int) else rest + far

@@ -1,8 +1,8 @@
 """Detection of stalled connections by the age of the oldest unsent byte.
 
 The system reports only the number of unsent bytes. Each write increases the number of unsent bytes.
-Each acknowledgement decreases the number, beginning with the oldest bytes. The write time of the
-oldest unsent byte can therefore be computed from earlier numbers of unsent bytes. A large number of
+Each acknowledgement decreases the number, starting with the oldest bytes. The write time of the
+oldest unsent byte can therefore be computed from earlier counts of unsent bytes. A large number of
 unsent bytes does not prove a stall, because a busy connection may always have unsent bytes.
 """
 
@@ -26,14 +26,14 @@ SHORTEST_CUT_S: Final = 0.2
 STOP_WITHIN_S: Final = 0.1
 """Maximum time from the end of a network interruption to the stop, in seconds."""
 TICK_S: Final = 0.05
-"""Period of the ticks of a held control, in seconds. The first write after the beginning of an
-interruption may be delayed by one tick."""
+"""Period of the ticks of a held control, in seconds. The first write after an interruption begins
+may be delayed by one tick."""
 AFRESH_S: Final = 0.03
 """Time to reset and reopen a nearby connection and write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
 """Age of unsent bytes at which a connection counts as stalled, in seconds. A stalled connection is
-reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte that was written
-one tick after the beginning of the shortest interruption reaches this age just in time."""
+reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte written one tick
+after the start of the shortest interruption reaches this age just in time."""
 WAITED_S: Final = 1.0
 """Age of unsent bytes at which a connection that is slow to open counts as stalled, in seconds."""
 IN_FLIGHT_S: Final = 0.15
@@ -67,7 +67,7 @@ class StallWatch:
     def saw(self, unsent: int, now: float) -> bool:
         """Record the number of unsent bytes; return whether the connection is stalled.
 
-        Call this method right before each write, and regularly between writes.
+        Call this method immediately before each write, and regularly between writes.
         """
         if not unsent:
             self.reset()
@@ -96,7 +96,7 @@ class StallWatch:
         self._written = self._taken = 0
 
     def reset(self) -> None:
-        """Reset the watch to a connection without unsent bytes."""
+        """Reset the watch to the state without unsent bytes."""
         self._marks.clear()
         self._written = self._taken = 0
 

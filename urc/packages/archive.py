@@ -1,6 +1,6 @@
 """The archive format: reproducible ZIP files without compression.
 
-Entries are stored without compression, sorted by path and dated 1980. The same files therefore
+Entries are stored without compression, sorted by path, with dates in 1980. The same files therefore
 produce the same bytes on every machine, regardless of zlib. No entry can be larger than its
 archive. Archives that differ from this form are rejected. The module `zipfile` only parses
 archives, and never extracts them.
@@ -178,7 +178,7 @@ def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
     entries, size, start = struct.unpack("<HII", end[10:20])
     if entries > limits.entries:
         raise PackageError(f"{name}: expected at most {limits.entries} entries, found {entries}")
-    # `zipfile` reads the whole directory, even if it has more entries than its end declares.
+    # `zipfile` reads the whole directory, even if the end record declares fewer entries.
     if start + size + _END_BYTES != len(data) or size > limits.entries * 1024:
         raise PackageError(
             f"{name}: the archive is damaged or truncated: its sizes are inconsistent"
@@ -240,7 +240,7 @@ def _written(files: Mapping[str, bytes]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=False) as archive:
         for path in sorted(files):
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # always Unix, which defines the meaning of the mode
+            entry.create_system = 3  # always Unix, as the mode bits require
             entry.external_attr = _MODE << 16
             archive.writestr(entry, files[path])
     return buffer.getvalue()

@@ -19,7 +19,7 @@ _POLL_S: Final = 0.05
 
 
 def put_file(file: Path, data: bytes, work: Path) -> None:
-    """Write a file atomically: after a power failure, its content is either old or new.
+    """Write a file atomically: a power failure leaves either the old or the new content.
 
     Args:
         file: path of the file; missing folders are created.
@@ -33,7 +33,7 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)
     name = work / f"{token_hex(8)}.new"
-    # Not `mkstemp`: the web server of another user must be able to read a repository.
+    # `mkstemp` is not used, because another user's web server must be able to read a repository.
     number = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         try:
@@ -83,7 +83,7 @@ def discard(path: Path, work: Path) -> None:
         work.mkdir(parents=True, exist_ok=True)
         gone = Path(mkdtemp(dir=work))
         os.replace(path, gone / "gone")
-    except OSError:  # a full disk has no room for a new name
+    except OSError:  # a full disk may have no space for the new name
         gone = path
     shutil.rmtree(gone, ignore_errors=True)
 
@@ -147,7 +147,7 @@ def _write_all(number: int, data: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Sync a folder, so that its file names are permanent.
+    """Sync a folder, so that its file names survive a power failure.
 
     Windows does not support or need this step.
     """

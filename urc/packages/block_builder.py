@@ -18,7 +18,7 @@ __all__ = ["block", "export_blocks", "unblock"]
 def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
     """Add an entry to the block list of a repository, and sign the index; return the index.
 
-    An entry with the same subject is replaced.
+    The new entry replaces an entry with the same subject.
 
     Args:
         folder: folder of the repository.
@@ -35,7 +35,7 @@ def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Ind
     """Withdraw an entry of the block list, and sign the index; return the index.
 
     Raises:
-        PackageError: as `block`, or no entry has this subject.
+        PackageError: as for `block`, or no entry has this subject.
     """
     return _change(folder, index_signer, subject, ())
 
@@ -67,7 +67,7 @@ def _change(
                 listed = ", ".join(one.subject for one in old.blocks) or "nothing"
                 raise PackageError(f"{subject} is not blocked; blocked: {listed}")
             data = msgspec.json.encode(BlockList(old.id, (*others, *new)))
-            try:  # a list that clients cannot read would protect nobody
+            try:  # an unreadable list would not protect clients
                 msgspec.json.decode(data, type=BlockList)
             except msgspec.DecodeError as error:
                 raise PackageError(f"{subject}: {error}") from None

@@ -1,7 +1,8 @@
-"""The known block lists on this machine, in ``blocks.json`` in the folder of the packages.
+"""The known block lists on this machine, in ``blocks.json`` in the packages folder.
 
-A list stays known while its repository is unreachable, expired or removed. An entry therefore acts
-until the package is removed, or a newer list of the same maintainer lacks the entry.
+A list stays known while its repository is unreachable, expired or removed. An entry therefore
+applies until the package is removed, or until a newer list from the same maintainer omits the
+entry.
 """
 
 from collections.abc import Iterable
@@ -39,11 +40,11 @@ class KnownBlocks(msgspec.Struct, frozen=True):
     """A block list with its maintainer and origin."""
 
     by: str
-    """Name of the maintainer. Only the key confirms the name."""
+    """Name of the maintainer, which is confirmed only by the key."""
     key: str
     """Public key of the maintainer, 32 bytes in base64."""
     number: int
-    """Number of the index with the list."""
+    """Number of the index that contains the list."""
     listed: BlockList
     place: str
     """URL of the repository, or path of the imported file."""
@@ -63,13 +64,13 @@ class BlockStore:
     """The block lists of all maintainers whose keys the user trusts."""
 
     def __init__(self, folder: Path) -> None:
-        """Initialize without reading the file; `folder` is the folder of the packages."""
+        """Initialize without reading the file; `folder` is the packages folder."""
         self._folder = folder
         self._file = folder / "blocks.json"
         self._read: tuple[object, tuple[KnownBlocks, ...]] = (None, ())
 
     def stamp(self) -> object:
-        """Return a value that changes with the file; None without a file."""
+        """Return a value that changes whenever the file changes; None for a missing file."""
         try:
             found = self._file.stat()
         except OSError:
@@ -90,7 +91,7 @@ class BlockStore:
 
         Args:
             by: holder of the trusted key that signed the list.
-            number: number of the index with the list.
+            number: number of the index that contains the list.
             listed: the list.
             place: URL of the repository, or path of the file.
 
@@ -115,7 +116,7 @@ class BlockStore:
             self._write([*others, new])
 
     def forget(self, key: str) -> None:
-        """Delete all lists of the key with this fingerprint; raise `PackageError`."""
+        """Delete all lists signed with the key `key`; raise `PackageError` without such a list."""
         with self._changing():
             left = [one for one in self.all() if fingerprint(one.key) != key]
             if len(left) == len(self.all()):
@@ -124,14 +125,14 @@ class BlockStore:
             self._write(left)
 
     def lines(self, lock: Lock, signature_of: SignatureOf) -> list[str]:
-        """Return one line for each blocked package of a lock, with maintainer and reason.
+        """Return one line for each blocked package in a lock, with the maintainer and the reason.
 
         Args:
             lock: lock of an installed or planned package.
             signature_of: function that returns the signature of an archive by its digest.
 
         Raises:
-            PackageError: the file of the lists is damaged.
+            PackageError: the file with the block lists is damaged.
         """
         known = self.all()
         if not known:

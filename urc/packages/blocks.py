@@ -1,6 +1,6 @@
-"""The block list of a repository: packages that must not be used, although they are installed.
+"""The block list of a repository: packages that must not be used, even if they are installed.
 
-A maintainer signs the list, as a part of the index or in a file for machines without a network.
+A maintainer signs the list, either in the index or in a file for machines without a network.
 """
 
 from typing import Annotated, Final
@@ -25,7 +25,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
     """One entry: a package with a range of versions, an archive, or all packages of a signer."""
 
     why: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
-    """Reason for users, on one line."""
+    """Reason shown to users, on one line."""
     package: str = ""
     """Package, such as ``drivers/puppet``; "" for an entry about an archive or a key."""
     versions: _Text = "*"
@@ -33,7 +33,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
     """Digest of the blocked archive."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A(SHA256:[A-Za-z0-9+/]{43})?\Z")] = ""
-    """Fingerprint of the key with blocked packages, for example of a stolen key."""
+    """Fingerprint of a key whose packages are all blocked, for example a stolen key."""
 
     def __post_init__(self) -> None:
         """Reject an ambiguous subject, invalid names and ranges, and hidden characters."""
@@ -47,7 +47,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def subject(self) -> str:
-        """Subject of the entry for people."""
+        """Readable subject of the entry."""
         if self.package:
             return self.package if self.versions == "*" else f"{self.package} {self.versions}"
         return f"archive {self.sha256}" if self.sha256 else f"packages signed by {self.key}"
@@ -98,7 +98,7 @@ def sign_blocks(listed: BlockList, number: int, index_signer: IndexSigner) -> Bl
 
 
 def read_block_file(data: bytes, where: str) -> BlockFile:
-    """Return a block list with a valid signature; raise `PackageError`.
+    """Return a block list with a valid signature; raise `PackageError` on failure.
 
     The caller decides whether the key of the signature is trusted.
     """

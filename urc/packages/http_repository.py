@@ -33,7 +33,7 @@ class HttpResponse(NamedTuple):
 
 
 def repository_url(text: str) -> str:
-    """Return the normalized URL of a repository; raise `PackageError`."""
+    """Return the normalized URL of a repository; raise `PackageError` if invalid."""
     try:
         url = httpx2.URL(text)
     except httpx2.InvalidURL:
@@ -46,7 +46,7 @@ def repository_url(text: str) -> str:
 
 
 def fetch_archive(url: str, entry: IndexEntry) -> bytes:
-    """Return an archive after checking its digest; raise `PackageError`."""
+    """Return an archive after checking its digest; raise `PackageError` on failure."""
     address = url + entry.file
     data = ask(address, entry.size).body
     if len(data) != entry.size or sha256(data) != entry.sha256:
@@ -123,7 +123,7 @@ async def _exchange(
     most: int,
     accepted: Container[int],
 ) -> HttpResponse:
-    # Without compression, so that the response cannot grow after the transfer.
+    # No compression, so that the response cannot grow after the transfer.
     asked = {"accept-encoding": "identity", **headers}
     timeout = httpx2.Timeout(_CHECKED_S if body else _READ_S, connect=_CONNECT_S)
     async with (

@@ -87,9 +87,9 @@ class Index(msgspec.Struct, frozen=True):
     name: _Text
     packages: tuple[IndexEntry, ...]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
-    """Number that increases with every change of the repository; 0 in unnumbered indexes."""
+    """Number that increases with every change to the repository; 0 in unnumbered indexes."""
     blocks: BlockList | msgspec.UnsetType = msgspec.UNSET
-    """Blocked packages. Clients believe only the list of a signed index."""
+    """Blocked packages. Clients trust only the list in a signed index."""
 
     @property
     def block_list(self) -> BlockList | None:
@@ -124,7 +124,7 @@ def entry_of(
 
 
 def read_index(data: bytes, where: str) -> Index:
-    """Return an index from an untrusted source; raise `PackageError`.
+    """Return an index from an untrusted source; raise `PackageError` if invalid.
 
     Versions and ranges are validated, so later code can rely on valid values.
     """
@@ -147,7 +147,7 @@ def check_entries(entries: Iterable[IndexEntry]) -> None:
     """Raise `PackageError` for an invalid version or range."""
     versions: set[str] = set()
     needs: set[tuple[str, str]] = set()
-    for entry in entries:  # thousands have equal texts, so each text is parsed once
+    for entry in entries:  # thousands of entries have equal texts, so each text is parsed once
         versions.add(entry.version)
         needs.update(entry.needs.items())
     for version in versions:

@@ -150,7 +150,7 @@ def keep(
 
 
 def notes_of(entry: IndexEntry) -> Notes:
-    """Return the notes in an index entry; raise `PackageError`."""
+    """Return the notes in an index entry; raise `PackageError` for invalid notes."""
     provenance = entry.provenance if isinstance(entry.provenance, Provenance) else None
     try:
         return Notes(entry.why_withdrawn, provenance)
@@ -167,7 +167,7 @@ def withdraw(
         folder: folder of the repository.
         key: the package.
         version: its version.
-        why: reason for users with the version installed; "" to make the version available again.
+        why: reason shown to users of the version; "" to make the version available again.
         index_signer: maintainer's signer, for a signed index.
 
     Raises:
@@ -183,7 +183,7 @@ def withdraw(
             after = msgspec.structs.replace(before, withdrawn=why or msgspec.UNSET)
             notes = _checked(notes_of(after))
             entries = [after if one is before else one for one in index.packages]
-            # The note goes first, so that an index written in between agrees with it.
+            # Write the note first, so that an index written in the meantime agrees with it.
             write_notes(folder / before.file, notes, work)
             is_signed = head is not None and head.signed is not None
             write_index(folder, index.name, entries, work, index_signer if is_signed else None)
@@ -209,7 +209,7 @@ def _checked(notes: Notes) -> Notes:
 
 
 def renew(folder: Path, index_signer: IndexSigner) -> None:
-    """Sign an index again if the signature is due for renewal; raise `PackageError`, `OSError`."""
+    """Sign an index again if its signature needs renewal; raise `PackageError` or `OSError`."""
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -262,12 +262,12 @@ def _blocks(folder: Path) -> BlockList | msgspec.UnsetType:
 
 
 def _before(folder: Path) -> tuple[Index | None, int]:
-    """Return the current index and its number; None instead of a damaged index."""
+    """Return the current index and its number; a damaged index becomes None."""
     data = _content(folder / INDEX, INDEX_BYTES + 1)
     with suppress(PackageError):
         if data is not None:
             index = read_index(data, INDEX)
-            # A number identifies exact bytes, so an index in other bytes gets a new number.
+            # A number identifies the exact bytes of an index, so different bytes need a new number.
             return (index if data == index.to_bytes() else None), index.number
     head = head_in(folder)
     return None, head.number if head is not None else 0
@@ -366,7 +366,7 @@ def _entry(folder: Path, file: Path, known: Mapping[str, IndexEntry]) -> IndexEn
 
 
 def read_signature(archive: Path) -> Signature | None:
-    """Return the signature of an archive, or None if unsigned; raise `PackageError`."""
+    """Return an archive's signature, or None; raise `PackageError` for a damaged signature."""
     file = archive.with_suffix(_SIGNED)
     try:
         with open(file, "rb") as opened:

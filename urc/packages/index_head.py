@@ -83,7 +83,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def read_head(data: bytes, where: str) -> IndexHead:
-    """Return a head from an untrusted source; raise `PackageError`."""
+    """Return a head from an untrusted source; raise `PackageError` if invalid."""
     try:
         return msgspec.json.decode(data, type=IndexHead)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

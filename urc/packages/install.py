@@ -77,7 +77,7 @@ def plan_file(
     """
     root = source.roots[0]
     own = merged([source], complain)
-    # The exact version, because a pre-release in a user's own file must be accepted.
+    # Require the exact version, so that a pre-release in a user's own file is accepted.
     version = own[root][0][0].version
     try:
         plan = plan_root(root, version, own, store)
@@ -131,7 +131,7 @@ def plan_root(
 
 
 def settle(root: PackageId, wanted: str, found: Found) -> dict[PackageId, IndexEntry]:
-    """Return the resolved versions without downloading archives; raise `PackageError`."""
+    """Return the resolved versions without downloads; raise `PackageError` on failure."""
     return resolve(root, wanted, {key: [entry for entry, _ in some] for key, some in found.items()})
 
 

@@ -80,7 +80,7 @@ def lock_of(root: PackageId, chosen: Mapping[PackageId, IndexEntry]) -> Lock:
 
 
 def read_lock(data: bytes, where: str) -> Lock:
-    """Return the lock in a file; raise `PackageError`."""
+    """Return the lock in a file; raise `PackageError` on failure."""
     try:
         return msgspec.json.decode(data, type=Lock)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:

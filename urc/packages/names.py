@@ -51,7 +51,7 @@ class PackageRequirement(NamedTuple):
 
 
 def parse_key(text: str) -> PackageId:
-    """Return the identity of a package such as ``drivers/puppet``; raise `PackageError`."""
+    """Return the identity in a text like ``drivers/puppet``; raise `PackageError` if invalid."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(
@@ -62,7 +62,7 @@ def parse_key(text: str) -> PackageId:
 
 
 def parse_requirement(text: str) -> PackageRequirement:
-    """Parse ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``; raise `PackageError`."""
+    """Parse ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``; raise `PackageError` if invalid."""
     package, at, wanted = text.partition("@")
     if "/" in package:
         key = parse_key(package)

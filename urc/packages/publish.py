@@ -32,7 +32,7 @@ class _ErrorBody(msgspec.Struct, frozen=True):
 
 
 def is_overheard(url: str) -> bool:
-    """Return whether a token sent to this URL is readable on the network."""
+    """Return whether others on the network could read a token sent to this URL."""
     parts = urlsplit(url)
     if parts.scheme == "https":
         return False

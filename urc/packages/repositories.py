@@ -23,7 +23,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""Number of attempts. A repository may change between the requests for head and index."""
+"""Number of attempts; a repository may change between the requests for head and index."""
 
 
 class _RepositoriesFile(msgspec.Struct, frozen=True):
@@ -33,7 +33,7 @@ class _RepositoriesFile(msgspec.Struct, frozen=True):
 
 class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Digest of the index that the stored ETags belong to."""
+    """Digest of the index to which the stored ETags belong."""
     index: str = ""
     """ETag of the index."""
     head: str = ""

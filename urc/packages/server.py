@@ -1,4 +1,4 @@
-"""HTTP server of a repository: its listed files, and the lists in figure B.3 of the URC thesis.
+"""HTTP server for a repository's listed files and the lists in figure B.3 of the URC thesis.
 
 Only files in the index are served. The server reads the index again after each change, so new
 packages need no restart.
@@ -72,7 +72,7 @@ class UploadService:
         except SubmissionRefused as error:
             refusal = error
         try:
-            # Read the body of refused requests too, or the client may miss the response.
+            # Also read the body of refused requests; otherwise, the client may miss the response.
             body = await _body(request, is_kept=refusal is None)
             if refusal is not None or key is None:
                 raise refusal or SubmissionRefused(404, "unknown path")
@@ -90,7 +90,7 @@ class UploadService:
         return _told(201 if taken.is_new else 200, said)
 
     async def _admitted(self, request: Request) -> PackageId:
-        """Return the package that the token may publish; raise `SubmissionRefused`."""
+        """Return the package that the token may publish; raise `SubmissionRefused` on failure."""
         scheme, _, text = request.headers.get("authorization", "").partition(" ")
         token = None
         if scheme.lower() == "bearer":
@@ -128,7 +128,7 @@ class UploadService:
         self._waiting += 1
         try:
             async with self._turn:
-                # In a thread, so that a client that disconnects cannot interrupt a change.
+                # Run in a thread, so that a disconnecting client cannot interrupt a change.
                 return await asyncio.shield(
                     asyncio.to_thread(
                         take,
@@ -165,7 +165,7 @@ async def _body(request: Request, *, is_kept: bool) -> bytes:
 
 
 def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told | None:
-    """Return the value of a header with JSON in base64, or None; raise `SubmissionRefused`."""
+    """Return a header's decoded base64 JSON, or None; raise `SubmissionRefused` if invalid."""
     text = request.headers.get(name, "")
     if not text:
         return None
@@ -183,7 +183,7 @@ def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = No
 
 _ANSWER_HEADERS: Final = {
     "x-content-type-options": "nosniff",
-    # Archives are for dashboards; opened as a page, they must not run anything.
+    # Archives are for dashboards. A browser must not run the content of an archive.
     "content-security-policy": "default-src 'none'; sandbox",
     "cache-control": "no-cache",
 }

@@ -61,7 +61,7 @@ class Signature(msgspec.Struct, frozen=True):
 
     @property
     def fingerprint(self) -> str:
-        """Fingerprint of the public key for people: ``SHA256:…``."""
+        """Readable fingerprint of the public key: ``SHA256:…``."""
         return fingerprint(self.key)
 
     def check(self, package: PackageId, version: str, sha256: str) -> None:
@@ -158,7 +158,7 @@ def new_signer(by: str, file: Path) -> Signer:
 
 
 def read_signer(file: Path) -> Signer | None:
-    """Return the key in a file, or None if the file is missing; raise `PackageError`."""
+    """Return the key in a file; None for a missing file. Raise `PackageError` on failure."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 

@@ -24,10 +24,10 @@ class Source(Protocol):
         """Name in messages."""
 
     def entries(self) -> tuple[IndexEntry, ...]:
-        """Return every version of every package; raise `PackageError`."""
+        """Return every version of every package; raise `PackageError` on failure."""
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return the archive with the digest of the entry; raise `PackageError`."""
+        """Return the archive with the digest of the entry; raise `PackageError` on failure."""
 
 
 class FileSource:
@@ -69,7 +69,7 @@ class FileSource:
 
 
 def open_source(path: Path) -> FileSource:
-    """Return the source at a path: a folder, an archive or a bundle; raise `PackageError`."""
+    """Return the folder, archive or bundle at a path; raise `PackageError` on failure."""
     if path.is_dir():
         packages = _pack_with_needs(path)
         return FileSource(str(path), packages, [packages[0].manifest.key], is_folder=True)

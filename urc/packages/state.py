@@ -61,7 +61,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next(kept, self.before, None)
 
     def without_key(self, key: PackageId) -> "StoreState":
-        """Return the state without a package's pinned key; raise `PackageError`."""
+        """Return the state without a package's pinned key; raise `PackageError` on failure."""
         if str(key) not in self.keys:
             known = ", ".join(sorted(self.keys)) or "none"
             raise PackageError(f"no key is pinned for {key}; keys are pinned for: {known}")
@@ -73,7 +73,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return msgspec.structs.replace(self, waived=tuple(sorted({*self.waived, str(key)})))
 
     def without_waiver(self, key: PackageId) -> "StoreState":
-        """Return the state that requires the signature of a package; raise `PackageError`."""
+        """Return the state that requires a package's signature; raise `PackageError` on failure."""
         if str(key) not in self.waived:
             known = ", ".join(self.waived) or "none"
             raise PackageError(f"{key} has no waiver; waivers exist for: {known}")
@@ -91,7 +91,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
 
         The state rejects different bytes of a known version, invalid signatures, and keys that
         differ from the pinned key. The state also rejects a missing signature, except for the
-        packages of `lacking`.
+        packages in `lacking`.
         """
         for name, pin in plan.lock.packages.items():
             self._check_known(name, pin)
@@ -145,7 +145,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     def _next(
         self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: InstallPlan | None
     ) -> "StoreState":
-        """Return the next state: sorted, with new keys, and without undo steps of removed locks."""
+        """Return the next state: sorted, with new keys, without undo steps of removed locks."""
         digests = {lock.digest for lock in installed}
         keys = dict(self.keys)
         if plan is not None:

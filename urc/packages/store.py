@@ -1,4 +1,4 @@
-"""The user's installed packages on this machine, usable without a network.
+"""The user's installed packages on this machine, which are usable without a network.
 
     packages/
       state.json              installed packages, one lock each, and pinned keys
@@ -57,7 +57,7 @@ class Store:
         return self.state().installed
 
     def state(self) -> StoreState:
-        """Return the state of the store; raise `PackageError`."""
+        """Return the state of the store; raise `PackageError` on failure."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)
@@ -69,7 +69,7 @@ class Store:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
 
     def previous(self, lock: Lock) -> Lock | None:
-        """Return the lock before the update to `lock`, or None without an update."""
+        """Return the lock from before the update to `lock`, or None without an update."""
         return self.state().before.get(lock.digest)
 
     def find(self, required: PackageRequirement) -> Lock | None:
@@ -95,7 +95,7 @@ class Store:
         return folder / lock.root / f"{lock.key.kind}.yaml"
 
     def blocked(self, lock: Lock) -> list[str]:
-        """Return one line for each blocked package of a lock; raise `PackageError`."""
+        """Return one line for each blocked package in a lock; raise `PackageError` on failure."""
         return self.blocks.lines(lock, self.signature)
 
     def check_use(self, lock: Lock) -> None:
@@ -207,7 +207,7 @@ class StoreTransaction:
         self._store = store
 
     def stage(self, plan: InstallPlan) -> Path:
-        """Extract the files of a plan for a preview, without installing them.
+        """Extract the files of a plan for a preview, without installing the packages.
 
         Returns:
             The folder of the files, with a subfolder for each kind: ``drivers/puppet/driver.yaml``.
@@ -250,11 +250,11 @@ class StoreTransaction:
         self._store.write_state(self._store.state().with_installed(plan))
 
     def replace(self, old: Lock, plan: InstallPlan) -> None:
-        """Replace the lock `old` by a staged plan. The method `back` can restore `old`."""
+        """Replace the lock `old` with a staged plan. The method `back` can restore `old`."""
         self._store.write_state(self._store.state().with_update(old, plan))
 
     def back(self, lock: Lock) -> Lock:
-        """Restore the lock before the update to `lock`; raise `PackageError`."""
+        """Restore the lock from before the update to `lock`; raise `PackageError` on failure."""
         state = self._store.state().with_back(lock)
         old = self._store.state().before[lock.digest]
         self._store.check_use(old)
@@ -281,7 +281,7 @@ class StoreTransaction:
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
     def forget_key(self, key: PackageId) -> None:
-        """Delete the pinned key of a package; raise `PackageError`.
+        """Delete the pinned key of a package; raise `PackageError` on failure.
 
         The next installation accepts any valid signature of the package.
         """
@@ -292,7 +292,7 @@ class StoreTransaction:
         self._store.write_state(self._store.state().with_waiver(key))
 
     def end_waiver(self, key: PackageId) -> None:
-        """Require a signature of a package again; raise `PackageError`."""
+        """Require a package's signature again; raise `PackageError` on failure."""
         self._store.write_state(self._store.state().without_waiver(key))
 
 

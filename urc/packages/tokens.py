@@ -119,7 +119,7 @@ def new_token() -> str:
 
 
 def read_token(file: Path) -> str:
-    """Return the token text in a file; raise `PackageError`."""
+    """Return the token text in a file; raise `PackageError` on failure."""
     try:
         with open(file, "rb") as opened:
             text = opened.read(1024).decode("utf-8", "replace").strip()

@@ -1,8 +1,8 @@
 """The engine: the synchronous state machine of one driver.
 
 The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport passes
-received data and the time to the engine, and executes the events that the engine returns. Live
-robots, document tests, playback and the simulator share this engine.
+received data and the time to the engine, and executes the returned events. Live robots, document
+tests, playback and the simulator share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
     events = engine.receive("wire", data, now)    # bytes were received
@@ -80,7 +80,7 @@ _PLAIN = frozenset(
 class Engine:
     """The protocol state machine of one driver.
 
-    All methods of the engine return lists of events, and are not re-entrant.
+    All engine methods return lists of events and are not re-entrant.
 
     Args:
         driver: a loaded driver, with compiled patterns and templates.
@@ -143,7 +143,7 @@ class Engine:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next `tick`; minus infinity before the first `tick`; None: no deadline."""
+        """Time of the next `tick`; minus infinity before the first one, None without a deadline."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None
@@ -163,7 +163,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay between received data or a command and any new deadline, in seconds."""
+        """Minimum delay from received data or a command to any new deadline, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
@@ -197,7 +197,7 @@ class Engine:
         return self._settle(events, now)
 
     def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
-        """Process received bytes, or a received envelope, of `transport`."""
+        """Process bytes or an envelope received on `transport`."""
         return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
@@ -225,7 +225,7 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """Stop every sequence and refuse autonomous motion; `reason` "" allows motion again.
+        """Stop every sequence and refuse autonomous motion; an empty `reason` allows motion again.
 
         Login sequences continue, because a stop can reach the robot only after the login.
         """
@@ -363,7 +363,7 @@ class Engine:
                 runner.check_conditions(now)
 
     def _advance(self, now: float) -> list[LineEvent]:
-        """Advance all sequences until every sequence waits."""
+        """Advance all sequences until every sequence is waiting."""
         pending: list[LineEvent] = []
         for runner in tuple(self._runners):
             pending += runner.advance(now)
@@ -393,7 +393,7 @@ class Engine:
         self._schedule.down(line)
 
     def _submit_polls(self, now: float) -> list[Event]:
-        """Submit the polls and keepalives that are due."""
+        """Submit all due polls and keepalives."""
         told: list[Event] = []
         for events in self._schedule.submit_due(self.run, now):
             told += self._settle(events, now)

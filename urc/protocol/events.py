@@ -1,4 +1,4 @@
-"""Input and output events of an engine: the only external interface of the engine."""
+"""Input and output events, which are the engine's only external interface."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -33,7 +33,7 @@ class Request(NamedTuple):
     confirmed_by: tuple[str, ...] = ()
     """Names of the people who have confirmed the command, including the requester."""
     on_sent: Callable[[Payload], None] | None = None
-    """Callback for each sent payload, except for secret payloads and payloads of sequences."""
+    """Callback for each sent payload, except secret payloads and sequence payloads."""
 
 
 class Open(NamedTuple):
@@ -43,12 +43,12 @@ class Open(NamedTuple):
 
 
 class Send(NamedTuple):
-    """Send framed bytes, or send an envelope."""
+    """Send framed bytes or an envelope."""
 
     transport: str
     data: Payload
     is_secret: bool = False
-    """Whether `data` contains a secret, and must not be shown or logged."""
+    """Whether `data` contains a secret, so that it must not be shown or logged."""
     counted: CountedFrame | None = None
     """The frame with its counter numbers if the guard also sends on the connection; otherwise
     None."""
@@ -59,7 +59,7 @@ class Close(NamedTuple):
 
     transport: str
     reason: str = ""
-    """Reason for a failure; "": normal end of a per-request connection."""
+    """Reason for a failure; "" means the normal end of a per-request connection."""
 
 
 class Ready(NamedTuple):
@@ -69,7 +69,7 @@ class Ready(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Samples of frames that arrived together, in order and including computed signals."""
+    """Samples from frames that arrived together, in order, including computed signals."""
 
     transport: str
     """Name of the transport; "" for an alarm that began without a frame."""
@@ -97,7 +97,7 @@ class Failed(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """A protocol violation by the robot, which is counted and shown but is not an exception."""
+    """A protocol violation by the robot, which is counted and shown without an exception."""
 
     transport: str
     code: str
@@ -107,7 +107,7 @@ class Violation(NamedTuple):
 
 
 class NumbersUsed(NamedTuple):
-    """The counters of this connection have advanced, so rendered stops may be outdated.
+    """This connection's counters have advanced, so stops rendered earlier may be outdated.
 
     `NumbersUsed` occurs only on connections that share counters with motion
     (`MotionEncoder.share`).

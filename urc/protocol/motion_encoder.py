@@ -1,8 +1,8 @@
-"""Frames of motion: setpoints and stops of held commands.
+"""Motion frames: setpoints and stops of held commands.
 
-Pure. Frames of motion bypass the request queue of the connection. The owner of the transport sends
-only the newest setpoint, and sends a stop before any other frame. Setpoints must meet all
-requirements of the command.
+Pure. Motion frames bypass the connection's request queue. The owner of the transport sends only the
+newest setpoint, and sends a stop before any other frame. Setpoints must meet all requirements of
+the command.
 """
 
 from collections.abc import Callable, Container, Mapping
@@ -26,13 +26,13 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Number of spare counter numbers for other frames, before the stops must be rendered again."""
+"""Number of counter numbers that other frames can use before the stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion is currently not possible; the message states the reason."""
+    """Motion is currently impossible; the message states the reason."""
 
 
 class _Way:
@@ -58,7 +58,7 @@ class MotionEncoder:
         lines: Mapping[str, Conversation],
         known: SignalState,
     ) -> None:
-        """Initialise the encoder with mappings of the engine, which are shared and not copied."""
+        """Initialise the encoder with the engine's mappings, which are shared, not copied."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
         self._ways = {
             name: _Way(one, checks[name], asks[name], lines[one.transport])
@@ -68,11 +68,12 @@ class MotionEncoder:
         self._lines = lines
         self._known = known
         self._counting: dict[str, int] = {}
-        """Number of held commands with counters, by connection."""
+        """Number of held commands with counters, for each connection."""
         self._made: dict[str, Made] = {}
-        """Cached stop frames, by command."""
+        """Cached stop frames, keyed by command."""
         self._lengths: dict[str, int] = {}
-        """Number of stops to render in advance for each held command, by shared connection."""
+        """Number of stops to render in advance for each held command, keyed by shared
+        connection."""
         for one, command in self._held.items():
             line = command.transport
             lines[line].has_motion = True
@@ -82,7 +83,7 @@ class MotionEncoder:
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
-        """Share the counters with the sender of motion, which must confirm the transmitted numbers.
+        """Share the counters with the sender of motion frames, which must confirm the sent numbers.
 
         Args:
             repeating: connections on which every stop is sent several times, because frames may be
@@ -99,7 +100,7 @@ class MotionEncoder:
 
         Args:
             line: name of the connection.
-            stand: last transmitted number, by counter.
+            stand: last transmitted number of each counter.
             is_settled: whether all frames from the engine have been transmitted.
         """
         if line in self._lengths:
@@ -120,7 +121,7 @@ class MotionEncoder:
     def has_stops(self, command: str) -> bool:
         """Return whether the rendered stops of `command` are still valid.
 
-        Stops are valid while at least half of the spare numbers are left. Rendered stops are always
+        Stops are valid while at least half of the spare numbers remain. Rendered stops are always
         outdated if they depend on values other than arguments and counters.
         """
         made, line = self._made.get(command), self._found(command).transport
@@ -129,16 +130,16 @@ class MotionEncoder:
         return self._lines[line].counters.is_near(made, _SPARE_STOPS // 2)
 
     def is_ready(self, command: str) -> bool:
-        """Return whether the connection of `command` is open and its login complete."""
+        """Return whether the connection of `command` is open and its login is complete."""
         line = self._lines[self._found(command).transport]
         return line.is_open and line.is_ready
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
         """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
 
-        Rendering a stop needs no connection. A stop with a counter is a series with one frame for
-        each possible next number. The series is long enough for the stops of all held commands of
-        the connection. The stop is empty for a robot that ends each motion step itself.
+        Rendering a stop requires no connection. A stop with a counter is a series with one frame
+        for each possible next number. The series is long enough for the stops of all held commands
+        on the connection. The stop is empty for a robot that ends each motion step itself.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -165,10 +166,10 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...] = (),
     ) -> Payload | CountedFrame:
-        """Return the frame of `command` with `arguments`, ready for sending.
+        """Return the frame of `command` with `arguments`, ready to send.
 
-        In half duplex, the result is empty while a reply is pending: this setpoint is skipped, and
-        the next setpoint is sent instead.
+        In half-duplex mode, the result is empty while a reply is pending. This setpoint is skipped,
+        and the next setpoint is sent instead.
 
         On a shared connection, the frame's counter numbers are provisional until `set_counters`
         confirms them after the transmission.
@@ -176,7 +177,7 @@ class MotionEncoder:
         Args:
             command: name of a held command.
             arguments: values by name; missing arguments have their default values.
-            now: current time in seconds, for requirements over fresh signals.
+            now: current time in seconds, for requirements on fresh signals.
             confirmed_by: names of the people who have confirmed the command, for the two-person
                 rule.
 
@@ -219,7 +220,7 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...],
     ) -> Numbered | None:
-        """Render a frame of motion again after another frame has used its numbers."""
+        """Render a motion frame again after another frame has used its numbers."""
         try:
             made = self.motion_frame(command, arguments, now, confirmed_by)
         except UrcError:

@@ -51,7 +51,7 @@ class PollState:
         self.due = None
 
     def submit_if_due(self, now: float) -> list[LineEvent]:
-        """Submit the request if due, unless the previous request is still pending."""
+        """Submit the request if it is due, unless the previous request is still pending."""
         if self.due is None or self.due > now:
             return []
         every_s = self.poll.every_s
@@ -214,7 +214,7 @@ class PollSchedule:
             poll.stop()
 
     def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit the due requests one by one, and yield the events of each request."""
+        """Submit the due requests one at a time, and yield the events of each."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.submit_if_due(now)

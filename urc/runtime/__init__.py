@@ -1,1 +1,1 @@
-"""Running robots: links, newest values, sessions."""
+"""The operation of robots: links, newest values and sessions."""

@@ -1,8 +1,9 @@
 """The writer of the alarm file.
 
-Layer 4. `AlarmStore.save` puts records and events into memory and returns; a thread of its own
-writes them, one transaction per batch. Of each alarm only the newest record waits, so the records
-are bounded by the signals of the robots. If too many events wait, the oldest are lost and counted.
+Layer 4. `AlarmStore.save` queues records and events in memory and returns. A separate thread writes
+them, with one transaction per batch. The queue contains only the newest record of each alarm, so
+its size is limited by the number of signals. If too many events are waiting, the oldest events are
+dropped and counted.
 """
 
 import logging
@@ -44,17 +45,17 @@ class AlarmStore:
     """A writer of one alarm file, for all robots of a server."""
 
     def __init__(self, file: Path, *, most_events: int = MOST_EVENTS) -> None:
-        """Prepare; the thread starts with the first change.
+        """Prepare the writer; the thread starts with the first change.
 
         Args:
             file: path of the file.
-            most_events: number of newest events that the history keeps.
+            most_events: number of newest events to keep in the history.
         """
         self.file = file
         self.fault = ""
         """Reason why alarms currently cannot be stored, or ""."""
         self.lost = 0
-        """Number of events that are missing in the history, since the start."""
+        """Number of events lost from the history since the start."""
         self._most_events = most_events
         self._known: dict[str, dict[str, AlarmRecord]] | None = None
         """Newest record of each alarm, by robot and signal; None before the first `load`."""
@@ -90,7 +91,7 @@ class AlarmStore:
         records: Mapping[str, AlarmRecord | None],
         events: Iterable[AlarmEvent],
     ) -> None:
-        """Queue changed records by signal, and events, and return immediately; None: no alarm."""
+        """Queue changed records (by signal; None: no alarm) and events; return immediately."""
         with self._wakes:
             self._records |= {(robot, signal): one for signal, one in records.items()}
             if self._known is not None:
@@ -107,7 +108,7 @@ class AlarmStore:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait until everything is written; return whether it is. Never call it on the loop."""
+        """Wait for all writes; return whether they are done. Never call this on the event loop."""
         with self._wakes:
             return self._wakes.wait_for(
                 lambda: not (self._records or self._events or self._is_busy), timeout_s
@@ -131,7 +132,7 @@ class AlarmStore:
                     base = self._opened()
                 self._write(base, *batch)
                 self._report("")
-            except Exception as error:  # supervisor: the next batch is always tried
+            except Exception as error:  # supervisor: the next batch is always attempted
                 self._put_back(*batch)
                 self._report(str(error))
                 if base is not None:

@@ -1,7 +1,7 @@
 """The SQLite file of alarms: the present states of all robots' alarms, and the history.
 
-Layer 4. All functions block: servers call them in a thread. The states are JSON objects, so a newer
-version of URC may add attributes: an older one skips unknown attributes.
+Layer 4. All functions block, so servers call them in a thread. The states are JSON objects, so a
+newer version of URC can add attributes. Older versions skip unknown attributes.
 """
 
 import json
@@ -35,9 +35,9 @@ __all__ = [
 FILE: Final = "alarms.sqlite"
 """Name of the file in the data folder."""
 MOST_EVENTS: Final = 100_000
-"""Number of newest events that the history keeps."""
+"""Number of newest events to keep in the history."""
 _SPARE: Final = 1000
-"""Events beyond the limit that are deleted together."""
+"""Number of events beyond the limit that are deleted together."""
 _VERSION: Final = 1
 _LONGEST_S: Final = 5.0
 """Maximum time of one search, in seconds."""
@@ -63,7 +63,7 @@ log = logging.getLogger(__name__)
 
 
 class AlarmSearchTimeout(UrcError):
-    """A search that takes too long."""
+    """The search took too long."""
 
 
 class AlarmHistoryRow(NamedTuple):
@@ -74,15 +74,15 @@ class AlarmHistoryRow(NamedTuple):
 
 
 class AlarmQuery(NamedTuple):
-    """The events to find, of one robot."""
+    """The events to find for one robot."""
 
     robot: str
     text: str = ""
-    """Text in signal, kind, condition, value or name, regardless of the case of ASCII letters."""
+    """Text in the signal, kind, condition, value or name; case does not matter for ASCII."""
     kinds: tuple[str, ...] = ()
-    """Kinds of events; empty for all."""
+    """Kinds of events; empty for all kinds."""
     signals: tuple[str, ...] = ()
-    """Names of signals that match in addition to `text`, because their titles contain it."""
+    """Names of signals that also match, because their titles contain `text`."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")
@@ -94,10 +94,10 @@ class AlarmQuery(NamedTuple):
 
 
 def alarm_file(file: Path) -> sqlite3.Connection:
-    """Return a connection for writing; create the file, readable to its owner only.
+    """Return a connection for writing; create the file, readable only by its owner.
 
     Raises:
-        sqlite3.DatabaseError: the file is not a file of alarms.
+        sqlite3.DatabaseError: the file is not an alarm file.
         OSError: the file cannot be created.
     """
     base = open_for_writing(file)
@@ -153,7 +153,7 @@ def prune_events(base: sqlite3.Connection, most: int = MOST_EVENTS) -> None:
 
 
 def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
-    """Return the stored records of all robots with their robots; [] without a file.
+    """Return the stored records of all robots, each with its robot; [] without a file.
 
     Raises:
         OSError: the file cannot be read.
@@ -219,7 +219,7 @@ def _marks(values: Collection[str]) -> str:
 
 
 def _record(text: str) -> AlarmRecord | None:
-    """Return a stored record; None for a damaged one."""
+    """Return a stored record; None for a damaged record."""
     try:
         given = json.loads(text)
         known = {name: given[name] for name in AlarmRecord._fields if name in given}

@@ -1,4 +1,4 @@
-"""The writer of the audit log: all that matters, with person and right, in one SQLite file.
+"""The writer of the audit log, an SQLite file of motion and administration by person and right.
 
 Theory of operation. `AuditLog.add` puts an entry into a short queue and returns. The call never
 waits for a disk, because motion and STOP call `add`. A separate thread writes the queued entries
@@ -8,7 +8,7 @@ first.
 
 Each row contains a hash of itself and the previous row, so `urc.runtime.audit_check.check` detects
 a changed, removed or inserted row. The hashes do not protect against an attacker who rewrites the
-whole file; an exported copy in another place does.
+whole file. A copy exported to another place does protect against this.
 """
 
 import logging
@@ -114,7 +114,7 @@ class AuditLog:
                     base = self._opened()
                 self._write(base, batch)
                 self._well()
-            except Exception as error:  # supervisor: the next batch is always tried
+            except Exception as error:  # supervisor: the next batch is always attempted
                 self._unwell(str(error), batch)
                 if base is not None:
                     with suppress(sqlite3.Error):

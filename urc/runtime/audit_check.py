@@ -1,10 +1,10 @@
-"""The check of the audit log's hash chain, and export as JSON Lines that can be checked later.
+"""Check the audit log's hash chain, and export the log as JSON Lines that can be checked later.
 
 Layer 4. All functions block: servers call them in a thread.
 
 Each exported line has the link before its entry (``before``) and the link of the entry
-(``chain``). A line proves itself, so an export of single robots can be checked, too. Lines with
-consecutive numbers must also fit together.
+(``chain``). Each line can be checked on its own, so an export of single robots can also be checked.
+Lines with consecutive numbers must also match each other.
 """
 
 import json
@@ -23,24 +23,23 @@ from urc.runtime.sqlite_file import opened_for_reading
 __all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "exported", "line_of"]
 
 _AT_ONCE: Final = 500
-"""Number of entries of one read transaction: a slow download must not hold back the writer."""
+"""Number of entries per read transaction, so that a slow download does not delay the writer."""
 _SLICE: Final = 25
 _PAUSE_S: Final = 0.001
-"""Pause after every `_SLICE` entries, in seconds, so that an export does not delay motion, which
-another thread of the same interpreter handles."""
+"""Pause after every `_SLICE` entries, in seconds; otherwise, an export would delay motion."""
 LONGEST_LINE: Final = 100_000
-"""Maximum length of a line of an export, in characters."""
+"""Maximum length of an export line, in characters."""
 
 
 class ExportCheck(NamedTuple):
-    """The result of the check of an export."""
+    """The result of an export check."""
 
     entries: int
     """Number of checked entries."""
     fault: str
     """Message about the first fault; "" for an intact export."""
     gap: str
-    """Message about the first missing entry; exports of single robots have gaps."""
+    """Message about the first missing entry; exports of single robots have such gaps."""
     last: int = 0
     """Number of the last entry."""
     chain: str = ""
@@ -56,8 +55,9 @@ def check(file: Path) -> str:
     with opened_for_reading(file) as base:
         if base is None:
             return ""
-        # After a deletion, the chain begins with the link that the entry about the deletion keeps.
-        # Older versions kept none: then the first row may have any number, and later gaps count.
+        # After a deletion, the chain begins with the link in the entry about the deletion. Older
+        # versions stored no link. The first row may then have any number, and later gaps are
+        # reported.
         last, chain = _last_pruning(base)
         is_explained = bool(last) or is_migrated(base)
         for values in base.execute(select(base) + " ORDER BY id"):
@@ -111,7 +111,7 @@ def line_of(row: AuditRow, before: str | None) -> str:
 
 
 def check_export(lines: Iterable[str]) -> ExportCheck:
-    """Check an export without the audit log that it came from."""
+    """Check an export without its audit log."""
     count, last, chain, gap = 0, 0, "", ""
     for number, line in enumerate(lines, 1):
         try:
@@ -133,9 +133,9 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
 
 
 def compare(file: Path, export: ExportCheck) -> str:
-    """Return a message if the audit log lacks the last entry of an export, or ""; see `check`.
+    """Return a message if the audit log lacks an export's last entry, otherwise ""; see `check`.
 
-    An export in another place therefore also proves that no newer entries were cut off.
+    An export in another place therefore shows whether entries were cut off the end of the log.
 
     Raises:
         OSError: the audit log cannot be read.
@@ -169,7 +169,7 @@ def _parsed(line: str) -> tuple[AuditRow, str | None]:
 
 
 def _fault_of(row: AuditRow, before: str | None, *, is_first: bool = True) -> str:
-    """Return a message about a broken link, or ""; only before the first row, None is allowed."""
+    """Return a message about a broken link, or ""; `before` may be None only for the first row."""
     if row.version > VERSION:
         return f"entry {row.id} was written by a newer version of URC"
     if row.version < 1 or (row.version == 1 and any(row.entry[FIRST_COLUMNS:])):
@@ -195,7 +195,7 @@ def _before_first(base: sqlite3.Connection, first: int) -> str | None:
 
 
 def _last_pruning(base: sqlite3.Connection) -> tuple[int, str]:
-    """Return number and link of the last deleted entry; 0 and "" without a deletion."""
+    """Return the last deleted entry's number and link; 0 and "" without a deletion."""
     row = base.execute(
         "SELECT arguments FROM entries WHERE what = ? ORDER BY id DESC LIMIT 1", (PRUNED,)
     ).fetchone()

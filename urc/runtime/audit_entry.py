@@ -14,7 +14,7 @@ __all__ = ["AuditEntry", "COLUMNS", "FIRST_COLUMNS", "VERSION", "cleaned", "link
 VERSION: Final = 2
 """Version of the links that this version of URC writes."""
 FIRST_COLUMNS: Final = 13
-"""Number of columns that links of version 1 cover."""
+"""Number of columns covered by links of version 1."""
 _LONGEST_TEXT: Final = 1000
 
 
@@ -31,9 +31,9 @@ class AuditEntry(NamedTuple):
     """Name of the person, device or program that caused the event; without a sign-in, the page."""
     role: str = ""
     client: str = ""
-    """Identifier of the connection between the page and the server, or of a sign-in."""
+    """Identifier of the page's connection to the server, or of a sign-in."""
     epoch: int = 0
-    """Epoch of the lease at the time of the event."""
+    """Epoch of the lease at the event."""
     command: str = ""
     """Name of the command, or of the action on a person, a package or a recording."""
     arguments: str = ""
@@ -50,7 +50,7 @@ class AuditEntry(NamedTuple):
     kind: str = ""
     """Kind of the principal: ``person``, ``device``, ``program`` or ``guest``."""
     way: str = ""
-    """Way of the sign-in, such as ``passkey`` or ``token``: the right behind the event."""
+    """Sign-in method, such as ``passkey`` or ``token``."""
     place: str = ""
     """Network address of the page or program."""
 
@@ -59,21 +59,21 @@ COLUMNS: Final = AuditEntry._fields
 
 
 def link(before: str, entry: AuditEntry, version: int = VERSION) -> str:
-    """Return the link of an entry after the link `before`; "" comes before the first entry."""
+    """Return the link of an entry after the link `before`, which is "" for the first entry."""
     covered = entry if version > 1 else entry[:FIRST_COLUMNS]
     text = before + json.dumps(covered, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def shown(data: bytes, most: int = 64) -> str:
-    """Return `data` in hex; return size and hash if `data` has more than `most` bytes."""
+    """Return `data` in hex, or its size and hash if it has more than `most` bytes."""
     if len(data) <= most:
         return data.hex()
     return f"{len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}"
 
 
 def cleaned(entry: AuditEntry) -> AuditEntry:
-    """Return an entry that survives a round trip through the file: short UTF-8, finite numbers."""
+    """Return an entry that the file can store without change: short UTF-8, finite numbers."""
     return AuditEntry._make(
         _text(one) if isinstance(one, str) else _number(one) if isinstance(one, float) else one
         for one in entry._replace(at=float(entry.at), lasted_s=float(entry.lasted_s))

@@ -3,7 +3,7 @@
 Layer 4. The module is synchronous: callers pass the current time. The functions never block and
 never raise an exception, because motion code calls them. Each motion has a start entry and an end
 entry, with the first and last values of the motion. Repeated refusals are combined into one entry
-per second, with a count. The audit log therefore shows the cause of each motion, but does not grow
+per second, with a count. The audit log therefore shows the cause of each motion without growing
 with every tick.
 """
 
@@ -46,7 +46,7 @@ def _harmless(
     def taken(self: "AuditRecorder", /, *args: _P.args, **named: _P.kwargs) -> None:
         try:
             take(self, *args, **named)
-        except Exception:  # supervisor: motion and STOP must go on
+        except Exception:  # supervisor: motion and STOP must continue
             if not self.is_faulty:
                 log.exception("an event is missing in the audit log of %s", self.robot)
             self.is_faulty = True
@@ -65,7 +65,7 @@ class _Motion:
 
 
 class AuditRecorder:
-    """A writer of the audit entries of one robot."""
+    """A writer of audit entries for one robot."""
 
     def __init__(
         self,

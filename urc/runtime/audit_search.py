@@ -1,7 +1,7 @@
 """Search in the audit log.
 
-Layer 4. All functions block: servers call them in a thread. They read the file of an `AuditLog`,
-which may be writing at the same time.
+Layer 4. All functions block: servers call them in a thread. The functions read the file of an
+`AuditLog`, which may be writing at the same time.
 """
 
 import sqlite3
@@ -22,7 +22,7 @@ MOST: Final = 1000
 _LONGEST_S: Final = 5.0
 """Maximum time of one search, in seconds."""
 _STEPS: Final = 50_000
-"""Steps of SQLite between two looks at the clock."""
+"""Number of SQLite steps between two checks of the clock."""
 _TEXTS: Final = tuple(name for name in COLUMNS if AuditEntry.__annotations__[name] is str)
 
 
@@ -34,16 +34,15 @@ class AuditQuery(NamedTuple):
     """The entries to find."""
 
     robots: frozenset[str] | None = None
-    """Robots whose entries may be shown; None allows all entries, with those of the server."""
+    """Robots whose entries may be shown; None allows all entries, including the server's."""
     robot: str = ""
-    """Name of the only robot; "" for all."""
+    """Name of the only robot; "" for all robots."""
     who: str = ""
-    """Part of the name of a person, device or program, its whole identifier, or part of an
-    address."""
+    """Part of the name or address of a person, device or program, or its complete identifier."""
     what: tuple[str, ...] = ()
     """Kinds of events; empty for all."""
     text: str = ""
-    """Text in any column, regardless of the case of ASCII letters."""
+    """Text in any column; case does not matter for ASCII."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")

@@ -1,7 +1,7 @@
 """The SQLite table of the audit log: creation, migration, writing and deletion of old entries.
 
-Layer 4. A file of an older version gets the missing columns in place. Its rows keep version 1, so
-their links stay valid. A deletion of old entries is itself an entry, with the link of the last
+Layer 4. Missing columns are added to a file of an older version in place. Its rows keep version 1,
+so their links stay valid. A deletion of old entries is itself an entry, with the link of the last
 deleted entry. The chain can therefore be checked from its new beginning.
 """
 
@@ -32,7 +32,7 @@ PRUNED: Final = "pruned"
 """Kind of the entry about deleted entries."""
 FOLLOWS: Final = "SELECT id, chain FROM entries ORDER BY id DESC LIMIT 1"
 _SHARE: Final = 10
-"""Divisor for the number of rows that a full file loses: 10 deletes a tenth of the rows."""
+"""Divisor for the number of rows to delete from a full file: 10 deletes a tenth of the rows."""
 _TYPES: Final = {"at": "REAL", "epoch": "INTEGER", "times": "INTEGER", "lasted_s": "REAL"}
 _LATER: Final = (
     *(f"{name} TEXT NOT NULL DEFAULT ''" for name in COLUMNS[FIRST_COLUMNS:]),
@@ -70,14 +70,14 @@ class Retention(NamedTuple):
     most_age_s: float = 90 * 86_400.0
     """Maximum age of an entry, in seconds."""
     fewest: int = 1000
-    """Number of newest entries that are kept at any age. A clock that jumps ahead by years
-    therefore cannot delete the whole log."""
+    """Number of newest entries to keep regardless of their age. A clock that jumps ahead by years
+    therefore cannot cause the deletion of the whole log."""
     group: int = 100
-    """Minimum number of entries that are deleted for their age at once."""
+    """Minimum number of old entries to delete at once."""
 
 
 def connected(file: Path) -> sqlite3.Connection:
-    """Return a connection for writing; create or migrate the file, readable to its owner only.
+    """Return a connection for writing; create or migrate the file, readable only by its owner.
 
     Raises:
         sqlite3.DatabaseError: the file is not an audit log.
@@ -96,7 +96,7 @@ def connected(file: Path) -> sqlite3.Connection:
 
 
 def select(base: sqlite3.Connection) -> str:
-    """Return the beginning of a query for `row_of`, also for the table of an older version."""
+    """Return the beginning of a query for `row_of`, including for tables of older versions."""
     has = _columns(base)
     later = [name if name in has else f"'' AS {name}" for name in COLUMNS[FIRST_COLUMNS:]]
     version = "version" if is_migrated(base) else "1 AS version"
@@ -148,7 +148,7 @@ def _columns(base: sqlite3.Connection) -> set[str]:
 
 
 def is_migrated(base: sqlite3.Connection) -> bool:
-    """Return whether the table has the columns of this version of URC."""
+    """Return whether the table has the columns of this URC version."""
     return "version" in _columns(base)
 
 
@@ -170,14 +170,14 @@ def _migrate(base: sqlite3.Connection) -> None:
 
 
 def _explain_beginning(base: sqlite3.Connection) -> None:
-    """Record the entries that an older version deleted without an entry of its own."""
+    """Record the entries that an older version deleted without recording the deletion."""
     first, at = base.execute("SELECT min(id), max(at) FROM entries").fetchone()
     if first is not None and first > 1:
         append(base, [_pruning(first - 1, first - 1, "", at, "by an older version of URC")])
 
 
 def _young(base: sqlite3.Connection, since: float) -> int:
-    """Return the number of the first entry that is not older than `since`."""
+    """Return the number of the first entry at or after `since`."""
     found = base.execute("SELECT id FROM entries WHERE at >= ? ORDER BY id LIMIT 1", (since,))
     row = found.fetchone()
     return row[0] if row else 2**62
@@ -188,7 +188,8 @@ def _delete(base: sqlite3.Connection, until: int, now: float, reason: str) -> No
     before = base.execute(
         "SELECT id, chain FROM entries WHERE id < ? ORDER BY id DESC LIMIT 1", (until,)
     ).fetchone()
-    # In the same transaction, with the link before the new beginning: the rest proves itself.
+    # In the same transaction, with the link before the new beginning, so that the rest can be
+    # checked.
     count = base.execute("DELETE FROM entries WHERE id < ?", (until,)).rowcount
     append(base, [_pruning(count, before[0], before[1], now, reason)])
 

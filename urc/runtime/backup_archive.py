@@ -1,4 +1,4 @@
-"""The archive of a backup: one private ZIP file with the lasting content of a data folder.
+"""The archive of a backup: one private ZIP file with a data folder's permanent content.
 
 Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files of a backup. Other
 names, links and large files are refused, so a foreign archive cannot write outside the data folder.
@@ -49,7 +49,7 @@ LEFT_OUT: Final = re.compile(
     r"|simulator_host_key|audit-before-\w+\.sqlite|.*\.(?:new|broken)|.*\.sqlite-(?:wal|shm|journal)",
     re.ASCII,
 )
-"""Files that are made again, or belong to one run of a server."""
+"""Files that URC recreates, or that belong to a single run of a server."""
 MANIFEST: Final = "urc-backup.json"
 MOST_FILES: Final = 20_000
 MOST_BYTES: Final = 2_000_000_000
@@ -58,7 +58,7 @@ _MANIFEST_BYTES: Final = 4096
 _BLOCK: Final = 1 << 20
 _END_BYTES: Final = 22
 _ENTRY_BYTES: Final = 512
-"""Maximum size of one entry of the archive's directory, in bytes."""
+"""Maximum size of one entry in the archive's directory, in bytes."""
 _DAMAGE: Final = (
     zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, RuntimeError, OverflowError,
 )  # fmt: skip
@@ -68,7 +68,7 @@ _PRIVATE: Final = 0o600
 
 
 class BackupError(UrcError):
-    """A backup that cannot be written, read or restored."""
+    """The backup cannot be written, read or restored."""
 
 
 class BackupManifest(msgspec.Struct, frozen=True):
@@ -76,7 +76,7 @@ class BackupManifest(msgspec.Struct, frozen=True):
 
     format: Annotated[int, msgspec.Meta(ge=1)]
     version: Annotated[str, msgspec.Meta(max_length=100)]
-    """Version of URC that made the backup."""
+    """Version of URC that wrote the backup."""
     made_at: float
     """UTC time of the backup, in seconds since 1970."""
 
@@ -113,7 +113,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
 def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
     """Write a backup of a data folder, and return the written and the unknown files.
 
-    The archive appears complete or not at all, and is readable only to its owner.
+    The archive appears only when it is complete, and is readable only by its owner.
 
     Args:
         data: the data folder.
@@ -169,7 +169,7 @@ def _still(packages: Path) -> Iterator[None]:
 
 
 def _copy_of_base(source: Path, work: Path) -> Path:
-    """Return a consistent copy of an SQLite file that others may be writing."""
+    """Return a consistent copy of an SQLite file, even while other processes write the file."""
     copy = work / source.name
     with (
         closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as old,
@@ -201,17 +201,17 @@ def _entry(path: str, mode: int) -> zipfile.ZipInfo:
 
 
 class BackupReader:
-    """An open archive whose names and sizes are checked."""
+    """An open archive with checked names and sizes."""
 
     def __init__(self, opened: IO[bytes], name: str) -> None:
-        """Check the whole directory of the archive.
+        """Check the archive's whole directory.
 
         Args:
             opened: the archive.
             name: name of the archive, for messages.
 
         Raises:
-            BackupError: this is no backup, or not one that this version restores.
+            BackupError: the file is not a backup, or this version cannot restore it.
         """
         self._name = name
         try:
@@ -293,7 +293,7 @@ def opened_backup(file: Path) -> Iterator[BackupReader]:
     """Open a backup.
 
     Raises:
-        BackupError: the file cannot be read, or is no backup.
+        BackupError: the file cannot be read, or is not a backup.
     """
     try:
         opened = file.open("rb")
@@ -304,7 +304,7 @@ def opened_backup(file: Path) -> Iterator[BackupReader]:
 
 
 def _check_end(opened: IO[bytes], name: str) -> None:
-    """Check the size of the archive's directory, which `zipfile` reads as a whole."""
+    """Check the size of the archive's directory, because `zipfile` reads it completely."""
     size = os.fstat(opened.fileno()).st_size
     opened.seek(max(0, size - _END_BYTES))
     end = opened.read(_END_BYTES)

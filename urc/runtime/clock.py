@@ -26,7 +26,7 @@ class Clock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
-        """Call `action` at `time_s` on this clock, or immediately if `time_s` is past."""
+        """Call `action` at `time_s` on this clock, or immediately if `time_s` has passed."""
 
 
 class LoopClock:
@@ -40,8 +40,8 @@ class LoopClock:
         await asyncio.sleep(seconds)
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
-        """Call `action` at `time_s`, or immediately if `time_s` is past."""
-        # Relative to `now`, because an event loop's own clock may have another zero.
+        """Call `action` at `time_s`, or immediately if `time_s` has passed."""
+        # Relative to `now`, because an event loop's own clock may start at a different zero.
         return asyncio.get_running_loop().call_later(max(0.0, time_s - self.now()), action)
 
 

@@ -1,6 +1,6 @@
 """The failure of a command.
 
-Layer 4. A module of its own, because clients of a server need the error without the engine.
+Layer 4. The error has a separate module, because clients of a server need it without the engine.
 """
 
 from urc.problems import UrcError

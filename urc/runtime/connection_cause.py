@@ -1,7 +1,8 @@
 """The cause of a failed connection, and the next step for the operator: one table for all pages.
 
-Layer 4. Pure. Transports report errors in words of the operating system or of a library; the table
-recognises the usual ones. Pages translate a cause by its name (`core/connection_causes.js`).
+Layer 4. Pure. Transports report errors in the words of the operating system or of a library. The
+table recognises the usual errors. Pages translate a cause by its name
+(`core/connection_causes.js`).
 """
 
 import re
@@ -24,16 +25,16 @@ Cause = Literal[
     "login",
     "silent",
 ]
-"""Name of a cause; "" for an unknown one."""
+"""Name of a cause; "" for an unknown cause."""
 
 
 class _CauseRow(NamedTuple):
     cause: Cause
     words: tuple[str, ...]
-    """Words in lower case; one of them is in the error message."""
+    """Words in lower case; the error message contains at least one of them."""
     advice: str
     address: str = ""
-    """Start of the addresses to which the row applies; "": all."""
+    """Prefix of the addresses to which the row applies; "": all addresses."""
 
 
 CAUSES: Final = (
@@ -103,11 +104,11 @@ CAUSES: Final = (
         "the robot ended the connection: many robots serve only one program at a time",
     ),
 )
-"""All known causes; the first match counts."""
+"""All known causes; the first match applies."""
 
 
 _NAMES: Final = re.compile(r"'[^']*'|[^\s:]+:\d+")
-"""Quoted names and addresses with a port: ``login.local`` and port 4030 tell no cause."""
+"""Quoted names and addresses with a port, which must not be mistaken for causes."""
 
 
 def cause_of(text: str, address: str = "") -> Cause:

@@ -1,7 +1,7 @@
-"""The times at which robots were last used and last heard, stored across restarts.
+"""The times of each robot's last use and last data, stored across restarts.
 
 Layer 4. The store keeps the times in memory; `save` writes a small file and may block, so the
-server calls `save` in a thread. Losing the file loses only the order of robots on the menu.
+server calls `save` in a thread. Without the file, only the order of robots on the menu is lost.
 """
 
 import logging
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 
 class ContactTimes(NamedTuple):
-    """The last use of one robot, and its last data."""
+    """The times of a robot's last use and last data."""
 
     used_at: float | None = None
     """UTC time at which a page or program last used the robot, in seconds since 1970; None:
@@ -35,7 +35,7 @@ class ContactTimes(NamedTuple):
 
     @property
     def newest(self) -> float:
-        """The later of both times; 0 without any."""
+        """The later of both times; 0 without any contact."""
         return max(self.used_at or 0.0, self.seen_at or 0.0)
 
 
@@ -54,8 +54,7 @@ class _Stored(msgspec.Struct, frozen=True):
 class ContactStore:
     """The contact times of all robots of a server.
 
-    Emulated robots have times of their own: `key` distinguishes them from real robots of the same
-    name.
+    Emulated robots have separate times: `key` distinguishes them from real robots of the same name.
     """
 
     def __init__(self, file: Path | None = None) -> None:
@@ -74,11 +73,11 @@ class ContactStore:
         return f"emulated/{robot}" if is_emulated else robot
 
     def of(self, key: str) -> ContactTimes:
-        """Return the times of a robot; an unknown robot was never used."""
+        """Return the times of a robot; an unknown robot has no times."""
         return self._times.get(key, NO_CONTACT)
 
     def note(self, key: str, now: float, *, is_used: bool, is_seen: bool) -> None:
-        """Set the times of a robot that is used or heard now.
+        """Set the times of a robot that is now in use or sending data.
 
         Args:
             key: the result of `key`.
@@ -97,9 +96,10 @@ class ContactStore:
             del self._times[min(self._times, key=lambda each: self._times[each].newest)]
 
     def save(self) -> None:
-        """Write the file if a time has changed; a failure is logged and retried by the next call.
+        """Write the file if a time has changed; after a failure, log it and retry on the next call.
 
-        The call blocks. It is safe in another thread while the event loop notes further times.
+        The call blocks. This method can run in another thread while the event loop records further
+        times.
         """
         if self._file is None:
             return

@@ -1,7 +1,7 @@
 """Test coverage of a document: the commands, polls and messages that its tests use.
 
 Layer 4, pure. An untested command is not reported as a problem, because the author decides which
-tests are needed.
+tests are necessary.
 """
 
 from collections.abc import Iterable

@@ -1,10 +1,11 @@
-"""The restoring of a backup into a data folder, as a whole or not at all.
+"""Restore a backup into a data folder, completely or not at all.
 
-Layer 4. The files are extracted and checked in a folder of their own, ``restoring-…``. Then the old
-files move to ``replaced-…``, and the new ones take their place. An error moves the old files back.
+Layer 4. The files are extracted and checked in a separate folder, ``restoring-…``. Then the old
+files move to ``replaced-…``, and the new files replace them. After an error, the old files are
+moved back.
 
-A latched STOP stays latched. A newer list of blocked packages stays in force. A replaced audit log
-stays in the data folder under another name.
+A latched STOP stays latched. A newer block list stays in force. A replaced audit log stays in the
+data folder under another name.
 """
 
 import json
@@ -30,14 +31,14 @@ __all__ = ["check_target", "is_interrupted", "restore"]
 _LATCHES: Final = "latches"
 _PACKAGES: Final = "packages"
 _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
-"""Endings of the files that SQLite keeps next to a file."""
+"""Suffixes of the files that SQLite stores next to a database."""
 _LATCH_BYTES: Final = 4096
 _OLD: Final = "replaced-????????"
-"""Pattern of the folder of replaced files."""
+"""Pattern for the folder name of replaced files."""
 
 
 def check_target(data: Path, *, replaces: bool) -> None:
-    """Check that a backup may be restored into a data folder.
+    """Check that a backup can be restored into a data folder.
 
     Args:
         data: the data folder.
@@ -60,21 +61,21 @@ def check_target(data: Path, *, replaces: bool) -> None:
 
 
 def is_interrupted(data: Path) -> bool:
-    """Return whether a power failure ended the restoring of a backup in the middle."""
+    """Return whether a power failure interrupted the restoration of a backup."""
     return any(data.glob(_OLD))
 
 
 def restore(reader: BackupReader, data: Path, adjust: Callable[[Path], None]) -> None:
-    """Replace the content of a data folder by a backup.
+    """Replace the content of a data folder with a backup.
 
     Args:
         reader: the opened backup.
         data: the data folder, checked with `check_target`.
-        adjust: function that changes the extracted files before they take their place.
+        adjust: function that changes the extracted files before they replace the old files.
 
     Raises:
         BackupError: the backup is damaged, or a file cannot be written. The folder is unchanged,
-            except that a robot stopped in the backup is stopped now.
+        except that robots stopped in the backup are now stopped.
     """
     try:
         make_private(data)
@@ -104,7 +105,7 @@ def _folder(data: Path, purpose: str) -> Iterator[Path]:
 
 
 def _tidy(data: Path) -> None:
-    """Remove the folders of a restoring that a power failure ended; keep its audit log."""
+    """Remove the folders of a restoration that a power failure interrupted; keep its audit log."""
     for folder in data.glob(_OLD):
         _keep_audit(folder, data)
         shutil.rmtree(folder, ignore_errors=True)
@@ -123,7 +124,7 @@ def _check_base(file: Path) -> None:
 
 
 def _merge_latches(new: Path, old: Path) -> None:
-    """Let a robot that is stopped now stay stopped, and let no lease number go back."""
+    """Keep stopped robots stopped, and keep lease numbers from decreasing."""
     for kept in old.rglob("*.latch.json"):
         restored = new / kept.relative_to(old)
         now, then = _latch(kept), _latch(restored)
@@ -136,15 +137,15 @@ def _merge_latches(new: Path, old: Path) -> None:
 
 
 def _merge_blocks(new: Path, old: Path) -> None:
-    """Keep the newer one of each two lists of blocked packages."""
+    """Keep the newer version of each block list."""
     try:
         known = BlockStore(old).all()
     except PackageError:
-        known = ()  # damaged, so the list of the backup is better
+        known = ()  # damaged, so the backup's list is better
     if known:
         make_private(new)
     for one in known:
-        with suppress(PackageError):  # the list of the backup is newer
+        with suppress(PackageError):  # the backup's list is newer
             BlockStore(new).keep(one, one.number, one.listed, one.place)
 
 
@@ -160,8 +161,8 @@ def _latch(file: Path) -> dict[str, Any] | None:
 
 
 def _swap(new: Path, old: Path, data: Path) -> None:
-    """Move the parts of the data folder to `old`, and those of `new` to the data folder."""
-    # A crash or an error after this step leaves a robot stopped, never released.
+    """Move the data folder's files to `old`, and the files of `new` to the data folder."""
+    # After a crash or an error at this point, stopped robots stay stopped.
     for file in (new / _LATCHES).rglob("*.latch.json"):
         put_private(data / file.relative_to(new), file.read_bytes())
     leaving, arriving = (
@@ -191,7 +192,7 @@ def _swap(new: Path, old: Path, data: Path) -> None:
 
 
 def _keep_audit(old: Path, data: Path) -> None:
-    """Keep a replaced audit log, because entries are never deleted by a person."""
+    """Keep a replaced audit log, because no person may delete entries."""
     if (old / AUDIT_FILE).exists():
         name = f"audit-before-{time.strftime('%Y%m%dT%H%M%S')}_{secrets.token_hex(2)}.sqlite"
         for end in ("", *_SIDE_FILES):

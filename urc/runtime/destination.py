@@ -39,7 +39,7 @@ def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) 
     Args:
         profile: profile with the transports.
         package: package name, such as ``drivers/puppet``; "" for a document given by path.
-        values: value of each setting, by name of the setting.
+        values: value of each setting, by name.
     """
     empty = {name: one.empty for name, one in profile.settings.items() if not one.is_required}
     lines = [_line(spec, empty | dict(values)) for spec in profile.driver.transports.values()]

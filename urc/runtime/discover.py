@@ -1,4 +1,4 @@
-"""The topics of a rosbridge robot, and their YAML form for a document."""
+"""The topics of a rosbridge robot, and their YAML for a document."""
 
 import asyncio
 import re
@@ -36,11 +36,11 @@ class RosTopic(NamedTuple):
 
     name: str
     type: str
-    """Message type; "" if rosapi does not know the type."""
+    """Message type; "" if rosapi does not know it."""
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Query all topics from rosapi; this function opens and closes the rosbridge transport.
+    """Query rosapi for all topics; this function opens and closes the rosbridge transport.
 
     Raises:
         TransportError: the bridge or rosapi does not respond.

@@ -3,8 +3,8 @@
 Layer 4. The module uses neither I/O nor asyncio, so `urc validate` needs no robot, network or
 secret.
 
-A test runs either in one instant or step by step on a simulated clock. In a one-instant test, the
-driver sends nothing automatically. In a test with steps, the whole driver runs, except for polls
+A test runs either in a single instant or step by step on a simulated clock. In a one-instant test,
+the driver sends nothing automatically. In a test with steps, the whole driver runs, except polls
 that the test does not name.
 """
 
@@ -33,7 +33,7 @@ class TestReport(NamedTuple):
     problems: list[Problem]
     """One problem for each failed test."""
     exercised: frozenset[Exercised]
-    """Commands, polls and messages that any test has used."""
+    """Commands, polls and messages used by at least one test."""
 
 
 class _Complaint(NamedTuple):
@@ -128,7 +128,7 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
     """Return a copy of the driver with only the polls that the test names.
 
     In a one-instant test, polls are due immediately. A test without a request checks unsolicited
-    frames and the steps of connections.
+    frames and connection steps.
     """
     if test.steps:
         polls = tuple(poll for poll in driver.polls if poll.name in test.polls)
@@ -172,12 +172,12 @@ def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
             "no message or reply matches the fed data; is the end of the frame missing?"
         )
     if not checks and command is not None and not complaints:
-        complaints += check_reply(trial.ended, {}, command)  # the command only has to be done
+        complaints += check_reply(trial.ended, {}, command)  # the command only has to complete
     return complaints
 
 
 def _check_failure(trial: TestEngine, expected: str) -> list[str]:
-    """Let time pass until the declared failure; return a message if no failure occurs."""
+    """Advance the time until the declared failure; return a message if no failure occurs."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
             return []
@@ -274,12 +274,12 @@ def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return a copy of the driver with connections that need no steps and send nothing unprompted.
+    """Return a copy of the driver without connection steps or unprompted frames.
 
     Args:
         driver: the loaded driver.
-        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. For
-            byte tests, the conditions are left out, because no robot reports the required signals.
+        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. Byte
+        tests omit the conditions, because no robot reports the required signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

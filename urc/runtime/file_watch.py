@@ -1,4 +1,4 @@
-"""Detection of changed, new and deleted files by polling, without an extra package.
+"""Detect changed, new and deleted files by polling, without an additional package.
 
 Layer 4. The watch polls the path, not the open file, because editors often replace files.
 """

@@ -1,4 +1,4 @@
-"""Creation of a session's guard client from the driver's transports and held commands."""
+"""Create a session's guard client from the driver's transports and held commands."""
 
 import logging
 from collections.abc import Mapping
@@ -22,8 +22,7 @@ from urc.runtime.transport_chain import BuiltTransport, make_lines
 __all__ = ["start_guard_client"]
 
 _SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
-"""Transport types that are not reset immediately, because opening is slow or might not succeed
-again."""
+"""Transport types that are not reset immediately, because opening them is slow or may fail."""
 
 _SOONER: Final = 0.9
 

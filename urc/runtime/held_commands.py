@@ -148,7 +148,7 @@ class HeldControl:
 
 
 def control_of(driver: Driver, command: Command) -> HeldControl:
-    """Return the initial state of a held command of `driver`: at rest."""
+    """Return the initial state of one of `driver`'s held commands: at rest."""
     hold = command.hold
     assert hold is not None  # noqa: S101 - callers pass only held commands
     slew, defaults = None, {}
@@ -158,8 +158,8 @@ def control_of(driver: Driver, command: Command) -> HeldControl:
         rest = {name: one.default for name, one in command.arguments.items()} | dict(hold.release)
         slew = SlewRateLimiter(hold.slew, rest, hold.repeat_s)
     line = driver.transports[command.transport]
-    # Before its start-up steps, a robot may take a stop for a part of its login. On a half-duplex
-    # line, the stop may collide with an answer that the robot still sends.
+    # Before its start-up steps, a robot may mistake a stop for part of its login. On a half-duplex
+    # line, the stop may collide with the robot's unfinished answer.
     needs_ready_line = bool(line.on_connect) or line.is_half_duplex
     period_s = period_of(driver, command)
     return HeldControl(command.transport, hold, period_s, slew, defaults, needs_ready_line)

@@ -40,7 +40,7 @@ __all__ = [
 
 
 STREAM_KEPT: Final = 500
-"""Number of stored readings of each streamed signal."""
+"""Number of stored readings per streamed signal."""
 
 
 class SampleHistory:
@@ -49,7 +49,7 @@ class SampleHistory:
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
         self._counts: dict[str, int] = {}
-        """Total number of readings of each signal, by signal name."""
+        """Total number of readings per signal, by name."""
 
     def __bool__(self) -> bool:
         return bool(self._kept)
@@ -88,7 +88,7 @@ class SampleHistory:
 
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
-"""In the state ``idle``, no connection was requested yet. In the state ``silent``, the link is
+"""In the state ``idle``, no connection has been requested yet. In the state ``silent``, the link is
 connected, but data is overdue. In the state ``lost``, the link is not connected."""
 
 NOTES_KEPT = 500
@@ -189,7 +189,7 @@ class AuditRecord:
     """An audit log entry, as reported to taps."""
 
     time_s: float
-    """Monotonic time of the entry, in seconds, unaffected by adjustments of the time of day."""
+    """Monotonic time of the entry, in seconds, unaffected by changes to the system clock."""
     entry: "AuditEntry"
 
 
@@ -261,12 +261,12 @@ class Hub:
         """Number of sequence progress changes so far."""
         self.notes: deque[LogEntry] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
-        """Total number of log entries, including entries that the list has dropped."""
+        """Total number of log entries, including dropped entries."""
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_watchers = 0
-        """Number of readers of the traffic; traffic is recorded only if this number is above 0."""
+        """Number of traffic readers; traffic is recorded only if this number is above 0."""
         self.streams = SampleHistory()
-        """Signals for which every reading is kept; empty by default."""
+        """Signals whose readings are all kept; empty by default."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
@@ -360,7 +360,7 @@ class Hub:
         return self._redactor is not None and self._redactor.is_holding
 
     def tell_rest(self, now_s: float) -> None:
-        """Publish traffic that was held back, after a pause without further bytes."""
+        """Publish held-back traffic after a pause without further bytes."""
         if self._redactor is not None:
             for (transport, direction), data in self._redactor.rest():
                 went: Literal["sent", "received"] = "sent" if direction == "sent" else "received"
@@ -385,7 +385,7 @@ class Hub:
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
         """Return the newest readings, and every streamed reading, after `revision`; oldest first.
 
-        Streamed readings from before `joined`, the reader's first revision, are left out.
+        Streamed readings from before `joined`, the reader's first revision, are omitted.
         """
         newest = self.changed_since(revision)
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest
@@ -410,7 +410,7 @@ class Hub:
     def passed_to(self, sink: Callable[[Sequence[Sample]], None]) -> Iterator[None]:
         """Call `sink` with all samples of each frame while the context is open.
 
-        `sink` must return immediately and raise nothing.
+        `sink` must return immediately and not raise an exception.
         """
         self._sinks.append(sink)
         try:

@@ -1,7 +1,7 @@
 """A small file for the part of a lease that survives a restart: latch, epoch and pending stop.
 
-Writing can be slow, or fail on a full disk; a stop must not wait for either. A thread therefore
-writes the newest state, and failures are reported without an exception.
+Writing can be slow, or fail on a full disk; a stop must wait for neither. A thread therefore writes
+the newest state, and failures are reported without an exception.
 """
 
 import asyncio
@@ -58,7 +58,7 @@ class LatchStore:
 
         An unreadable or invalid file counts as latched with a pending stop, because the true state
         is unknown. In a valid file, a missing entry ``owed`` means that a latched stop is pending.
-        Page numbers restart at one in each run, so page names from an earlier run are marked.
+        Page numbers restart at 1 in each run, so page names from earlier runs are marked.
         """
         try:
             with self._file.open("rb") as file:

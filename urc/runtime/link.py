@@ -45,8 +45,8 @@ _CHUNK_COST = 32
 """Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the
 loop."""
 HURRY_S = 1.0
-"""Shortest interval of two attempts that operators request, in seconds. A robot that refuses is not
-flooded, however often and on however many pages they press."""
+"""Shortest interval between two attempts requested by operators, in seconds. Repeated requests,
+even from many pages, therefore do not flood a robot that refuses connections."""
 SETTLE_S = 1.0
 """Age after which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
@@ -105,7 +105,7 @@ class Link:
         self._hurried = asyncio.Event()
         """Event that ends the backoff early."""
         self._hurried_s = float("-inf")
-        """Time of the last request to try at once."""
+        """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
         """Future with the reason for the end of the connection; None without a connection."""
         self._forget_connection()
@@ -141,11 +141,11 @@ class Link:
         return self._outgoing.is_full
 
     def want_open(self) -> None:
-        """Connect as soon as the backoff permits."""
+        """Connect as soon as the backoff delay ends."""
         self._wanted.set()
 
     def reconnect(self) -> None:
-        """Try a lost connection now instead of after the backoff, at most once in `HURRY_S`."""
+        """Try to reopen a lost connection now, not after the backoff, at most once in `HURRY_S`."""
         now = self._clock.now()
         if self.is_connected or now - self._hurried_s < HURRY_S:
             return
@@ -159,8 +159,8 @@ class Link:
             self._wanted.clear()
         if self._ended is None:
             return
-        # Noted even after the end of the connection: the engine has already forgotten it and must
-        # not receive its end.
+        # Recorded even after the end of the connection, because the engine has already removed the
+        # connection and must not receive its end.
         self._close_reason = reason
         if reason:
             self._end(reason)
@@ -216,7 +216,7 @@ class Link:
         self._report.publish()
 
     async def settle(self) -> str:
-        """Wait until all sent bytes are written and, if the transport can tell, have arrived.
+        """Wait until all sent bytes are written and, if the transport can detect it, have arrived.
 
         Returns:
             A message about undelivered bytes, or "". The wait takes a few seconds at most.
@@ -248,7 +248,7 @@ class Link:
             await self._close()
 
     async def _back_off(self) -> None:
-        """Wait until the time of the next attempt, which `reconnect` brings forward."""
+        """Wait until the next attempt; `reconnect` ends the wait early."""
         await asyncio.sleep(0)
         while self._retry_s > self._clock.now():
             self._hurried.clear()
@@ -348,7 +348,7 @@ class Link:
                 self._retry_s = self._clock.now() + self._spec.backoff.initial_s
 
     def _lose(self, state: LinkState, reason: str) -> None:
-        """Count a failed attempt, and schedule the next one."""
+        """Count a failed attempt, and schedule the next attempt."""
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff
@@ -359,7 +359,7 @@ class Link:
 
     def _tell_closed(self, reason: str) -> None:
         if not self._is_persistent:
-            self._wanted.clear()  # first, because the engine may ask for a connection again at once
+            self._wanted.clear()  # first, because the engine may request a new connection at once
         self._dispatcher.closed(self._spec.name, reason)
         self.publish()
 
@@ -407,7 +407,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes now, unless they are too many or earlier bytes are waiting."""
+        """Handle received bytes now, unless there are too many or earlier bytes are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended

@@ -14,7 +14,7 @@ __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 BURST = 4
 """Number of log entries of one kind before the rate limit starts."""
 REFILL_S = 10.0
-"""Minimum interval of further log entries of one kind, in seconds."""
+"""Minimum interval between further log entries of one kind, in seconds."""
 HELD_S = 0.3
 """Maximum time to hold back data that may be the beginning of a secret, in seconds."""
 KINDS = 64
@@ -78,7 +78,7 @@ class LinkReport:
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "") -> None:
-        """Set the state. A new state is logged; a new detail is only published."""
+        """Set the state. A new state is also logged; a new detail is only published."""
         if state == self.state and detail == self._detail:
             return
         if state != self.state:
@@ -99,10 +99,10 @@ class LinkReport:
         self.faults += 1
         self._is_changed = True
         if self.state == "connecting" and self._detail:
-            # Connected without a good frame: the violation is the detail that helps most.
+            # Connected without a valid frame: the violation is the most helpful detail.
             self._detail = f"connected; {fault.message}"
         if fault.code == "no-data" and self.state != "silent":
-            return  # the following change of state says the same
+            return  # the following change of state reports the same
         self.log("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def log(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
@@ -114,7 +114,7 @@ class LinkReport:
         self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
-        """Record traffic while the hub has readers of traffic."""
+        """Record traffic while the hub has traffic readers."""
         if self._hub.traffic_watchers:
             envelope = data if isinstance(data, Envelope) else None
             shown, now = traffic_of(data), self._clock.now()

@@ -1,4 +1,4 @@
-"""A watchdog of the event loop, because a blocked loop delays all work of this process.
+"""A watchdog for the event loop, because a blocked loop delays all work of this process.
 
 If the loop is blocked, the guard stops motion when the lease runs out. The watchdog detects, counts
 and reports each delay; after a long delay, operators must start a new gesture.

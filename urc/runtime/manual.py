@@ -201,7 +201,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
-    """Return the bytes of a frame that never varies; None for a variable frame."""
+    """Return the bytes of a constant frame; None for a variable frame."""
     if command.send.names or spec is None:
         return None
     try:
@@ -253,7 +253,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Describe the frames that the server sends after a release or the loss of the operator."""
+    """Describe the server's frames after a release or after the loss of the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -353,7 +353,7 @@ def _plain(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    """Return text as Markdown code, with escaped bars, which would otherwise end the table cell."""
+    """Return text as Markdown code; escape bars, which would otherwise end the table cell."""
     clean = printable(text).replace("|", "\\|")
     if "`" in clean:
         return f"`` {clean} ``"

@@ -1,6 +1,6 @@
 """The motion controller of one robot: the lease, and the state of each held command.
 
-Theory of operation. Pages send ticks of sampled input, and release messages. For each tick, the
+Theory of operation. Pages send sampled input as ticks, and release messages. For each tick, the
 controller checks the lease of the page and the age of the tick; the engine checks the arguments.
 The controller then passes the frame to the motion backend, which owns the connection and enforces
 the time limits. The first tick of a gesture arms the control. The first tick also renders the stop
@@ -43,7 +43,7 @@ __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_loss
 Verb = str
 """A lease request: ``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
 Moved = Callable[[Operator, int, str, Mapping[str, Reading], Payload, float], None]
-"""Arguments of the callback: operator, epoch of the lease, command, arguments, frame, time."""
+"""Arguments of the callback: operator, lease epoch, command, arguments, frame, time."""
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
@@ -69,7 +69,7 @@ class MotionController:
         Args:
             driver: the driver; commands with ``hold`` become controls.
             kept: the lease state from before a restart; a latched stop stays latched.
-            is_owed: whether the last stop has not reached the robot and must be sent first.
+            is_owed: whether the last stop has not reached the robot, so it must be sent first.
         """
         self.lease = Lease(kept)
         self._frames: MotionFrames | None = None
@@ -86,8 +86,7 @@ class MotionController:
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Callback for each tick whose frame was passed to the backend; must neither block nor
-        raise."""
+        """Callback for each tick passed to the backend; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
         """Callback with the control and the message when the robot refuses to move."""
 
@@ -98,12 +97,12 @@ class MotionController:
 
     @property
     def has_own_stop(self) -> bool:
-        """Whether STOP sends anything to the robot; if false, STOP only blocks URC's commands."""
+        """Whether STOP sends frames to the robot; if false, STOP only blocks URC's commands."""
         return bool(self._holds) or bool(self._stops)
 
     @property
     def owed(self) -> list[str]:
-        """Return the stop commands that still have to be sent."""
+        """Return the stop commands that must still be sent."""
         return [name for name in self._stops if name in self._unconfirmed]
 
     def given(self, command: str) -> None:
@@ -123,12 +122,12 @@ class MotionController:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether all stop frames of the last stop were written."""
+        """Whether all frames of the last stop were written."""
         return not self._unconfirmed
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next call of `expire`, or None."""
+        """Time of the next call to `expire`, or None."""
         return self.lease.deadline
 
     # -- the robot
@@ -161,7 +160,7 @@ class MotionController:
         self._screens[client.id] = _Screen(client)
 
     def change(self, client: Operator) -> None:
-        """Replace the rights of a page; without the right to drive, its lease ends and it stops."""
+        """Replace the rights of a page; without the right to drive, its lease and motion end."""
         screen = self._screens.get(client.id)
         if screen is None:
             return
@@ -225,7 +224,7 @@ class MotionController:
         return halted
 
     def _moving(self) -> list[str]:
-        """Return the commands that had a tick after their last reported stop."""
+        """Return the commands with a tick after their last reported stop."""
         controls = self._controls.items()
         return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 
@@ -274,7 +273,7 @@ class MotionController:
         control.motion_state = "moving"
         backend.tick(command, data)
         if data == b"":
-            return ""  # it waits for a reply that the robot owes
+            return ""  # it is waiting for the robot's reply
         shown = data.numbered.data if isinstance(data, CountedFrame) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
@@ -288,7 +287,7 @@ class MotionController:
         self._close(control, why)
 
     def release(self, client: str, command: str) -> None:
-        """Handle the release of a control; only the holder of the control may release it."""
+        """Handle the release of a control; only its holder may release it."""
         holder = self.lease.state.holder
         control = self._controls.get(command)
         if control is None or holder is None or holder.id != client:
@@ -323,7 +322,7 @@ class MotionController:
         self.on_refused(command, why)
 
     def stopped(self, command: str, reason: Reason) -> None:
-        """Handle a report of the backend that the stop of a control was written."""
+        """Handle the backend's report that the stop of a control was written."""
         control = self._controls.get(command)
         if control is None:
             return

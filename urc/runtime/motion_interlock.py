@@ -1,7 +1,7 @@
-"""The interlock of programs that move a robot without the server that serves the robot.
+"""The interlock for programs that move a robot without using the robot's server.
 
-Layer 4. Motion is refused while STOP is latched, or while an operator has the controls on a server
-of this user.
+Layer 4. Motion is refused while STOP is latched, or while an operator has the controls on one of
+this user's servers.
 """
 
 import asyncio
@@ -85,7 +85,7 @@ class MotionInterlock:
             self._latched = f"STOP was latched by {by}: reset it first" if by else ""
 
     def _asked(self) -> str:
-        """Return the first reason of a server for refusing motion, or ""."""
+        """Return a server's first reason for refusing motion, or ""."""
         for file, server in servers(self._data).items():
             why = self._answer(file, server)
             if why:

@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 AGAIN_S = 1.0
-"""Delay before a STOP that has not reached the robot is sent again, in seconds."""
+"""Delay before an undelivered STOP is sent again, in seconds."""
 _STOP = Operator("", "STOP")
 OUT_OF_SCOPE = "this token does not permit the command"
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
@@ -89,14 +89,14 @@ def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
 
 
 def role_refusal(client: Operator, needed: Role) -> str:
-    """Return the reason why the role of `client` is too low for a command, or ""."""
+    """Return the reason why the role of `client` does not permit a command, or ""."""
     if includes(client.role, needed):
         return ""
     return WATCHES if needed == "drive" else f"this command needs the role {needed}"
 
 
 class OneShotCommands:
-    """The commands of one robot that need no held control."""
+    """One robot's commands that need no held control."""
 
     def __init__(
         self,
@@ -131,9 +131,9 @@ class OneShotCommands:
         arguments: Mapping[str, object] = NOTHING,
         stops: int | None = None,
     ) -> str:
-        """Return the reason why the page may not run a command or sequence now, or "".
+        """Return the reason for refusing a command or sequence to the page now, or "".
 
-        `stops` is the number of STOPs that the page knew at the operator's click; None means the
+        `stops` is the number of STOPs known to the page at the operator's click; None means the
         current number.
         """
         known = self.driver.commands.get(command)
@@ -144,7 +144,7 @@ class OneShotCommands:
         return role_refusal(client, known.role if known is not None else "drive")
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return the reason to refuse control of a sequence.
+        """Return the reason for refusing control of a sequence.
 
         Any operator may pause or end a sequence.
         """

@@ -1,7 +1,7 @@
-"""Loading of a robot's document, with local widgets and installed interfaces.
+"""Load a robot's document, with local widgets and installed interfaces.
 
-Layer 4. A driver's document names no interface. An installed driver uses the interfaces that were
-installed for the driver.
+Layer 4. A driver's document does not declare an interface. An installed driver uses the interfaces
+that were installed for the driver.
 """
 
 from os import PathLike
@@ -20,7 +20,7 @@ __all__ = ["open_document"]
 
 _DRIVER: Final = "driver.yaml"
 _MADE: Final = "default"
-"""Name of the generated interface for a document that declares none."""
+"""Name of the generated interface for a document without an interface."""
 
 
 def open_document(path: str | PathLike[str]) -> Profile:

@@ -19,7 +19,7 @@ from urc.transports.base import Prompt, Transport
 __all__ = ["MAX_QUEUED_BYTES", "STUCK_S", "OutputBuffer"]
 
 MAX_QUEUED_BYTES = 262_144
-"""Maximum size of the buffer, in bytes; beyond this limit, the connection is closed with a message.
+"""Maximum size of the buffer, in bytes; beyond it, the connection is closed with a message.
 """
 STUCK_S = 5.0
 """Time without accepted bytes after which the connection counts as stalled, in seconds."""
@@ -44,13 +44,13 @@ class _Shared(Protocol):
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
         """Send a frame with counters without waiting; return whether the frame was accepted.
 
-        `left` receives the frame that was sent.
+        `left` receives the sent frame.
         """
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
         """Send a frame with counters; wait until the frame is sent.
 
-        `left` receives the frame that was sent.
+        `left` receives the sent frame.
         """
 
 
@@ -72,7 +72,7 @@ class OutputBuffer:
         Args:
             transport: destination of the bytes.
             report: the `LinkReport` that publishes the written data as traffic.
-            hub: hub of the session, which knows whether traffic has readers.
+            hub: hub of the session, which counts the traffic readers.
             clock: source of time.
             give_up: function that ends the connection for the given reason.
             is_stream: whether bytes may be joined; if false, each piece is a datagram or a message.
@@ -173,7 +173,7 @@ class OutputBuffer:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Wake the writer to check that the kernel accepts the remaining data in time."""
+        """Make the writer check that the kernel accepts the remaining data in time."""
         self._waiting.append(_BufferedOutput(b"", b""))
         self._has_some.set()
 

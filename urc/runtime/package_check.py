@@ -1,4 +1,4 @@
-"""A check of a package's document for a repository, including the document's tests.
+"""Check a package's document for a repository, including its tests.
 
 ``python -m urc.runtime.package_check DOCUMENT`` prints the errors as a JSON list. The process
 limits its own memory and time, so that a third-party document cannot block the repository.

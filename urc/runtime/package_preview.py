@@ -31,7 +31,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
 
     Args:
         document: the document of the package.
-        folder: folder with all files of the package; references to files outside are an error.
+        folder: folder with all files of the package; references to files outside it are errors.
         widgets: names of the widgets in the package.
 
     Raises:
@@ -89,7 +89,7 @@ def _of_profile(profile: Profile) -> list[str]:
 
 
 def _of_transport(spec: TransportSpec, profile: Profile) -> str:
-    """Return the description of a connection: its type, and the source of each option."""
+    """Return a description of a connection: its type, and the source of each option."""
     options = [
         joined(" ", (name, _told(value, profile))) for name, value in sorted(spec.options.items())
     ]
@@ -137,7 +137,7 @@ _URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#
 
 
 def risks_of(profile: Profile) -> list[str]:
-    """Return the fixed names of local resources in a package, one line each; usually none."""
+    """Return the fixed names of local resources in a package, one per line; usually empty."""
     found = [
         line
         for spec in profile.driver.transports.values()
@@ -214,8 +214,8 @@ class PackagePreview(NamedTuple):
     permissions: list[str]
     """Permissions, one per line."""
     wire: Mapping[str, str]
-    """Values of all keys that affect sent bytes, the decoding of replies, or rights, by key path,
-    such as ``commands.beep.send``."""
+    """Values of all keys that affect sent bytes, the decoding of replies, or rights. They are
+    listed by key path, such as ``commands.beep.send``."""
     risks: list[str]
     """Local resources that the package uses without a setting; see `risks_of`."""
 
@@ -225,7 +225,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
 
     Args:
         document: the document of the package.
-        folder: folder with all files of the package; references to files outside are an error.
+        folder: folder with all files of the package; references to files outside it are errors.
         widgets: names of the widgets in the package.
 
     Raises:

@@ -1,4 +1,4 @@
-"""A connection test of a robot, which tries each transport once.
+"""A connection test of a robot, which opens each transport once.
 
 Layer 4. The test opens an ordinary session, so it uses the driver's logins, polls and timeouts. The
 test sends no motion. An on-demand transport that no poll uses is opened and closed once.
@@ -20,7 +20,7 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""Maximum duration of a test, in seconds, for any driver; the orderly close takes extra time."""
+"""Maximum duration of a test, in seconds, for any driver, without the orderly close."""
 _ANSWER_S: Final = 4.0
 """Time in which a connected robot must send a frame, in seconds."""
 _FIRST_S: Final = 1.0
@@ -40,13 +40,13 @@ class ProbeResult(NamedTuple):
     """Address for people."""
     verdict: Verdict
     """The result ``answers`` means that the transport is live. The result ``opens`` means a
-    connection on which the robot sends nothing, and ``fails`` means no connection."""
+    connection without data from the robot, and ``fails`` means no connection."""
     text: str
     """Description of the result, in one line."""
     advice: str
     """Advice in one line; "" for a good result."""
     cause: Cause = ""
-    """Cause of a failure; "" if it is unknown, and for a good result."""
+    """Cause of a failure; "" for an unknown cause and for a good result."""
 
 
 async def probe(
@@ -117,7 +117,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
 
 
 async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, ProbeResult]:
-    """Open and close the transports that only requests would open."""
+    """Open and close the transports that otherwise only requests open."""
     driver = session.profile.driver
     tried: dict[str, ProbeResult] = {}
     if not names:

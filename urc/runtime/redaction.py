@@ -1,4 +1,4 @@
-"""Redaction of the values of secret settings in all displayed or stored data.
+"""Redact the values of secret settings in all displayed or stored data.
 
 Layer 4, pure. The engine marks secret frames, and the link redacts these frames. For the hub, this
 module redacts other data, such as the echo of a password or a command with a token. An echo may
@@ -28,8 +28,7 @@ _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
 """Minimum length of a truncated secret to redact; shorter parts occur in many words."""
 _SHORTEST_NUMBER = 4
-"""Minimum number of digits of a secret number to redact; shorter numbers would match too many
-readings."""
+"""Minimum number of digits in a secret number to redact; shorter ones match too many readings."""
 _CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
 """Text after a truncated value: dots, a quotation mark, or the end."""
 
@@ -62,7 +61,7 @@ class Redactor:
         self._plain = tuple(dict.fromkeys(written))
         coded = [code for secret in self._plain for code in _base64(secret)]
         coded += [form.encode("utf-8", "replace") for text in texts for form in forms(text)]
-        # The longest first, because one secret may be part of another.
+        # Longest first, because one secret may be part of another secret.
         found = dict.fromkeys((*self._plain, *coded))
         self._all = tuple(sorted(found, key=len, reverse=True))
         self._long = tuple(secret for secret in self._all if len(secret) >= _SHORTEST)
@@ -168,7 +167,7 @@ class Redactor:
 
 
 def _base64(secret: bytes) -> list[bytes]:
-    """Return the forms of a secret inside base64 text, one for each byte alignment."""
+    """Return the forms of a secret inside base64 text, one per byte alignment."""
     found = []
     for shift in range(3):
         code = base64.b64encode(bytes(shift) + secret).rstrip(b"=")

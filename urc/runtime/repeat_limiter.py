@@ -1,4 +1,4 @@
-"""The limit on entries about repeated events: one entry a second for each event, with a count.
+"""Limit the entries about repeated events to one entry per second for each event, with a count.
 
 Layer 4. Pure. A token bucket limits the entries about all events together. Hostile visitors with
 many addresses therefore cannot push older entries out of the log.
@@ -24,14 +24,14 @@ class _Repeat:
 
 
 class RepeatLimiter(Generic[_Key]):
-    """Counts of events that have no entry yet."""
+    """Counts of events without an entry so far."""
 
     def __init__(self, burst: int = 16, per_s: float = 16.0) -> None:
         """Start without events.
 
         Args:
             burst: maximum number of entries at once.
-            per_s: maximum mean rate of entries, in entries per second.
+            per_s: maximum mean rate, in entries per second.
         """
         self._forgotten = 0
         self._known: dict[_Key, _Repeat] = {}
@@ -41,7 +41,7 @@ class RepeatLimiter(Generic[_Key]):
         self._filled_s: float | None = None
 
     def __len__(self) -> int:
-        """Return the number of different events that are counted."""
+        """Return the number of different events counted."""
         return len(self._known)
 
     def count(self, key: _Key, now: float) -> int:
@@ -66,7 +66,7 @@ class RepeatLimiter(Generic[_Key]):
                 yield key, count
 
     def forgotten(self, now: float | None = None) -> int:
-        """Return the number of events whose own counts were dropped, and reset the number.
+        """Return the number of events whose separate counts were dropped, and reset the number.
 
         Return 0 if no entry may be written at the time `now`; None ignores the limits.
         """
@@ -77,7 +77,7 @@ class RepeatLimiter(Generic[_Key]):
         return count
 
     def rest(self) -> Iterator[tuple[_Key, int]]:
-        """Yield each event with a count, regardless of the limits, and forget all events."""
+        """Yield each event with a count, regardless of the limits, and remove all events."""
         known, self._known = self._known, {}
         yield from ((key, one.count) for key, one in known.items() if one.count)
 

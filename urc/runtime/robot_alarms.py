@@ -1,12 +1,12 @@
-"""The alarms of one robot: judged from its hub, stored, and announced.
+"""The alarms of one robot, which are detected in its hub, stored and announced.
 
-Layer 4. Samples already carry their alarm, so a sample costs one comparison, and only a change is
-judged. The object belongs to a robot, not to a session: without a session all values are unknown,
-and the alarms stay.
+Layer 4. Each sample includes its alarm, so a sample costs one comparison, and only changes are
+processed. The object belongs to a robot, not to a session. Without a session, all values are
+unknown, and the alarms stay.
 
 While an expression `suppressed_when` is true, its alarms are suppressed by design. An expression
-with an unknown or stale value is false, except in the first seconds of a session, in which values
-arrive one by one.
+with an unknown or stale value is false, except in the first seconds of a session, while the first
+values arrive.
 """
 
 import logging
@@ -26,12 +26,11 @@ from urc.runtime.signal_sources import sources_of
 __all__ = ["CONNECTION", "AlarmMemory", "RobotAlarms"]
 
 LOOK_S: Final = 1.0
-"""Interval of the checks for old values, and of changes by the passage of time, in seconds."""
+"""Interval of the checks for old values and scheduled changes, in seconds."""
 FIRST_VALUES_S: Final = 5.0
-"""Time after the start of a session in which an alarm waits for the first values of its
-`suppressed_when`, in seconds."""
+"""Time for which an alarm waits for the first values of its `suppressed_when`, in seconds."""
 LOST_S: Final = 30.0
-"""Time after which a lost connection of a monitored robot is an alarm, in seconds."""
+"""Time after which a monitored robot's lost connection causes an alarm, in seconds."""
 CONNECTION: Final = Signal(
     "connection",
     "string",
@@ -49,7 +48,7 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""The alarm of URC itself about a monitored robot: a silent robot must not look well."""
+"""URC's own alarm about a monitored robot, so that a silent robot does not seem to be working."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 
@@ -71,7 +70,7 @@ class AlarmMemory(Protocol):
         """Store changes without waiting."""
 
     def settle(self, timeout_s: float = ...) -> bool:
-        """Wait until everything is written; called in threads."""
+        """Wait until all changes are written; called in threads."""
 
 
 class _Suppression(NamedTuple):
@@ -81,7 +80,7 @@ class _Suppression(NamedTuple):
 
 
 class RobotAlarms:
-    """The alarm list of one robot, fed by the hub of its present session."""
+    """The alarm list of one robot, with values from the hub of its present session."""
 
     def __init__(
         self,
@@ -102,7 +101,7 @@ class RobotAlarms:
             key: name of the robot in the store.
             memory: the store; None stores nothing.
             is_monitored: whether the robot stays connected for its alarms, so that a lost
-                connection is an alarm, too.
+            connection also causes an alarm.
         """
         self._clock = clock
         self._utc = utc
@@ -110,24 +109,24 @@ class RobotAlarms:
         """Name of the robot in the store."""
         self.memory = memory
         self.on_change: Callable[[], None] = _nothing
-        """Called after each change of the list, on the event loop."""
+        """Callback after each change of the list, on the event loop."""
         self.on_events: Callable[[Sequence[AlarmEvent]], None] = _nothing_of
-        """Called with new events of the history, on the event loop."""
+        """Callback with new events of the history, on the event loop."""
         self._hub: Hub | None = None
         self._names: Mapping[str, object] = NOTHING
         self._lost_s: dict[str, float] = {}
-        """Start of the loss of each transport, on `clock`; attempts to connect keep it."""
+        """Start time of each transport's loss, on `clock`; connection attempts do not change it."""
         self._began_s = 0.0
-        """Start of the session on `clock`, in seconds."""
+        """Start time of the session on `clock`, in seconds."""
         self._timer: PeriodicTimer | None = None
         self._use(driver, is_monitored=is_monitored)
         records = memory.load(key) if memory is not None else []
         self.list = AlarmList(self._limits, records)
-        """All alarms that are not normal."""
+        """All non-normal alarms."""
         self.list.adopt(self._limits, utc())
         self._stored = 0
         self.edition = 0
-        """Number of versions of the robot's document so far; causes and actions may differ."""
+        """Number of the document's versions so far; each version may change causes and actions."""
         self._finish()
 
     def _use(self, driver: Driver, *, is_monitored: bool) -> None:
@@ -143,7 +142,7 @@ class RobotAlarms:
         self._limits = _limits(declared)
         self._sources = sources_of(driver)
         self._seen: dict[str, tuple[str, str]] = dict.fromkeys(self._limits, _UNKNOWN)
-        """Alarm and condition of the last judged sample, by signal."""
+        """Alarm and condition of the last processed sample, by signal."""
         self._suppressions = tuple(_suppressions(self._limits))
         names = (one.expression.names for one in self._suppressions)
         inputs = frozenset(name for each in names for name in each) & driver.signals.keys()
@@ -151,7 +150,7 @@ class RobotAlarms:
         """Last values of the signals in the expressions."""
 
     def renew(self, driver: Driver, *, is_monitored: bool = False) -> None:
-        """Continue with another version of the robot's document."""
+        """Use another version of the robot's document."""
         self._use(driver, is_monitored=is_monitored)
         self.list.adopt(self._limits, self._utc())
         self.edition += 1
@@ -165,19 +164,19 @@ class RobotAlarms:
     # The session
 
     def start(self) -> None:
-        """Begin with changes by the passage of time; call it on the event loop."""
+        """Start scheduled changes; call this method on the event loop."""
         if self._timer is None and (self._limits or self.list.records):
             self._timer = PeriodicTimer(self._clock, LOOK_S, self._check)
 
     def stop(self) -> None:
-        """End the changes by the passage of time."""
+        """End scheduled changes."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     @contextmanager
     def attending(self, hub: Hub, names: Mapping[str, object] = NOTHING) -> Iterator[None]:
-        """Judge the samples of a session while the context is open.
+        """Process the samples of a session while the context is open.
 
         Args:
             hub: the hub of the session.
@@ -200,11 +199,12 @@ class RobotAlarms:
             self._finish()
 
     def _judge_all(self, samples: Sequence[Sample]) -> None:
-        """Judge the samples whose alarm has changed; first, evaluate the suppression."""
+        """Process the samples with a changed alarm, after an evaluation of the suppression."""
         if self._inputs:
             self._update_inputs(samples)
-        # Most samples end at this comparison, so it has no call and no name of a field. Alarms of
-        # limits have no condition here. Several alarm states can share one alarm: they are judged.
+        # Most samples end at this comparison, so it avoids calls and field names. Alarms of limits
+        # have no condition here. Several alarm states can share one alarm, so their samples are
+        # processed.
         seen = self._seen
         for sample in samples:
             before = seen.get(sample[0])
@@ -261,7 +261,7 @@ class RobotAlarms:
         try:
             return bool(expression.evaluate({**self._names, **self._inputs}))
         except ExpressionError:
-            return False  # an alarm too many does less harm than a hidden one
+            return False  # an unnecessary alarm is less harmful than a hidden alarm
 
     def _is_old(self, name: str) -> bool:
         sample = self._hub.latest(name) if self._hub is not None else None
@@ -279,7 +279,7 @@ class RobotAlarms:
         return bool(states) and not any(state in _CONNECTED for state in states)
 
     def _check(self) -> float:
-        """Handle old values, and all that is due by now."""
+        """Handle old values and all due changes."""
         if self._hub is not None:
             old = [
                 name
@@ -298,7 +298,7 @@ class RobotAlarms:
         return LOOK_S
 
     def _judge_connection(self, hub: Hub) -> None:
-        """Judge the connections: one that was lost for `LOST_S` is an alarm."""
+        """Check the connections; a connection lost for `LOST_S` causes an alarm."""
         # An idle connection is not lost: only commands open it.
         now, links = self._clock.now(), hub.links.values()
         self._lost_s = {
@@ -315,20 +315,20 @@ class RobotAlarms:
     # Operators
 
     def acknowledge(self, raised: Mapping[str, int], actor: AlarmActor) -> list[AlarmRecord]:
-        """Acknowledge alarms as the operator saw them; see `AlarmList.acknowledge`."""
+        """Acknowledge the alarms that the operator saw; see `AlarmList.acknowledge`."""
         done = self.list.acknowledge(raised, actor, self._utc())
         self._finish()
         return done
 
     def shelve(self, signals: Iterable[str], for_s: float, actor: AlarmActor) -> list[AlarmRecord]:
-        """Shelve alarms for a time in seconds; return those that are shelved now."""
+        """Shelve alarms for a time in seconds; return the newly shelved alarms."""
         now = self._utc()
         done = self.list.shelve(signals, now + for_s, actor, now)
         self._finish()
         return done
 
     def unshelve(self, signals: Iterable[str], actor: AlarmActor) -> list[AlarmRecord]:
-        """End the shelves of alarms; return those that were shelved."""
+        """Unshelve alarms; return the alarms that were shelved."""
         done = self.list.unshelve(signals, actor, self._utc())
         self._finish()
         return done

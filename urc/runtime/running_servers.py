@@ -1,11 +1,11 @@
 """The running dashboards of the current user on this machine: addresses and start keys.
 
-Layer 4. Each running server keeps one small file, readable only by its owner::
+Layer 4. Each running server has one small file, readable only by its owner::
 
     servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711, …}
 
-Programs send the key with each request, as ``Authorization: Bearer …``. For an address with HTTPS,
-the file also names the certificate by which programs verify the server.
+Programs send the key with each request, as ``Authorization: Bearer …``. For an HTTPS address, the
+file also contains the path of the certificate that verifies the server.
 """
 
 import json
@@ -27,7 +27,7 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A dashboard that is running, or was running when the machine lost power."""
+    """A dashboard that is running, or was running during a power failure."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""
@@ -38,7 +38,7 @@ class RunningServer(NamedTuple):
     public: str = ""
     """Base address for other devices; "" if the server accepts clients on this machine only."""
     certificate: str = ""
-    """File in PEM with the certificate to trust for an ``https`` address; "" for plain HTTP."""
+    """PEM file with the certificate to trust for an ``https`` address; "" for plain HTTP."""
     name: str = ""
     """Name in the server's certificate, which may differ from the host of the address."""
 
@@ -56,7 +56,7 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
         timeout_s: time limit of each step, in seconds.
 
     Raises:
-        OSError: the file of the certificate cannot be read.
+        OSError: the certificate file cannot be read.
         ValueError: the address is invalid.
     """
     place = urlsplit(server.address)
@@ -68,7 +68,7 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
 class _Verified(HTTPSConnection):
     """A connection that trusts one certificate, and expects one name in the server's certificate.
 
-    The certificate of an operator may lack the address at which the server listens.
+    An operator's own certificate may not include the server's listening address.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class _Verified(HTTPSConnection):
     ) -> None:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.load_verify_locations(server.certificate)
-        # The file of an operator begins with the server's own certificate, not with a root.
+        # An operator's file begins with the server's own certificate, not with a root certificate.
         context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
         super().__init__(host, port, timeout=timeout_s, context=context)
         self._verifier = context
@@ -111,10 +111,10 @@ def announced(data: Path, name: str, server: RunningServer) -> Iterator[None]:
 
 
 def servers(data: Path) -> dict[Path, RunningServer]:
-    """Return the servers announced in the data folder, the newest first.
+    """Return the servers announced in the data folder, newest first.
 
-    Files of killed servers are removed. If the system cannot tell whether a process runs, its
-    server stays in the list, although the address may not respond.
+    Files of killed servers are removed. If the system cannot determine whether a process is
+    running, its server stays in the list, although the address may not respond.
     """
     found: dict[Path, RunningServer] = {}
     for file in _files(data):

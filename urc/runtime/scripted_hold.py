@@ -1,4 +1,4 @@
-"""Execution of a held command by a script for a limited time, under the normal rules of motion.
+"""Run a held command from a script for a limited time, under the normal rules of motion.
 
 The script samples no input, but renews the lease with regular ticks. If the script hangs, is killed
 or loses its connection, the lease expires, and the guard writes the stop.
@@ -38,7 +38,7 @@ async def hold(
     for_s: float,
     why_not: Callable[[], str],
 ) -> None:
-    """Hold a command for a time, release the command, and return after its stop is sent.
+    """Hold a command for a time, release it, and return after its stop is sent.
 
     Args:
         session: a session opened with ``motion``.
@@ -96,7 +96,7 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Tick until the time is over; return whether the robot moved, and why the hold ended early."""
+    """Send ticks until the end; return whether the robot moved, and why the hold ended early."""
     number, next_s = 0, _now()
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:
@@ -117,7 +117,7 @@ async def stop_is_out(
 ) -> None:
     """Wait until the transport has accepted the stop, including repeats on a lossy transport.
 
-    If the connection is lost, the guard reopens the connection and sends the stop first.
+    If the connection is lost, the guard reopens it and sends the stop first.
     """
     driver = session.profile.driver
     until = _now() + _STOP_OUT_S

@@ -10,12 +10,12 @@ __all__ = ["HIDDEN", "SecretForms", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
-"""Minimum length of a secret to search in encoded form; shorter secrets match too often."""
+"""Minimum length of a secret to find in encoded form; shorter secrets match too often."""
 _LONGEST = 4096
 
 
 class SecretForms:
-    """A search for secrets as plain text and in JSON, URL, hex and base64 encoding.
+    """Searches for secrets in plain text and in JSON, URL, hex and base64 encoding.
 
     A secret in base64 may be part of a longer text, such as ``user:password`` in a header. In
     base64, the whole encoded text is hidden, because neighbouring bytes change the first and last
@@ -25,7 +25,7 @@ class SecretForms:
     def __init__(self, secrets: Iterable[str] = ()) -> None:
         known = [one for one in secrets if one]
         plain = {form for one in known for form in forms(one)}
-        # The longest first, because one secret may be part of another.
+        # Longest first, because one secret may be part of another secret.
         self._plain = tuple(sorted(plain, key=lambda form: (-len(form), form)))
         self._based = tuple(sorted({form for one in known for form in _based(one)}))
         self._bytes = tuple(

@@ -1,11 +1,11 @@
 """Audit entries of one server: sign-ins, people, settings, packages, recordings, start and end.
 
 Layer 4. The methods are thread-safe, never block and never raise an exception, because sign-ins and
-STOP call them. Failed sign-ins and the STOP of unknown visitors are combined into one entry a
-second for each address, with a count.
+STOP call them. Failed sign-ins and STOPs of unknown visitors are combined into one entry per second
+and address, with a count.
 
-Secrets never reach the log. A name tried in vain is recorded only if it is the name of a person:
-people type passphrases into the wrong field.
+Secrets never reach the log. The name in a failed sign-in is recorded only if a person has this
+name, because people sometimes type passphrases into the wrong field.
 """
 
 import json
@@ -26,11 +26,11 @@ from urc.runtime.secret_forms import HIDDEN, SecretForms
 __all__ = ["CLOCK_JUMP_S", "NO_ACTOR", "Actor", "ServerRecorder", "terminal_actor"]
 
 CLOCK_JUMP_S: Final = 5.0
-"""Smallest jump of the machine's clock that is recorded, in seconds."""
+"""Smallest recorded jump of the machine's clock, in seconds."""
 _BURST: Final = 60
-"""Maximum number of entries about unknown visitors at once."""
+"""Maximum number of entries about unknown visitors in one burst."""
 _PER_S: Final = 0.1
-"""Rate of such entries in a lasting attack: in a day, they take 3 MB of the log's 100 MB."""
+"""Rate of such entries in a long attack: in a day, they use 3 MB of the log's 100 MB."""
 _MOST_SECRETS: Final = 256
 _USERINFO: Final = re.compile(r"//[^/@\s\"]*@")
 """User name and passphrase in a URL."""
@@ -48,11 +48,11 @@ class Actor(NamedTuple):
     """``person``, ``device``, ``program`` or ``guest``."""
     role: str = ""
     way: str = ""
-    """Way of the sign-in, such as ``passkey``; ``terminal`` for a command on this machine."""
+    """Sign-in method, such as ``passkey``; ``terminal`` for a command on this machine."""
     place: str = ""
     """Network address; "" for this machine."""
     sign_in: str = ""
-    """Identifier of the sign-in; no secret."""
+    """Identifier of the sign-in; not a secret."""
 
 
 NO_ACTOR: Final = Actor()
@@ -67,7 +67,7 @@ class _Repeated(NamedTuple):
 
 
 class ServerRecorder:
-    """A writer of the audit entries of one server or one command."""
+    """A writer of audit entries for one server or one command."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class ServerRecorder:
     # Sign-ins
 
     def signed_in(self, actor: Actor, agent: str = "") -> None:
-        """Record a sign-in; `agent` is browser and system in words."""
+        """Record a sign-in; `agent` is a text with the browser and the system."""
         self._record("signed in", actor, outcome=agent)
 
     def sign_in_failed(
@@ -115,10 +115,10 @@ class ServerRecorder:
         """Record a failed attempt to sign in or pair; equal attempts are counted.
 
         Args:
-            way: way of the attempt, such as ``passphrase``.
+            way: sign-in method of the attempt, such as ``passphrase``.
             place: network address.
             reason: reason for display, without any input of the visitor.
-            name: name of the person, device or program that was tried; "" for an unknown name.
+            name: name of the person, device or program in the attempt; "" for an unknown name.
             principal: its identifier; without one, the name is not recorded.
         """
         actor = Actor(name if principal else "", principal, way=way, place=place)
@@ -129,19 +129,19 @@ class ServerRecorder:
         self._record("signed out", actor)
 
     def revoked(self, actor: Actor, what: str, **about: object) -> None:
-        """Record the end of a sign-in, token or right by someone else.
+        """Record that another person has ended a sign-in, token or right.
 
         Args:
             actor: the administrator.
-            what: the end, such as ``sign-in`` or ``device``.
-            about: its name and other facts, without secrets.
+            what: the kind of the ended right, such as ``sign-in`` or ``device``.
+            about: the right's name and other facts, without secrets.
         """
         self._record("revoked", actor, what, arguments=about)
 
     def paired(
         self, actor: Actor, step: Literal["code made", "code used"], **about: object
     ) -> None:
-        """Record the making or the use of a pairing code; `about` never contains the code."""
+        """Record the creation or the use of a pairing code; `about` never contains the code."""
         self._record("pairing", actor, step, arguments=about)
 
     # Administration
@@ -217,7 +217,7 @@ class ServerRecorder:
     # The server
 
     def server(self, step: Literal["started", "ended"], version: str, **about: object) -> None:
-        """Record start or end of the server; the end also writes all pending counts."""
+        """Record the server's start or end; the end also writes all pending counts."""
         if step == "ended":
             self.flush(is_last=True)
         self._record("server", NO_ACTOR, step, arguments={"version": version, **about})
@@ -237,7 +237,7 @@ class ServerRecorder:
             self._record("clock", NO_ACTOR, outcome=text, lasted_s=round(jump_s, 1))
 
     def flush(self, *, is_last: bool = False) -> None:
-        """Write the counts of repeated events that have waited long enough; at the end, all."""
+        """Write the due counts of repeated events; at the end, write all counts."""
         with self._lock:
             now = None if is_last else self._now()
             forgotten = self._repeats.forgotten(now)
@@ -291,7 +291,7 @@ class ServerRecorder:
                 place=actor.place,
             )
             self._note(entry)
-        except Exception:  # supervisor: signing in and STOP must go on
+        except Exception:  # supervisor: signing in and STOP must continue
             if not self.is_faulty:
                 log.exception("an event is missing in the audit log")
             self.is_faulty = True
@@ -301,7 +301,7 @@ class ServerRecorder:
 
 
 def terminal_actor() -> Actor:
-    """Return the user of this process, who administers by the right to the data folder."""
+    """Return the user of this process, who may administer because of access to the data folder."""
     return Actor(f"{_user()} on this computer", "local", "person", "administer", "terminal")
 
 

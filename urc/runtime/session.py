@@ -64,13 +64,13 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""Kind of the writer of motion frames: none, a guard in this process, or a guard process. Only a
+"""The writer of motion frames: none, a guard in this process, or a guard process. Only a
 guard process stops the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Function that creates a named tuple without the cost of the constructor; every command creates
-several named tuples."""
+"""Function that creates a named tuple faster than the constructor; each command creates several
+named tuples."""
 _GRACE_S = 2.0
 """Tolerance added to the sum of a command's declared waits, in seconds."""
 
@@ -123,7 +123,7 @@ class Session:
         fresh = TimeAndNonce(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
-        """Renderer of the frames of held commands."""
+        """Renderer of held commands' frames."""
         self.backend = self._make_backend(engine, transports, motion)
         """Writer of held-command frames; None without motion."""
         self._dispatcher = Dispatcher(
@@ -140,7 +140,7 @@ class Session:
         """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links that have not ended their first attempt; commands wait for these links, in order.
+        """Links whose first attempt has not ended; commands wait for these links, in order.
         """
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
@@ -228,8 +228,8 @@ class Session:
         self.hub.tell_rest(self._clock.now())
         for task in self._tasks:
             task.cancel()
-        # An error of the block belongs to the caller and passes unchanged, outside of a group. Only
-        # a cancellation goes to the task group, which may itself have asked for it.
+        # An error in the block is passed to the caller unchanged, outside of a group. Only a
+        # cancellation is passed to the task group, which may have requested the cancellation.
         if isinstance(error, asyncio.CancelledError):
             await self._group.__aexit__(kind, error, trace)
         else:
@@ -265,7 +265,7 @@ class Session:
             name: name of the command in the driver.
             arguments: values of the arguments, by name; missing arguments use their defaults.
             confirmed_by: people who confirmed the command, for the two-person rule.
-            on_sent: callback with each sent payload, except secrets and payloads of a sequence.
+            on_sent: callback with each sent payload, except secrets and sequence payloads.
 
         Raises:
             CommandFailed: the command was refused, timed out, or lost its connection.
@@ -296,14 +296,14 @@ class Session:
         return "; ".join(filter(None, found))
 
     def reconnect(self) -> None:
-        """Try all lost connections now, instead of after their backoff."""
+        """Try to reopen all lost connections now, instead of after their backoff."""
         for link in self._links.values():
             link.reconnect()
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, continue or end a sequence.
 
-        ``step`` starts a sequence that is not running, paused at its first step. All verbs except
+        ``step`` starts an inactive sequence and pauses it at its first step. All verbs except
         ``step`` have no effect if the sequence is not running.
         """
         self._dispatcher.pull(sequence, what)

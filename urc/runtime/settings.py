@@ -121,7 +121,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
     """Return the options of a transport, with templates evaluated over ``settings``.
 
-    An option that consists only of an empty setting is left out.
+    An option that consists only of an empty setting is omitted.
 
     Raises:
         UrcError: a template uses a missing setting, or fails.
@@ -158,7 +158,7 @@ def _path(text: str, found: str) -> str:
         raise UrcError(f"{found} is not a path")
     try:
         return str(Path(text).expanduser())
-    except RuntimeError as error:  # ~ without a home, or of a user who is not there
+    except RuntimeError as error:  # ~ without a home folder, or of an unknown user
         raise UrcError(f"{found} is not a path: its home folder is unknown") from error
 
 

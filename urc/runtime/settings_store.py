@@ -18,7 +18,7 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "StoredSettings", "SettingsStore", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages that have settings, in order of precedence for equal names: a robot precedes a
+"""Kinds of packages with settings, in order of precedence for equal names: a robot precedes a
 driver."""
 
 _MOST_BYTES: Final = 1 << 20
@@ -43,7 +43,7 @@ class StoredSettings(msgspec.Struct, frozen=True):
     """Package to which the settings belong, such as ``drivers/puppet``; "" for a document given by
     path."""
     monitors_alarms: bool | None = None
-    """Whether the robot stays connected for its alarms; None for the choice of the server."""
+    """Whether the robot stays connected for its alarms; None for the server's choice."""
 
 
 class SettingsStore:
@@ -71,7 +71,7 @@ class SettingsStore:
             raise UrcError(f"{self.file}: this file is damaged: {error}") from None
 
     def save(self, kept: StoredSettings) -> None:
-        """Write the settings atomically: after a power failure, the file is either old or new.
+        """Write the settings atomically: a power failure leaves either the old or the new file.
 
         Raises:
             UrcError: the file cannot be written and stays unchanged.
@@ -90,11 +90,11 @@ class SettingsStore:
             return True  # damaged, so its content is lost anyway
         if kept == StoredSettings():
             return False
-        # An earlier version stored neither destination nor package.
+        # An earlier version stored neither the destination nor the package.
         return kept.package == package or not (kept.package or kept.destination)
 
     def forget(self) -> None:
-        """Delete the settings file, if the file exists."""
+        """Delete the settings file, if it exists."""
         with suppress(OSError):
             self.file.unlink(missing_ok=True)
 
@@ -103,7 +103,7 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
     """Return the robots with settings that become obsolete when packages are removed.
 
     Args:
-        folder: folder of the files.
+        folder: folder with the settings files.
         removed: packages to remove.
         left: packages that remain installed; a robot with such a package keeps its settings.
     """
@@ -117,13 +117,13 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
 
 
 def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
-    """Return the installed package that a robot name refers to, or None.
+    """Return the installed package for a robot name, or None.
 
-    The result is the version that the operator chose, or else the newest version. If a robot and a
-    driver have the same name, the robot is chosen.
+    The result is the version that the operator chose, or else the newest version. A robot takes
+    precedence over a driver of the same name.
 
     Args:
-        folder: folder of the files.
+        folder: folder with the settings files.
         name: robot name.
         installed: all installed packages.
     """
@@ -146,7 +146,7 @@ def pin(folder: Path, lock: Lock) -> None:
     """Pin a robot to its present version before an installation; raise `UrcError` on failure.
 
     Args:
-        folder: folder of the files.
+        folder: folder with the settings files.
         lock: result of `in_use`.
     """
     file = SettingsStore(folder, lock.key.name)

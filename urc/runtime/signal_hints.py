@@ -1,4 +1,4 @@
-"""Hints about signals that a test failed to set, with corrections of the test.
+"""Hints about signals that a test failed to set, with corrections for the test.
 
 Layer 4, pure. This module is used only after a failed test.
 """
@@ -48,7 +48,7 @@ class SignalHints:
         self._in_steps = in_steps
 
     def of(self, signal: str) -> str:
-        """Return the reason as text that follows "nothing set it"; "" for an unknown reason."""
+        """Return the reason, to append to the text "nothing set it"; "" for an unknown reason."""
         for transport in self._driver.transports:
             reason = self._of_line(transport, signal)
             if reason:
@@ -122,7 +122,7 @@ class SignalHints:
         for poll in self._trial.polls:
             is_ours = poll.transport == transport and ("poll", poll.name) in self._trial.used
             if is_ours and poll.reply is not None:
-                # A poll without a name is called by its position, such as polls.0.
+                # A poll without a name is identified by its position, such as polls.0.
                 yield poll.name if "." in poll.name else f"poll {poll.name}", poll.reply
         for command in self._driver.commands.values():
             name = command.name

@@ -1,4 +1,4 @@
-"""Opening of SQLite files that several servers may write."""
+"""Open SQLite files that several servers may write."""
 
 import os
 import sqlite3
@@ -19,13 +19,13 @@ _AGAIN_S: Final = 0.01
 def open_for_writing(file: Path) -> sqlite3.Connection:
     """Return a connection without implicit transactions; create a missing file in its folder.
 
-    The file is readable to its owner only and has a write-ahead log, so readers never wait.
+    The file is readable only by its owner and has a write-ahead log, so readers never wait.
 
     Raises:
-        sqlite3.DatabaseError: the file is not an SQLite file, or another server keeps it locked.
+        sqlite3.DatabaseError: the file is not an SQLite file, or another server has locked it.
         OSError: the file cannot be created.
     """
-    # Created before SQLite does, because SQLite's other files copy the mode of this one.
+    # Created before SQLite creates it, because SQLite's other files copy this file's mode.
     os.close(os.open(file, os.O_RDWR | os.O_CREAT, 0o600))
     for name in ("", "-wal", "-shm"):
         with suppress(FileNotFoundError):
@@ -42,7 +42,7 @@ def open_for_writing(file: Path) -> sqlite3.Connection:
 
 @contextmanager
 def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file for reading that a server may be writing; give None without a file or tables.
+    """Open a file for reading while a server may write it; yield None without a file or tables.
 
     Raises:
         OSError: the file cannot be read.
@@ -53,7 +53,7 @@ def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
     uri = f"{file.absolute().as_uri()}?mode=ro"
     try:
         with closing(sqlite3.connect(uri, uri=True, timeout=LOCKED_S)) as base:
-            # A server creates the file some time before the tables.
+            # A server creates the file shortly before the tables.
             (tables,) = base.execute("SELECT count(*) FROM sqlite_master").fetchone()
             yield base if tables else None
     except sqlite3.Error as error:
@@ -61,7 +61,7 @@ def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
 
 
 def set_aside(file: Path) -> Path:
-    """Rename a damaged file to a free name ending in `.broken…`, and return its new path.
+    """Rename a damaged file to an unused name ending in `.broken…`, and return its new path.
 
     Raises:
         OSError: the file cannot be renamed.
@@ -77,8 +77,8 @@ def set_aside(file: Path) -> Path:
 
 
 def _use_write_ahead_log(base: sqlite3.Connection) -> None:
-    # SQLite does not wait here as it waits for transactions: two servers that start together
-    # would each get an error at once. https://sqlite.org/c3ref/busy_handler.html
+    # SQLite does not wait here, unlike for transactions. Two servers that start together would each
+    # get an error immediately. https://sqlite.org/c3ref/busy_handler.html
     end = time.monotonic() + LOCKED_S
     while True:
         try:

@@ -1,6 +1,6 @@
-"""Comparison of expected and actual results in a document's tests.
+"""Compare expected and actual results in a document's tests.
 
-Layer 4, pure. Each mismatch message contains the expected and the actual value; callers insert the
+Layer 4, pure. Each mismatch message contains the expected and the actual value. Callers insert the
 message into a line of text.
 """
 

@@ -38,11 +38,11 @@ __all__ = ["Exercised", "Kind", "TestEngine", "encoded"]
 
 Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
-"""Kind and name of a part of a driver that a test can use."""
+"""Kind and name of a driver part that a test can use."""
 _TWO_PEOPLE: Final = ("author of the test", "operator")
 """Confirmations of two people, so that tests can run every command."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
-"""Transport types with objects as messages; all other types carry bytes."""
+"""Transport types with objects as messages; all other types transfer bytes."""
 _MOST_TICKS: Final = 20_000
 """Maximum number of deadlines to handle during one wait of a test."""
 
@@ -100,16 +100,16 @@ class TestEngine:
         """Simulated time, in seconds."""
         self.samples: dict[str, Sample] = {}
         self.fresh: set[str] = set()
-        """Signals set since the last call of `forget`, with their samples."""
+        """Signals set since the last call to `forget`, with their samples."""
         self.fed: dict[str, bytes] = {}
-        """All bytes received from the robot since the connection opened, by transport."""
+        """All bytes received from the robot since the opening of the connection, by transport."""
         self.sent: dict[str, list[Payload]] = {}
         """Sent payloads that no check has read yet, by transport."""
         self.failures: list[str] = []
         self.ended: list[Replied | Failed] = []
         """Finished commands that no check has read yet."""
         self.closed: set[str] = set()
-        """Transports closed by the engine that no check has read yet."""
+        """Transports that the engine has closed, and that no check has read yet."""
         self._requests = 0
         self._numbers: dict[str, list[object]] = {}
         """Numbers of the unanswered requests, by transport."""
@@ -185,7 +185,7 @@ class TestEngine:
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
         """Return the message as a transport delivers it.
 
-        A response carries the number of its request.
+        A response includes its request's number.
         """
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
@@ -200,7 +200,7 @@ class TestEngine:
         return Envelope(piece.verb, attributes, body)
 
     def fall_silent(self) -> None:
-        """Let time pass until silence ends the frame."""
+        """Advance the time until silence ends the frame."""
         for name in self.fed:
             due = self.engine.lines[name].receiver.decoder.deadline
             if due is not None:
@@ -208,7 +208,7 @@ class TestEngine:
                 self.perform(self.engine.tick(self.now))
 
     def wait(self, seconds: float) -> None:
-        """Advance the simulated time, and handle all deadlines that fall due."""
+        """Advance the simulated time, and handle all due deadlines."""
         end = self.now + seconds
         for _ in range(_MOST_TICKS):
             if not self.pass_to_deadline(end):

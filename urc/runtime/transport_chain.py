@@ -1,4 +1,4 @@
-"""The transports of a driver, with each tunnel before the transports inside the tunnel."""
+"""The transports of a driver; each tunnel precedes the transports that it carries."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, cast
@@ -14,7 +14,7 @@ __all__ = ["BuiltTransport", "make_lines", "make_transports"]
 
 
 class BuiltTransport(NamedTuple):
-    """A transport with the values used to build the transport."""
+    """A transport, and the values used to build it."""
 
     spec: TransportSpec
     factory: str
@@ -26,7 +26,7 @@ class BuiltTransport(NamedTuple):
 def make_lines(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, BuiltTransport]:
-    """Return the closed transports by name; each tunnel precedes the transports inside the tunnel.
+    """Return the closed transports by name; each tunnel precedes the transports that it carries.
 
     Args:
         driver: the loaded driver, without circular tunnels.

@@ -83,7 +83,7 @@ class WidgetRegistry(WidgetFolder):
         return super().get(name)
 
     def hidden(self) -> list[Path]:
-        """Return the folders of installed widgets that are hidden by a built-in widget."""
+        """Return the folders of installed widgets hidden by built-in widgets."""
         return [self._brought.place(name) for name in self._brought.names() if self._hides(name)]
 
     def _hides(self, name: str) -> bool:

@@ -56,7 +56,7 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """No reply can be built for a declared request; the message is for people."""
+    """No reply can be built for a declared request; the message is human-readable."""
 
 
 class SimulatedReply(NamedTuple):
@@ -126,7 +126,7 @@ class DefaultResponder:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: values that were set, otherwise plausible values."""
+        """Return raw fields for a frame: set values, or otherwise plausible values."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -243,7 +243,7 @@ class DefaultConnection:
         raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> ReceivedRequest | None:
-        """Return the request and the arguments of a frame. Exact matches have priority.
+        """Return the request and the arguments of a frame. Exact matches take priority.
 
         Args:
             frame: the received frame.
@@ -267,7 +267,7 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`; None if the best match has a reply.
 
-        Two declarations of a driver often have the same stop frame. Examples are the release of a
+        Two declarations in a driver often have the same stop frame. Examples are the release of a
         held command, a close message and a command without reply.
         """
         best = self.asked(frame)
@@ -279,13 +279,13 @@ class DefaultConnection:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return the labels of all requests that encode to this frame, or of the first match."""
+        """Return the labels of all requests that encode to this frame, else of the first match."""
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
 
     def _readings(self, frame: Frame) -> Iterator[ReceivedRequest]:
-        """Yield all possible requests of a frame, constant requests first."""
+        """Yield all possible requests for a frame, constant requests first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
@@ -313,7 +313,7 @@ class DefaultConnection:
             return False
 
     def _declared(self) -> Iterator[_Request]:
-        """Yield the requests of commands, polls and sequences. Constant requests are first."""
+        """Yield the requests of commands, polls and sequences. Constant requests come first."""
         driver, name = self._robot.driver, self._spec.name
         requests = []
         for command in driver.commands.values():
@@ -386,7 +386,7 @@ class DefaultConnection:
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:
-        """Return a message period that keeps all signals of the message fresh."""
+        """Return a message period that keeps all the message's signals fresh."""
         signals = self._robot.driver.signals
         ages = [signals[name].stale_after_s for name in read.fields if name in signals]
         return min(_SLOWEST_S, max(_FASTEST_S, min(ages, default=_SLOWEST_S) / 3))
@@ -402,7 +402,7 @@ def _main_way(steps: Iterable[Step]) -> Iterator[Step]:
 
 
 def numbered(data: Payload, request: Frame) -> Payload:
-    """Return the reply with the identifier of its request, if the request has an identifier."""
+    """Return the reply, with its request's identifier if the request has one."""
     asked = request.payload
     if not isinstance(asked, Envelope):
         return data

@@ -1,7 +1,7 @@
 """A profile that connects to an emulated robot on free ports.
 
-Layer 4. `urc demo` and `urc serve --simulate` use free ports. By contrast, `urc simulate` uses the
-ports of the profile.
+Layer 4. `urc demo` and `urc serve --simulate` use free ports. `urc simulate` uses the profile's
+ports instead.
 """
 
 from collections.abc import AsyncIterator, Mapping
@@ -24,7 +24,7 @@ async def stand_in(
     Args:
         profile: profile of the robot.
         settings: values of the profile's settings.
-        emulated_robot: emulated robot to use; None: create one from the profile.
+        emulated_robot: emulated robot to use; if None, one is created from the profile.
 
     Raises:
         UrcError: a transport cannot be emulated.

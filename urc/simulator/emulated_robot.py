@@ -1,4 +1,4 @@
-"""An emulated robot that converts received frames to sent bytes, by the profile's simulator rules.
+"""An emulated robot, which answers received frames according to the profile's simulator rules.
 
 If no rule matches a frame, the driver's declarations define the reply (`urc.simulator.auto`).
 
@@ -64,7 +64,7 @@ MOST_COURSES: Final = 256
 """Maximum number of delayed replies per connection."""
 
 log = logging.getLogger(__name__)
-"""Logger of all faults, with the arguments ``(transport, text)``."""
+"""Logger for all faults, with the arguments ``(transport, text)``."""
 
 
 class EmulatedRobot:
@@ -120,7 +120,7 @@ class EmulatedRobot:
         return self._values.body
 
     def prepare(self) -> None:
-        """Load the image modules early, so the first image has no delay; the call may block."""
+        """Load the image modules early, to avoid delaying the first image; the call may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
@@ -130,14 +130,14 @@ class EmulatedRobot:
         return tuple(one.text for one in self._values.faults.active.values())
 
     def inject(self, text: str, now_s: float) -> None:
-        """Inject a fault in the syntax of `FAULTS`.
+        """Inject a fault given in the syntax of `FAULTS`.
 
         Args:
             text: fault to inject, such as ``loss=5%``.
             now_s: current time, in seconds since the epoch.
 
         Raises:
-            UrcError: the fault is unknown, or impossible for this robot.
+            UrcError: the fault is unknown or impossible for this robot.
         """
         inject(parse_fault(text), self._values, now_s)
 
@@ -157,7 +157,7 @@ class EmulatedRobot:
         return body.picture(name, now_s)
 
     def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
-        """Return a top view of the world as JPEG; None without a world, or without Pillow.
+        """Return a top view of the world as JPEG; None without a world or without Pillow.
 
         Args:
             width: width of the image in pixels, 16 to 2000.
@@ -181,7 +181,7 @@ class EmulatedRobot:
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
-    """Return the signal of each camera image, by transport and topic."""
+    """Return the signal of each camera image, keyed by transport and topic."""
     return {
         (message.transport, topic_of(message.read, settings)): name
         for message in driver.messages.values()
@@ -193,7 +193,7 @@ def _pictures(
 
 
 def _speaks(rule: SimulatorRule) -> bool:
-    """Return whether a rule replaces the automatic messages of the robot."""
+    """Return whether a rule replaces the robot's automatic messages."""
     if rule.request:
         return False
     says = any(one.send or one.message for one in rule.reactions)
@@ -243,7 +243,7 @@ class EmulatedConnection:
         self.faults = 0
         """Total number of invalid frames, unmatched frames and failed replies."""
         self.last_fault = ""
-        """Text of the latest fault, in one line."""
+        """Text of the latest fault, on one line."""
 
     @property
     def due_in_s(self) -> float | None:
@@ -263,7 +263,7 @@ class EmulatedConnection:
         """Process received data and return the replies. Each reply is a whole frame.
 
         Args:
-            data: bytes from any position of the stream, or an envelope on a message transport.
+            data: bytes from any position in the stream, or an envelope on a message transport.
             now_s: current time in seconds since the epoch, available to templates as ``now``.
             limit: maximum number of replies; further requests are dropped. None: no limit.
         """
@@ -396,7 +396,7 @@ class EmulatedConnection:
         return said or []
 
     def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Run the reactions that are due; schedule the remaining reactions."""
+        """Run all due reactions, and schedule the remaining reactions."""
         said: list[Payload] = []
         while running_rule.ready_reactions and not self.is_over:
             reaction = running_rule.ready_reactions[0]

@@ -1,8 +1,8 @@
 """Inversion of expressions: find the field value for which an expression has the wanted value.
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
-first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. Expressions
-without an inverse have the result None.
+first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. An
+expression without an inverse results in None.
 """
 
 import ast
@@ -48,7 +48,7 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
 
 
 def _takes_apart(template: Template) -> bool:
-    """Return whether the expression splits its field, so the field cannot be a plain value."""
+    """Return whether the expression splits its field, so that the field cannot be a plain value."""
     return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
 
 
@@ -144,4 +144,4 @@ _TEXTS: Final[dict[str, Callable[[bytes], object]]] = {
     "b64decode": _base64,
     "hexbytes": lambda data: data.hex().upper(),
 }
-"""Inverse functions of the filters that decode text to bytes, by filter."""
+"""Inverse functions of the filters that decode text to bytes, keyed by filter."""

@@ -1,4 +1,4 @@
-"""Fault injection for an emulated robot: delay, loss, noise and failed sensors.
+"""Faults to inject into an emulated robot: delay, loss, noise and failed sensors.
 
 Pure. With the same traffic and the same faults, the same frames are dropped in every run.
 """
@@ -31,7 +31,7 @@ FAULTS: Final[Mapping[str, str]] = {
     "stuck": "stuck=SIGNAL",
     "low-battery": "low-battery",
 }
-"""Syntax of each fault, by name."""
+"""Syntax of each fault, keyed by name."""
 
 
 class Fault(NamedTuple):
@@ -39,7 +39,7 @@ class Fault(NamedTuple):
 
     name: str
     amount: float = 0.0
-    """Delay in seconds, share of lost frames (0 to 1), or noise factor."""
+    """Delay in seconds, fraction of lost frames (0 to 1), or noise factor."""
     signal: str = ""
     """Name of the affected signal, for the faults ``dropout`` and ``stuck``."""
     text: str = ""
@@ -100,12 +100,12 @@ class Faults:
             missing: signals whose sensors never work on this machine.
         """
         self.active: dict[str, Fault] = {}
-        """Faults by name; for faults of a signal, by name and signal."""
+        """Faults, keyed by name; faults of a signal are keyed by name and signal."""
         self._missing = missing
         self.dropped = missing
         """Signals with failed sensors."""
         self.stuck: dict[str, Reading] = {}
-        """Last values of the stuck signals, by name."""
+        """Last values of the stuck signals, keyed by name."""
         self._frames = 0
 
     @property
@@ -120,7 +120,7 @@ class Faults:
         return "silent" in self.active
 
     def add(self, fault: Fault) -> None:
-        """Add a fault, and remove any previous fault of the same name and signal."""
+        """Add a fault, replacing any previous fault with the same name and signal."""
         key = f"{fault.name} {fault.signal}".strip()
         self.active[key] = fault
 

@@ -10,15 +10,15 @@ __all__ = ["Fields"]
 
 
 class Fields(NamedTuple):
-    """The field values for one frame, as far as known."""
+    """The known field values for one frame."""
 
     numbers: dict[str, object]
     others: dict[str, object]
     own: dict[str, object]
-    """Internal fields of the document: constants of ``when``, and values repeated from the
+    """Internal fields of the document: constants from ``when``, and values repeated from the
     request."""
     unknown: tuple[str, ...] = ()
-    """Internal fields of the document without a known value."""
+    """Internal fields of the document whose values are unknown."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
         """Yield sets of fields to encode, from the largest to the smallest."""

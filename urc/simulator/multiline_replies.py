@@ -16,8 +16,8 @@ def in_lines(
 
     Args:
         payload: payload of the whole reply.
-        lines: number of lines, or the pattern of the last line; None for a reply of one frame.
-        reader: decoder of the whole reply.
+        lines: number of lines, or the pattern of the last line; None for a single-frame reply.
+        reader: decoder for the whole reply.
         encoding: encoding of the transport.
     """
     if lines is None:

@@ -1,4 +1,4 @@
-"""Reply fields that repeat values of the request, and fields that identify a frame.
+"""Reply fields that repeat values from the request, and fields that identify a frame.
 
 Pure. The module inverts only equalities and lists of constants in ``when`` and ``match``.
 """
@@ -99,7 +99,7 @@ def _constant(text: str) -> object:
 
 
 def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object]:
-    """Return the reply's fields that are constants or repeat a field of the request."""
+    """Return the reply's fields that are constants or repeat a request field."""
     return {
         left: known[right] if isinstance(right, _Name) else right
         for left, right in _equalities(match)
@@ -126,7 +126,8 @@ def guesses(
 ) -> Iterator[dict[str, object]]:
     """Yield the arguments with each possible value of a missing argument, such as true and false.
 
-    An argument is guessed only if all other arguments are known and the argument has few values.
+    An argument is guessed only if all other arguments are known and the argument has few possible
+    values.
     """
     left = [one for name, one in arguments.items() if name not in found]
     if len(left) == 1:

@@ -1,6 +1,6 @@
 """The simulator rules of a document, compiled for one transport.
 
-Pure: no sockets and no clock.
+The module is pure: it uses no sockets and no clock.
 """
 
 from collections.abc import Mapping
@@ -71,7 +71,7 @@ class RunningRule:
         self.ready_reactions = ready_reactions
         """Pending reactions."""
         self.names = names
-        """Values from the frame, by name."""
+        """Values from the frame, keyed by name."""
         self.asked = asked
         """The declared request that triggered the rule; None for other frames."""
         self.frame = frame
@@ -109,7 +109,7 @@ class RuleSet:
         self._counters = Counters()
         ready = [self._ready(rule) for rule in rules]
         self.asked = tuple(rule for rule in ready if rule.what.every_s is None)
-        """Rules that received frames trigger."""
+        """Rules triggered by received frames."""
         self.periodic = tuple(rule for rule in ready if rule.what.every_s is not None)
 
     def _ready(self, rule: SimulatorRule) -> ReadyRule:
@@ -214,7 +214,7 @@ class RuleSet:
         return what.send is not None and self._values.faults.drops(what.send.names)
 
     def _wants_dropped(self, what: Reaction) -> bool:
-        """Return whether a failed sensor may be the cause of a reaction's failure."""
+        """Return whether a failed sensor may have caused a reaction to fail."""
         body = self._values.body
         names = {
             name for one in what.sets.values() if isinstance(one, Template) for name in one.names

@@ -1,6 +1,6 @@
 """Servers for an emulated robot on real connections, for operators, tests and ``urc demo``.
 
-The package `urc.simulator.servers` has one server for each type of transport.
+The package `urc.simulator.servers` contains one server for each type of transport.
 """
 
 import asyncio
@@ -52,10 +52,10 @@ async def serve(
         now: function that returns the current time, in seconds since the epoch; templates read the
             time as ``now``.
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
-        emulated_robot: emulated robot to serve; None: create one from the profile.
+        emulated_robot: emulated robot to serve; if None, one is created from the profile.
 
     Returns:
-        Endpoint of each transport, by name.
+        Endpoint of each transport, keyed by transport name.
 
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.

@@ -28,7 +28,7 @@ _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
 """Sensors that need numpy or Pillow."""
 
 Evaluate = Callable[[Template, float], object]
-"""Function that evaluates a template over the robot's signals and state at a given time."""
+"""Function that evaluates a template with the robot's signals and state at a given time."""
 
 
 class SimulatedBody:
@@ -70,7 +70,7 @@ class SimulatedBody:
             self._heard_s, self._is_safe = now_s, False
 
     def prepare(self) -> None:
-        """Load the laser and camera modules if a signal needs the modules; the call may block."""
+        """Load the laser and camera modules if a signal needs them; the call may block."""
         if has_rendering() and rendered_signals(self.spec):
             import urc.simulator.world.laser
             import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
@@ -85,7 +85,7 @@ class SimulatedBody:
         return self._evaluate(self.spec.senses[name], now_s)
 
     def picture(self, name: str, now_s: float) -> bytes | None:
-        """Return the image of a signal; None if the value of the signal is not an image."""
+        """Return the image of a signal; None if the signal's value is not an image."""
         value = self.sense(name, now_s)
         return value if isinstance(value, bytes) else None
 
@@ -130,7 +130,7 @@ class SimulatedBody:
 
 @cache
 def has_rendering() -> bool:
-    """Return whether the packages of cameras and laser scanners are installed (extra `demo`)."""
+    """Return whether the packages for cameras and laser scanners are installed (extra `demo`)."""
     try:
         return find_spec("numpy") is not None and find_spec("PIL") is not None
     except ModuleNotFoundError:  # hidden, as in browsers
@@ -138,7 +138,7 @@ def has_rendering() -> bool:
 
 
 def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> frozenset[str]:
-    """Return the signals of cameras and laser scanners, except of the readings `without`."""
+    """Return the signals of cameras and laser scanners, except those of the readings `without`."""
     found = {name: set(_LOOKS.findall(one.python)) for name, one in spec.senses.items()}
     return frozenset(name for name, readings in found.items() if readings - without)
 
@@ -146,7 +146,7 @@ def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> 
 def failsafe_of(driver: Driver) -> Failsafe | None:
     """Return a fail-safe from the `watchdog` or `step` of the held commands, or None.
 
-    Return None without held commands, or if any held command has no finite time.
+    Return None if there are no held commands, or if any held command has no finite time.
     """
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]

@@ -66,7 +66,7 @@ def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: f
 
 
 def _range(signal: Signal) -> tuple[float, float]:
-    """Return the range of values without alarms."""
+    """Return the range of values that cause no alarm."""
     limits: AlarmLimits = signal.limits
     lowest, highest = signal.min, signal.max
     floors = [one for one in (signal.min, limits.lolo, limits.low) if one is not None]
@@ -88,14 +88,14 @@ def _quaternion(now_s: float) -> dict[str, Value]:
 
 
 _DIGITS: Final = 7
-"""Number of decimal places of world values; in degrees of latitude, the last place is a
+"""Number of decimal places of world values; in degrees of latitude, the last place is about a
 centimetre."""
 _DEEPEST: Final = 16
 """Maximum length of a chain of computed signals."""
 
 
 class Unsettable(UrcError):
-    """An invalid value for a signal; the message is for people."""
+    """An invalid value for a signal; the message is human-readable."""
 
 
 class Values:
@@ -114,9 +114,9 @@ class Values:
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
-        """State variables that are not signals, by name."""
+        """State variables that are not signals, keyed by name."""
         self.chosen: dict[str, Reading] = {}
-        """Explicitly set signal values, by name."""
+        """Explicitly set signal values, keyed by name."""
         self.body: SimulatedBody | None = None
         """The simulated body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
@@ -180,7 +180,7 @@ class Values:
         return plausible(signal, now_s)
 
     def evaluate(self, template: Template, now_s: float) -> object:
-        """Return the value of a template over the robot's values; raise `ExpressionError`."""
+        """Return the value of a template with the robot's values; raise `ExpressionError`."""
         return template.evaluate(Names(self, now_s))
 
 

@@ -1,4 +1,4 @@
-"""A fake clock that only a test moves forward."""
+"""A fake clock that only a test advances."""
 
 import asyncio
 import heapq
@@ -8,15 +8,15 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Number of event loop turns after which all ready tasks have run; greater than the length of any
-chain of tasks in URC."""
+"""Number of event loop turns after which all ready tasks have run. The number exceeds the length of
+any chain of tasks in URC."""
 _QUIET_TURNS = 3
 """Number of consecutive turns without a ready task after which the event loop counts as idle."""
 
 
 async def settle() -> None:
     """Run every ready task until all tasks wait."""
-    # The loop's queue of ready callbacks; a loop without it gets all turns.
+    # The loop's queue of ready callbacks; a loop without this queue gets all turns.
     ready = getattr(asyncio.get_running_loop(), "_ready", None)
     quiet = 0
     for _ in range(_TURNS):
@@ -47,7 +47,7 @@ class FakeClock:
         return self._now
 
     async def sleep(self, seconds: float) -> None:
-        """Wait until `advance` has moved the time by `seconds`; for zero, return immediately."""
+        """Wait until `advance` has moved the time by `seconds`; return immediately for zero."""
         if seconds <= 0:
             await asyncio.sleep(0)
             return
@@ -65,12 +65,12 @@ class FakeClock:
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Move the time without running calls, then run overdue calls, like a blocked loop."""
+        """Advance the time without running calls, then run overdue calls, like a blocked loop."""
         self._now += seconds
         await self.advance(0)
 
     async def advance(self, seconds: float) -> None:
-        """Move the time forward, and run each due call with its effects in order."""
+        """Advance the time, and run each due call and its effects in order."""
         end_s = self._now + seconds
         await settle()
         while self._due and self._due[0][0] <= end_s:

@@ -69,7 +69,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:
-    """Return the default options in the widget's manifest, which the loader applies."""
+    """Return the default options from the widget's manifest, which the loader applies."""
     return {
         name: schema["default"]
         for name, schema in widget.options.items()
@@ -88,7 +88,7 @@ def dashboard_profile(
 ) -> Profile:
     """Return a profile with all slots in one row; the default is the puppet's battery signal.
 
-    A missing option of a widget takes the default in the widget's manifest.
+    A widget's missing options have the defaults from its manifest.
     """
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
@@ -120,7 +120,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """A fake session under the control of a test. The session counts the calls of `open`."""
+    """A fake session, controlled by a test. The session counts the calls of `open`."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -134,7 +134,7 @@ class FakeRobot:
         self.pulls: list[tuple[str, Pull]] = []
         """Requests to sequences."""
         self.reconnects = 0
-        """Number of requests to try the connections now."""
+        """Number of requests to reopen the connections immediately."""
         self.latched: list[str] = []
         """Reasons of all latched stops, in order."""
         self.frames = FakeFrames(profile.driver)
@@ -142,8 +142,8 @@ class FakeRobot:
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Callback for the events of held commands."""
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
-        """Callback that returns the values in the reply to a command, or raises an error; None for
-        replies without values."""
+        """Callback that returns the reply values of a command, or raises an error; None for replies
+        without values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
         """Return a context in which the robot is connected."""
@@ -177,7 +177,7 @@ class FakeRobot:
         return Replied(len(self.commands), name, values)
 
     def reconnect(self) -> None:
-        """Count a request to try the connections now."""
+        """Count a request to reopen the connections immediately."""
         self.reconnects += 1
 
     def pull(self, sequence: str, what: Pull) -> None:

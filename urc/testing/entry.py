@@ -1,4 +1,4 @@
-"""Access to the dashboard of a test, with known keys and the cookies of admitted browsers.
+"""Access to a test's dashboard, with known keys and the cookies of admitted browsers.
 
 For tests alone.
 """
@@ -33,7 +33,7 @@ BEARER = {"authorization": f"Bearer {KEY}"}
 
 
 def person(name: str, *grants: str) -> dict[str, str]:
-    """Return the cookies of a new person with these grants, who has signed in."""
+    """Return the cookies of a new, signed-in person with these grants."""
     now = CONTROL.now()
     added = STORE.add("person", name, [parse_grant(one) for one in grants], now=now)
     _, secret = STORE.open_sign_in(added.id, "passphrase", now=now)

@@ -24,9 +24,9 @@ class FakeFrames:
         self.refusal = ""
         """Reason for refusing frames; "" to accept all frames."""
         self.on_motion: Callable[[MotionEvent], None] | None = None
-        """Callback for the motion events of the engine."""
+        """Callback for the engine's motion events."""
         self.is_greeted = True
-        """Whether all steps that follow the connection have run."""
+        """Whether all connection steps have run."""
         self.number = 0
         """Counter of the newest frame; 0 for frames without a counter."""
 
@@ -49,7 +49,7 @@ class FakeFrames:
             raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
-        """Use the counter for another frame, and return its new value."""
+        """Increment the counter for another frame, and return its new value."""
         self.number = number = self.number + 1
         self.tell(NumbersUsed(line))
         return number
@@ -87,7 +87,7 @@ class FakeSession:
 
     @property
     def on_motion(self) -> Callable[[MotionEvent], None] | None:
-        """Callback for the motion events of the engine."""
+        """Callback for the engine's motion events."""
         return self.frames.on_motion
 
     @on_motion.setter
@@ -137,7 +137,7 @@ class FakeMotionBackend:
         hold_to_run.renew(hold_to_run.terms.stopped_by(stop))
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether the command moves the robot or still has to stop it."""
+        """Return whether the command is moving the robot or must still stop it."""
         return command in self._backend and self._backend[command].state != "idle"
 
     def is_open(self, command: str) -> bool:

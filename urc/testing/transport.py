@@ -1,4 +1,4 @@
-"""An in-memory transport for tests that play the role of the robot."""
+"""An in-memory transport for tests that act as the robot."""
 
 import asyncio
 from collections import deque
@@ -11,7 +11,7 @@ __all__ = ["MemoryTransport", "table_of"]
 
 
 class MemoryTransport:
-    """A replacement for any transport, in the memory of the test.
+    """A replacement for any transport, in the test's memory.
 
     The transport receives bytes from `feed`, and from `answer`. The callback `answer` gets all sent
     data, and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
@@ -31,7 +31,7 @@ class MemoryTransport:
         self.sent: list[bytes] = []
         """All pieces of data sent over all connections."""
         self.opens = 0
-        """Number of calls of `open`, including failed calls."""
+        """Number of calls to `open`, including failed calls."""
         self.is_open = False
         self.stall_open = False
         """Whether `open` blocks beyond its timeout, in violation of its contract."""
@@ -46,12 +46,12 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Send each of `chunks` separately, in the role of the robot."""
+        """Send each of `chunks` separately, as the robot."""
         self._arriving.extend(chunks)
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Close the connection in the role of the robot, after all data fed so far."""
+        """Close the connection as the robot, after all data fed so far."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 
@@ -60,7 +60,7 @@ class MemoryTransport:
         self._refusals.extend([reason] * times)
 
     def stall_sends(self, is_stalled: bool = True) -> None:
-        """Make the robot accept no more bytes, or accept bytes again."""
+        """Make the robot stop or resume accepting bytes."""
         if is_stalled:
             self._flowing.clear()
         else:
@@ -93,7 +93,7 @@ class MemoryTransport:
         return chunk
 
     async def send(self, data: bytes) -> None:
-        """Record `data`, and feed the reply of the robot."""
+        """Record `data`, and feed the robot's reply."""
         await self._flowing.wait()
         if not self.is_open:
             raise PeerClosed("the connection is closed")

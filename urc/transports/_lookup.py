@@ -1,4 +1,4 @@
-"""Lookups of network addresses that block neither the event loop nor the exit of the program."""
+"""Address lookups that block neither the event loop nor the exit of the program."""
 
 import asyncio
 import errno
@@ -25,7 +25,7 @@ class AddressLookup:
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Prepare a lookup for sockets of `kind`, without starting the lookup."""
+        """Prepare a lookup for sockets of `kind`, but do not start the lookup."""
         self._host = host
         self._port = port
         self._kind = kind
@@ -36,7 +36,7 @@ class AddressLookup:
 
         Raises:
             OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller sets a
-            time limit.
+                time limit.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)

@@ -84,7 +84,7 @@ class _Rfc2217(RFC2217SerialTransport):
                 return
             try:
                 super()._data_received(data[start : start + _AT_ONCE])
-            except Exception as fault:  # the library checks little of its input
+            except Exception as fault:  # the library hardly validates its input
                 self._fail(f"the server does not speak RFC 2217 ({reason(fault)})")
                 return
             # Discard old unsolicited options: the library would keep them and search them each
@@ -169,7 +169,7 @@ class SerialStream(asyncio.Protocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Pass `data` to the system after a wait for space; raise `PeerClosed` on an error."""
+        """Wait for space, then pass `data` to the system; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._transport.write(data)
@@ -178,7 +178,7 @@ class SerialStream(asyncio.Protocol):
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close the port after a short wait for unsent bytes; never raises."""
+        """Wait briefly for unsent bytes, then close the port; never raises."""
         with suppress(TimeoutError):
             async with asyncio.timeout(_DRAIN_S):
                 # The system does not report the transmission of the last byte.

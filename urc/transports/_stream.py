@@ -141,7 +141,7 @@ class TcpStream(asyncio.BufferedProtocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
+        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         await self._until_writable()
         self._transport.write(data)
         await self._until_writable()
@@ -221,7 +221,7 @@ class StreamTransport:
         return await self._stream.read()
 
     async def send(self, data: Payload) -> None:
-        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
+        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         await self._stream.write(as_bytes(data))
@@ -272,7 +272,7 @@ def tune(line: socket.socket) -> None:
     ):
         option = getattr(socket, name, None)
         if option is not None:
-            with suppress(OSError):  # known to Python, but not to this kernel
+            with suppress(OSError):  # supported by Python, but not by this kernel
                 line.setsockopt(socket.IPPROTO_TCP, option, value)
 
 

@@ -113,7 +113,7 @@ class _TlsStream:
                 await self._flush()
                 self._arrived.write(await self._stream.read())
             except ssl.SSLError:
-                await self._flush()  # the alert, which tells the other side the reason
+                await self._flush()  # the alert, which reports the reason to the other side
                 raise
             else:
                 await self._flush()
@@ -204,7 +204,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
 def _load_own(
     where: str, context: ssl.SSLContext, options: Mapping[str, object], *, is_server: bool
 ) -> None:
-    """Load the client or server certificate from the options, if any."""
+    """Load the client or server certificate if the options contain one."""
     certificate = _options.text(where, options, "cert")
     key = _options.text(where, options, "key")
     if not certificate:
@@ -212,8 +212,8 @@ def _load_own(
             raise TransportError(f"{where} needs a certificate as cert")
         return
     try:
-        # The library reads only files, and a key may be a secret setting: it is on the disk only
-        # during the call, in a private folder.
+        # The library reads only files, but a key may be a secret setting. The key is therefore on
+        # the disk only during the call, in a private folder.
         with tempfile.TemporaryDirectory(prefix="urc-") as folder:
             files = [Path(folder, name) for name in ("cert", "key")]
             files[0].write_text(_pem(certificate), "ascii")
@@ -228,7 +228,7 @@ def _no_password() -> str:
 
 
 def _pem(given: str) -> str:
-    """Return the contents of a file, or the text given in place of a file name."""
+    """Return the contents of a file, or the given text if it is not a file name."""
     return given if _PEM in given else Path(given).expanduser().read_text("ascii")
 
 

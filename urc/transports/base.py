@@ -3,7 +3,7 @@
 A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
 messages. A transport converts every exception of a library into one of the errors in this module.
 
-Only `urc.runtime.link` uses transports, and works equally if a transport runs in another process.
+Only `urc.runtime.link` uses transports, including transports in another process.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,8 +40,8 @@ __all__ = [
 
 NOTICE: Final = "notice"
 """Verb of notices, the messages that a transport itself creates. The body of a notice is a one-line
-text about an error that the robot does not report. Notices go to the robot's log and do not prove
-that the robot is alive.
+text about an error that the robot does not report. Notices are written to the robot's log and do
+not prove that the robot is alive.
 """
 
 
@@ -69,7 +69,7 @@ class Transport(Protocol):
 
     @property
     def address(self) -> str:
-        """Target of the connection as text to display, such as ``tcp 192.168.1.5:6789``."""
+        """Target of the connection as display text, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
         """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
@@ -82,7 +82,7 @@ class Transport(Protocol):
         """
 
     async def send(self, data: Payload) -> None:
-        """Send `data` after a wait for space; raise `TransportError` on a broken connection."""
+        """Wait for space, then send `data`; raise `TransportError` on a broken connection."""
 
     async def close(self) -> None:
         """Close immediately. The method never raises and may be called twice."""
@@ -102,7 +102,7 @@ class ByteStream(Protocol):
         """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
 
     async def write(self, data: bytes) -> None:
-        """Send `data` after a wait for buffer space; raise `PeerClosed` on a broken connection."""
+        """Wait for buffer space, then send `data`; raise `PeerClosed` on a broken connection."""
 
     async def abort(self) -> None:
         """Close immediately. The method never raises and may be called twice."""
@@ -135,7 +135,8 @@ class TransportSetup(NamedTuple):
     """Tunnel that carries the connection; None for the network of this machine."""
 
 
-# Optional abilities. Users check them once with `isinstance`, and work without them.
+# Optional capabilities. Callers check for each capability once with `isinstance`, and also work
+# without it.
 
 
 @runtime_checkable
@@ -201,7 +202,7 @@ class SupportsOffer(Protocol):
 
 @runtime_checkable
 class Prompt(SupportsOffer, Protocol):
-    """A byte transport that saves a task switch per message in both directions.
+    """A byte transport that avoids one task switch per message in both directions.
 
     The order of all bytes is preserved. `offer` refuses data while earlier data is waiting, and the
     sink receives nothing while `receive` has buffered data.

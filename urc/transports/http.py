@@ -56,7 +56,7 @@ class HttpTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``http http://192.168.4.1:80/``."""
+        """Target of the transport as display text, such as ``http http://192.168.4.1:80/``."""
         place = self._place
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 

@@ -83,7 +83,7 @@ class HttpClient:
 
     @property
     def where(self) -> str:
-        """Host and port as text to display."""
+        """Host and port as display text."""
         return self._place.authority
 
     async def reach(self, timeout_s: float = CONNECT_S) -> None:
@@ -96,7 +96,7 @@ class HttpClient:
         """Return a request for `path`, relative to the path in the document's URL.
 
         Raises:
-            HttpFault: the request is not valid HTTP, or its path leaves the base path.
+            HttpFault: the request is not valid HTTP, or its path is outside the base path.
         """
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
@@ -176,8 +176,8 @@ class HttpClient:
             return await self._client.send(request, stream=True)
         except (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError):
             raise
-        except Exception as fault:  # the library parses challenges and cookies without much care
-            # A new object: the old one would answer an invalid challenge forever.
+        except Exception as fault:  # the library hardly validates challenges and cookies
+            # Use a new object, because the old object would keep answering an invalid challenge.
             if (fresh := _auth(self._credentials)) is not None:
                 self._client.auth = fresh
             if isinstance(fault, _FAULTS):

@@ -54,7 +54,7 @@ class MultipartParser:
     def __init__(self, boundary: bytes, max_part_bytes: int) -> None:
         """Create a splitter at `boundary` (see `boundary_of`), for parts up to `max_part_bytes`."""
         # Between parts, the preceding line break and the dashes may be missing. Inside a part, they
-        # distinguish a delimiter from the picture.
+        # distinguish a delimiter from the image.
         self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))
         self._strict = re.compile(rb"\r?\n-+" + re.escape(boundary))
         self._keep = len(boundary) + 80

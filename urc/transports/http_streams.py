@@ -146,7 +146,7 @@ class HttpStream:
             )
 
     async def _mjpeg(self) -> None:
-        # An occasional byte keeps the response alive, but is no picture.
+        # An occasional byte keeps the response alive, but is not an image.
         patience = _ExtendableTimeout(SILENCE_S, "no picture")
         async with self._open({}, SILENCE_S) as response, patience:
             boundary = boundary_of(response.headers.get("content-type", ""))
@@ -229,7 +229,7 @@ class HttpStream:
 
     @property
     def _shown(self) -> str:
-        """Name of the stream as text to display."""
+        """Name of the stream as display text."""
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:

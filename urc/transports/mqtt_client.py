@@ -61,7 +61,7 @@ class MqttTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``mqtt 192.168.1.5:1883``."""
+        """Target of the transport as display text, such as ``mqtt 192.168.1.5:1883``."""
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -150,7 +150,7 @@ class _MqttSession:
         self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
         self._seen = 0
         self._writable: asyncio.Future[None] | None = None
-        """Future that ends when the kernel accepts more data; None if no task is waiting."""
+        """Future that completes when the kernel accepts more data; None if no task is waiting."""
         self._check: asyncio.TimerHandle | None = None
         self._client = self._make()
 
@@ -264,7 +264,7 @@ class _MqttSession:
             writable.set_result(None)
 
     def _readable(self) -> None:
-        """Let paho read all received packets; one paho call reads at most one packet."""
+        """Make paho read all received packets; each paho call reads at most one packet."""
         try:
             for _ in range(_PACKETS_A_TURN):
                 before = self._seen
@@ -274,7 +274,7 @@ class _MqttSession:
                     return
                 if self._seen == before:
                     return
-        except Exception as fault:  # paho checks little of its input
+        except Exception as fault:  # paho hardly validates its input
             self._lose(f"the broker sent an invalid packet ({reason(fault)})")
 
     def _tick(self) -> None:

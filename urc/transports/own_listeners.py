@@ -51,7 +51,7 @@ class OwnListeners:
             self._doors.append((_address(address), int(port)))
 
     def check(self, line: socket.socket) -> None:
-        """Raise `OwnAddressError` if a connected socket leads to URC's own dashboard."""
+        """Raise `OwnAddressError` if a socket is connected to URC's own dashboard."""
         peer = line.getpeername()
         if line.family in (socket.AF_INET, socket.AF_INET6):
             self.check_place(_address(peer[0]), peer[1])

@@ -59,7 +59,7 @@ class SerialTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``serial /dev/ttyUSB0``."""
+        """Target of the transport as display text, such as ``serial /dev/ttyUSB0``."""
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:

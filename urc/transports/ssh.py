@@ -161,7 +161,7 @@ class SshTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``ssh 192.168.1.5:22``."""
+        """Target of the transport as display text, such as ``ssh 192.168.1.5:22``."""
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:

@@ -121,7 +121,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         return data
 
     async def write(self, data: bytes) -> None:
-        """Send `data` after a wait for buffer space; raise `PeerClosed` on an error."""
+        """Wait for buffer space, then send `data`; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._channel.write(data)

@@ -124,7 +124,7 @@ async def _connect(
             target.address.host,
             target.address.port,
             client_factory=lambda: client,
-            config=None,  # ignore ~/.ssh/config: the document must mean the same for all users
+            config=None,  # ignore ~/.ssh/config, because a document must work equally for all users
             tunnel=through,
             known_hosts=([], list(known.authorities), list(known.revoked)),
             server_host_key_algs=host_key_algorithms(

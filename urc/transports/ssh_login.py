@@ -123,7 +123,7 @@ async def _private_key(login: Login) -> asyncssh.SSHKey:
 
 def _read_key(login: Login) -> asyncssh.SSHKey:
     if "-----BEGIN" in login.key:
-        # A setting is one line on some pages: its line ends became spaces there.
+        # Some pages show a setting as one line, which converts its line ends to spaces.
         return asyncssh.import_private_key(login.key.strip() + "\n", login.passphrase or None)
     return asyncssh.read_private_key(os.path.expanduser(login.key), login.passphrase or None)
 

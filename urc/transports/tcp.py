@@ -37,12 +37,12 @@ _Caller = tuple[socket.socket, str]
 
 
 class TcpListener(StreamTransport):
-    """A transport that listens for one robot; a newer connection replaces the present connection.
+    """A transport that listens for one robot; a newer connection replaces the current connection.
 
     After a failed `open`, the port keeps listening, so that a robot is not refused between two
-    attempts. After a replacement, the first `close` also keeps the port listening: within
-    `HANDOVER_S`, the next `open` receives the newer connection. Any other `close` stops listening
-    on the port.
+    attempts. After a replacement, the first `close` also keeps the port listening. The next `open`
+    within `HANDOVER_S` receives the newer connection. Any other `close` stops listening on the
+    port.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
@@ -72,7 +72,7 @@ class TcpListener(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Listening address as text to display, such as ``tcp 0.0.0.0:6789 (listening)``."""
+        """Listening address as display text, such as ``tcp 0.0.0.0:6789 (listening)``."""
         return f"tcp {self._place} (listening)"
 
     @property
@@ -193,7 +193,7 @@ class TcpListener(StreamTransport):
             self._meet(line, address)
 
     def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
-        """Store the newest connection for the next `open`, and end the present connection."""
+        """Store the newest connection for the next `open`, and end the current connection."""
         allowed = self._allowed_now[0] if self._allowed_now is not None else None
         if allowed is not None and _plain(address[0]) not in allowed:
             line.close()
@@ -205,7 +205,7 @@ class TcpListener(StreamTransport):
         self._replace()
 
     def _replace(self) -> None:
-        """Inform the present connection that it was replaced."""
+        """Inform the current connection about its replacement."""
         stream = self._stream
         if stream is None or self._newer is None:
             return
@@ -271,7 +271,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``tcp 192.168.1.5:6789``."""
+        """Target of the transport as display text, such as ``tcp 192.168.1.5:6789``."""
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:

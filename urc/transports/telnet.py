@@ -64,7 +64,7 @@ class TelnetTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``telnet 192.168.1.5:23``."""
+        """Target of the transport as display text, such as ``telnet 192.168.1.5:23``."""
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:

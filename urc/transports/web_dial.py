@@ -44,7 +44,7 @@ class Dialer:
 
     @property
     def place(self) -> str:
-        """Target of the connection as text to display."""
+        """Target of the connection as display text."""
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:
@@ -119,4 +119,4 @@ async def _until_closed(way: Coroutine[Any, Any, None]) -> None:
     try:
         await way
     except (PeerClosed, OSError):
-        return  # either side has ended; closing tells the other one
+        return  # either side has ended; closing informs the other side

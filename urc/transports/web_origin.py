@@ -137,7 +137,7 @@ class OptionReader:
         found: dict[str, str] = {}
         for name, value in self.part("headers").entries():
             text = str(value).strip()
-            # The value may be a secret: it is not shown.
+            # The value may be a secret, so it is not shown.
             if not _TOKEN.fullmatch(name) or not text.isprintable() or not text.isascii():
                 raise TransportError(f"{self.kind} cannot send the header {name[:40]!r}")
             if is_reserved(name) or name.lower() in _OURS:

@@ -102,7 +102,7 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     async def send(self, data: Payload) -> None:
-        """Pass one message to the kernel after a wait for buffer space.
+        """Wait for buffer space, then pass one message to the kernel.
 
         Raises:
             PeerClosed: the connection broke.
@@ -204,20 +204,20 @@ class WebSocketTransport:
 class _LimitedConnection(ClientConnection):
     """A WebSocket connection with a limit on unsent ping replies.
 
-    The library writes ping replies without a check of buffer space.
+    The library writes ping replies without checking for buffer space.
     """
 
     _untaken = 0
     _sign: asyncio.Future[None] | None = None
 
     def next_sign(self) -> asyncio.Future[None]:
-        """Return a future that ends after further data, or at the end of the connection."""
+        """Return a future that completes when more data arrives or the connection ends."""
         if self._sign is None or self._sign.done():
             self._sign = asyncio.get_running_loop().create_future()
         return self._sign
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wake the tasks that wait for further data."""
+        """Wake the tasks that are waiting for more data."""
         self._give_sign()
         super().connection_lost(exc)
 

@@ -1,1 +1,1 @@
-"""The dashboard: pages, static modules, and one WebSocket for each page."""
+"""The dashboard: pages, static modules, and one WebSocket per page."""

@@ -1,7 +1,7 @@
-"""Access control of pages: admission of browsers with a key, and the sign-in page for all others.
+"""Access control for pages: browsers with a key are admitted, all others get the sign-in page.
 
 Layer 5. The module contains an ASGI middleware inside the page policy. A visitor without a role
-reaches only the routes whose right is `ANYONE`, among them STOP and the files of the sign-in page.
+reaches only routes with the right `ANYONE`, such as STOP and the sign-in page's files.
 """
 
 import re
@@ -32,9 +32,9 @@ from urc.web.words import t
 __all__ = ["AccessMiddleware"]
 
 SAID = "sign in, or open the address that URC printed when it started"
-"""Refusal message for programs and sockets; `words.js` translates the message."""
+"""Refusal message for programs and sockets; `words.js` translates it."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
-"""Paths of the files that frames load, without the secret prefix."""
+"""Paths of the frames' files, without the secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
 _LONGEST_AGENT = 200
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
@@ -66,7 +66,7 @@ class AccessMiddleware:
         self._pages = pages
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward allowed requests to the application, and refuse all others."""
+        """Forward permitted requests to the application, and refuse all others."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -106,7 +106,7 @@ class AccessMiddleware:
         )
 
     def _warnings(self, scope: Scope) -> Iterator[str]:
-        """Yield the warnings of each page: the server's, and those of this connection."""
+        """Yield the warnings about the server and about this connection, for every page."""
         if self._access.anonymous is not None:
             yield t("Sign-in is off: everyone on this network can drive these robots.")
         client = scope.get("client") or ("",)
@@ -119,7 +119,7 @@ class AccessMiddleware:
         return any(one.matches(scope)[0] is Match.FULL for one in self._open)
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
-        """Return the response to a request with a key in its query."""
+        """Return the response to a request with a start key in its query."""
         rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
         # Never "//…", which would be another host.
         path = "/" + quote(scope["path"].lstrip("/"))
@@ -147,7 +147,7 @@ class AccessMiddleware:
 
 
 def _has_token(scope: Scope) -> bool:
-    """Return whether a request has a token, good or bad."""
+    """Return whether a request has a token, valid or not."""
     return any(
         name == b"authorization" and value[:7].lower() == b"bearer "
         for name, value in scope["headers"]
@@ -155,6 +155,6 @@ def _has_token(scope: Scope) -> bool:
 
 
 def _agent(scope: Scope) -> str:
-    """Return browser and system of a request in words."""
+    """Return a readable name of the request's browser and operating system."""
     found = (value for name, value in scope["headers"] if name == b"user-agent")
     return browser_name(next(found, b"").decode("latin-1")[:_LONGEST_AGENT])

@@ -39,18 +39,18 @@ _ABOUT: Final = (
     " WebSocket `/ws` is the other stream of a robot, and the better way for motion."
 )
 _ALL: Final = (413, 429, 503)
-"""Failures of every call: a request that is too large, or too many requests or connections."""
+"""Failures of every call: an oversized request, or too many requests or connections."""
 
 
 async def document(_: Request) -> Response:
-    """Return the document as a response."""
+    """Return the OpenAPI document as a response."""
     headers = {"cache-control": "no-store"}
     return Response(api_document(), media_type=JSON, headers=headers)
 
 
 @cache
 def api_document() -> bytes:
-    """Return the document as JSON."""
+    """Return the OpenAPI document as JSON."""
     kinds = [kind for call in CALLS for kind in (call.answer, call.body)]
     kinds = [kind for kind in kinds if kind not in (None, bytes)]
     _, components = msgspec.json.schema_components(

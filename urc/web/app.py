@@ -93,51 +93,50 @@ __all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
 
 _PAGE = {"cache-control": "no-store"}
 _LATE_S = 2.0
-"""Interval for entries about repeated events, in seconds."""
+"""Interval between audit entries with counts of repeated events, in seconds."""
 _NO_ROBOT = "no robot of that name is served here"
 
 
 @dataclass(frozen=True, slots=True)
 class DashboardOptions:
-    """Options of the application; by default nothing is stored, and no start key is shown."""
+    """Options of the application. By default, the server stores nothing and shows no start key."""
 
     access: Access | None = None
-    """Identities and rights of the server; None to create a key that is never shown."""
+    """Identities and rights of the server; None creates a start key that is never shown."""
     allowed_hosts: Collection[str] = ()
-    """Further accepted host names, besides addresses, ``localhost`` and the server's own names."""
+    """Accepted host names in addition to addresses, ``localhost`` and the server's own names."""
     linger_s: float = LINGER_S
-    """Time for which a robot stays connected after its last client has left, in seconds."""
+    """Time from a robot's last client's departure to the disconnection, in seconds."""
     data: Path | None = None
-    """Folder of the latches and the audit log; None to store neither."""
+    """Folder of the latches and the audit log; None stores neither."""
     audit: AuditLog | None = None
-    """Audit log of the folder, which the application closes at its end; None opens it."""
+    """Open audit log of the folder, closed when the application ends; None opens the log."""
     tiles: Path | None = None
-    """Folder of map tiles, ``z/x/y.png``; None for no tiles."""
+    """Folder of map tiles, ``z/x/y.png``; None for a server without tiles."""
     remake: Mapping[str, Remake] | None = None
-    """Functions that create a robot from its saved document; None for a server without developer
-    pages."""
+    """Functions that create a robot from its saved document; None without developer pages."""
     robot_options: RobotOptions | None = None
     """Options of the robot factory; None for a server without managers and settings."""
     trusted: Collection[str] = ()
     """Names of third-party widgets that run in the page instead of a frame."""
     recordings: Path | None = None
-    """Folder of the recordings; None for a server that records nothing."""
+    """Recordings folder; None for a server without recordings."""
     certificates: Certificates | None = None
-    """Certificates of HTTPS, whose authority devices may trust; None for plain HTTP."""
+    """Certificates for HTTPS, with an authority that devices may trust; None for plain HTTP."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
-    """Options of the ways to sign in."""
+    """Options of the sign-in methods."""
     notifier: AlarmNotifier | None = None
-    """Receiver of new alarms of all robots; None sends no notification."""
+    """Receiver of all robots' new alarms; None sends no notifications."""
 
 
 _DEFAULT: Final = DashboardOptions()
 
 
 def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT) -> Starlette:
-    """Return the application that serves `robots`, by the name in their URL.
+    """Return the application that serves `robots`, which are keyed by their names in URLs.
 
     Raises:
-        UrcError: two robots use different widgets of the same name, or a way to sign in needs an
+        UrcError: two robots use different widgets of the same name, or a sign-in method needs an
             extra package.
     """
     access, data, notifier = options.access or Access(), options.data, options.notifier
@@ -181,7 +180,7 @@ def _unread(entry: AuditEntry) -> None:
 
 
 class _Dashboard(Starlette):
-    """A Starlette application that applies the page policy even to error responses."""
+    """A Starlette application with the page policy on all responses, including errors."""
 
     def __init__(self, routes: "_Routes", options: DashboardOptions) -> None:
         self._access = access = routes.access
@@ -227,7 +226,7 @@ class _Dashboard(Starlette):
         )
 
     def build_middleware_stack(self) -> ASGIApp:
-        """Put the page policy around the whole application, with its error handlers."""
+        """Wrap the whole application in the page policy, including its error handlers."""
         inner = super().build_middleware_stack()
         door = AccessMiddleware(inner, self._access, self.routes, self._people.pages)
         policy = Policy(
@@ -260,16 +259,16 @@ class _Routes:
 
     @property
     def robots(self) -> Mapping[str, Robot]:
-        """All served robots, by the name in their URL."""
+        """All served robots, keyed by their names in URLs."""
         return self.fleet.robots
 
     @property
     def services(self) -> Mapping[str, RobotService]:
-        """The services of the robots, by the name in their URL."""
+        """The robots' services, keyed by the robots' names in URLs."""
         return self.fleet.services
 
     def add_managers(self, options: DashboardOptions) -> None:
-        """Add the managers and the developer pages that the options ask for."""
+        """Add the managers and developer pages that the options enable."""
         if options.robot_options is not None:
             factory = RobotFactory(options.robot_options)
             self.manager = Manager(factory, self.fleet, time.monotonic, self.renew)
@@ -278,7 +277,7 @@ class _Routes:
             self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
     def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
-        """Return the providers of pages with calls of the API."""
+        """Return the page providers that also have API calls."""
         found: list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart] = [
             AuditRoutes(self.audit, self.recorder, lambda: self.services, self.ways)
         ]
@@ -290,7 +289,7 @@ class _Routes:
         return found
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints of the API that every server has, by the name of their call."""
+        """Return the API endpoints of every server, keyed by call name."""
         return {
             "health": self.health,
             "stop": self.stop,
@@ -303,7 +302,7 @@ class _Routes:
         }
 
     def people_routes(self) -> PeopleRoutes:
-        """Return the routes of people, devices and sign-ins."""
+        """Return the routes for people, devices and sign-ins."""
         return PeopleRoutes(
             self.ways_in,
             stoppable=self.stoppable,
@@ -314,7 +313,7 @@ class _Routes:
         )
 
     def stoppable(self) -> list[Stoppable]:
-        """Return all robots that STOP can stop."""
+        """Return all robots with motion, which STOP can stop."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
@@ -322,7 +321,7 @@ class _Routes:
         ]
 
     def titles(self) -> dict[str, str]:
-        """Return the titles of all robots, by the name in their URL."""
+        """Return the titles of all robots, keyed by their names in URLs."""
         return {name: each.profile.title or name for name, each in self.robots.items()}
 
     def tags_of(self, name: str) -> tuple[str, ...]:
@@ -339,17 +338,17 @@ class _Routes:
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot) -> None:
-        """Switch to another version of a robot; raise `UrcError` when widgets conflict."""
+        """Switch to another version of a robot; raise `UrcError` if widgets conflict."""
         latch = latch_of(self.data, robot)
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
         self.services[name].controls.recorder.hide(secrets)
         self.services[name].replace(robot, latch)
-        self.access.recheck()  # grants may be for a tag that the new document lacks
+        self.access.recheck()  # the new document may lack a tag with grants
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        """Run one session supervisor for each robot, until the server ends."""
+        """Run one session supervisor for each robot until the server ends."""
         try:
             async with self.fleet.running() as group:
                 if self.manager is not None:
@@ -382,7 +381,7 @@ class _Routes:
                 await asyncio.to_thread(self.audit.close)
 
     async def _record_late(self) -> None:
-        """Record counts of repeated events, and jumps of the clock, until cancelled."""
+        """Record counts of repeated events and clock jumps until cancelled."""
         while True:
             await asyncio.sleep(_LATE_S)
             self.recorder.flush()
@@ -440,7 +439,7 @@ class _Routes:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
 
     async def stop(self, request: Request) -> Response:
-        """Stop a robot and latch the stop; pages without a working socket use this request."""
+        """Stop a robot and latch the STOP; pages without a working socket use this request."""
         service = self.services.get(request.path_params["name"])
         if service is None:
             return told(404, _NO_ROBOT, "unknown-robot")
@@ -486,14 +485,14 @@ class _Routes:
                 await client.serve()
 
     async def spare(self, websocket: WebSocket) -> None:
-        """Serve the redundant socket of a page that drives."""
+        """Serve the redundant socket of a page in control."""
         _, service = await self._accepted(websocket)
         if service is not None:
             flow = websocket.scope["state"]["flow"]
             await RedundantSocket(websocket, service.controls, service.clock, flow).serve()
 
     async def _accepted(self, websocket: WebSocket) -> tuple[str, RobotService | None]:
-        """Accept a socket; return name and service of its robot, or close the socket."""
+        """Accept a socket; return its robot's name and service, or close the socket."""
         await websocket.accept()
         names = list(self.services)
         name = websocket.query_params.get("robot", names[0] if len(names) == 1 else "")

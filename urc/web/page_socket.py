@@ -1,8 +1,8 @@
-"""The WebSocket of one page, which checks each message and never waits for another page.
+"""The WebSocket of one page, which checks each message and never waits for other pages.
 
-Layer 5. Two tasks of one group read and write. The writer sends the newest state as soon as the
-socket is free, so a slow page skips frames. A page that reads nothing for `STALL_S` seconds is
-disconnected.
+Layer 5. One task reads, and another task of the same group writes. The writer sends the newest
+state as soon as the socket is free, so a slow page skips frames. A page that reads no data for
+`STALL_S` seconds is disconnected.
 """
 
 import asyncio
@@ -30,10 +30,10 @@ __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientS
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, newer
+"""Maximum rate of ticks from held controls; a higher rate closes the socket. Below this rate, newer
 ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
-"""First bytes of a page's tick; ticks in any other form are decoded more slowly."""
+"""First bytes of a page's tick; decoding ticks in any other form takes longer."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 STALL_S = 15.0
@@ -45,14 +45,14 @@ log = logging.getLogger(__name__)
 
 
 class BrowserClient:
-    """The server's side of one page, until either side closes."""
+    """The server side of a page's connection."""
 
     def __init__(
         self,
         line: ClientSocket,
         service: RobotService,
         flow: FlowControl,
-        peer: SocketPeer = SocketPeer(),  # noqa: B008 - it cannot be changed
+        peer: SocketPeer = SocketPeer(),  # noqa: B008 - the default is immutable
     ) -> None:
         self._line = line
         self._service = service
@@ -65,8 +65,8 @@ class BrowserClient:
         self._place = Place()
         self._alarm_place = AlarmPlace()
         self._live: LiveSession | None = None
-        """The robot's open session; None until the page has received the indexes of the session's
-        values."""
+        """The robot's open session; None until the page has received the session's signal
+        indexes."""
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
@@ -89,10 +89,10 @@ class BrowserClient:
                 await self._visit()
 
     def recheck(self) -> None:
-        """Look at the visitor's rights again: stop what it may no longer drive, or close the page.
+        """Check the visitor's rights again: stop forbidden motion, and close a page without rights.
 
-        A page of a visitor without any right at the robot closes, and the robot that it drove
-        stops, before this method returns.
+        If the visitor has no right at the robot any more, the motion that it controls stops before
+        this method returns, and the socket closes.
         """
         if self._operator is not None:
             self._service.controls.recheck(self._operator)
@@ -160,7 +160,7 @@ class BrowserClient:
         self._live = live
         while True:
             async with asyncio.timeout(STALL_S):
-                # Values taken before the socket is free would be outdated when they are sent.
+                # Values read before the socket is free would be outdated when sent.
                 await self._flow.drained()
                 self._news.clear()
                 self._send_shared(live)
@@ -176,9 +176,9 @@ class BrowserClient:
             await self._news.wait()
 
     def _flushed(self) -> None:
-        """Send a flush of the fan-out now if the socket is free; leave other work to the writer.
+        """Send a flush of the fan-out if the socket is free; leave all other work to the writer.
 
-        Waking the writer for every flush would take three times as long as the direct send.
+        Waking the writer for every flush would take three times as long as sending directly.
         """
         live = self._live
         if live is not None and self._flow.is_free() and not self._closing:
@@ -188,7 +188,7 @@ class BrowserClient:
         self._news.set()
 
     def _send_shared(self, live: LiveSession) -> None:
-        """Send the data shared by all pages, then images until the kernel's buffer is full."""
+        """Send the shared data of all pages, then images until the kernel's buffer is full."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
         while self._place.subscription.names and self._flow.is_free():
@@ -227,7 +227,7 @@ class BrowserClient:
             self._is_listening = False
 
     def _offered(self, data: bytes) -> bool:
-        """Handle a tick while no earlier message is pending; return False for any other message."""
+        """Handle a tick if no earlier message is pending; return False for other messages."""
         operator = self._operator
         if operator is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False

@@ -1,4 +1,4 @@
-"""The services of all robots of a server, with their stored latches, alarms and audit entries."""
+"""The services of all robots on a server, with stored latches, alarms and audit entries."""
 
 import asyncio
 import time
@@ -24,18 +24,18 @@ __all__ = ["Stores", "fleet_of", "latch_of"]
 
 
 class Stores(NamedTuple):
-    """The stores of a server that last over restarts; None keeps nothing."""
+    """A server's persistent stores; None disables a store."""
 
     data: Path | None
-    """Folder of the data."""
+    """Data folder."""
     audit: AuditLog | None
     alarms: AlarmStore | None
     notifier: AlarmNotifier | None
-    """Receiver of new alarms of all robots."""
+    """Receiver of all robots' new alarms."""
 
 
 def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fleet:
-    """Return the fleet of `robots`; each is connected until `linger_s` after its last page."""
+    """Return the fleet; each robot stays connected for `linger_s` after its last page."""
     start_lock = asyncio.Lock()
     return Fleet(
         robots,
@@ -51,7 +51,7 @@ def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fl
 
 
 def _alarms(stores: Stores, name: str, robot: Robot) -> RobotAlarms:
-    """Return the alarms of a robot; those of a playback are neither stored nor notified."""
+    """Return a robot's alarms; a playback's alarms are neither stored nor sent as notifications."""
     is_live = robot.playback is None
     found = RobotAlarms(
         robot.profile.driver,

@@ -1,11 +1,11 @@
-"""Texts of the pages in the user's language; the English text is the key and the fallback.
+"""Page texts in the user's language, with the English text as key and fallback.
 
 Layer 5. The catalogues are in gettext format (``translations/*.po``), written and checked by
-``scripts.translations``. This module reads the compiled form of the catalogues, with one flat table
-for each language. The pages' modules import the same table under the name ``urc/words``, so the
-server and the pages use the same texts.
+``scripts.translations``. This module reads the compiled catalogues, with one flat table for each
+language. The pages' modules import the same table as ``urc/words``, so server and pages use the
+same texts.
 
-Texts from the documents of a robot, such as the titles of signals, are not translated.
+Texts from a robot's documents, such as signal titles, are not translated.
 """
 
 import json
@@ -35,7 +35,7 @@ __all__ = [
 
 
 def spoken(line: str) -> str:
-    """Return a line in the current language; a text that is no `Phrase` stays unchanged."""
+    """Return a line in the current language; texts other than a `Phrase` stay unchanged."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:
@@ -51,9 +51,9 @@ LANGUAGES: Mapping[str, str] = {
     "fr": "Français",
     "it": "Italiano",
 }
-"""Name of each language in the language itself, by BCP 47 tag."""
+"""Native name of each language, by BCP 47 tag."""
 MOST_WISHES = 20
-"""Maximum number of entries that are read from an Accept-Language header."""
+"""Maximum number of entries read from an Accept-Language header."""
 
 _HOLE = re.compile(r"\{([a-z_]+)\}")
 
@@ -78,19 +78,19 @@ def table(tag: str) -> Mapping[str, str]:
 
 
 def address(tag: str) -> str:
-    """Return the URL of the table of a language."""
+    """Return the URL of a language's table."""
     return "/static/core/english.js" if tag == "en" else f"/words/{tag}.js"
 
 
 def module(tag: str) -> str:
-    """Return the table of a language as a JavaScript module, for `kit.js`."""
+    """Return a language's table as a JavaScript module, for `kit.js`."""
     return f"export default {json.dumps(table(tag), ensure_ascii=False)};\n"
 
 
 def choose(chosen: str, accepted: str) -> str:
-    """Return the language for a user, as a BCP 47 tag.
+    """Return the BCP 47 tag of a user's language.
 
-    `chosen` is the language picked on the device, or "". `accepted` is the Accept-Language header
+    `chosen` is the language chosen on the device, or "". `accepted` is the Accept-Language header
     (RFC 9110, 12.5.4).
     """
     if chosen in LANGUAGES:

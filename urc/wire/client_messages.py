@@ -1,7 +1,8 @@
-"""The shapes of the messages from a client to the server, by their tag ``t``.
+"""The shapes of client messages, by their tag ``t``.
 
 Layer 3½. Pure: `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
-limit the nesting depth: the decoder refuses anything deeper than a map of plain arguments.
+limit the nesting depth: the decoder refuses values nested more deeply than a map of plain
+arguments.
 """
 
 from collections.abc import Mapping
@@ -40,11 +41,11 @@ __all__ = [
 INBOUND_BYTES = 64 * 1024
 """Maximum length of a message from a client, in bytes."""
 SCREEN_NAME_LENGTH: Final = 40
-"""Maximum length of the name of a screen, in characters."""
+"""Maximum length of a screen name, in characters."""
 
 _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
-"""Arguments of a command, as the client sends them."""
+"""Arguments of a command, as sent by the client."""
 Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
 """A request about the lease, or the reset of STOP."""
 
@@ -66,7 +67,7 @@ class CommandRequest(
     token: str = ""
     """Token from `ApprovalRequest`, if the driver requires a confirmation."""
     stops: int | None = None
-    """Number of STOPs that the page knew at the operator's click; None skips the check."""
+    """Number of STOPs known to the page at the operator's click; None skips the check."""
 
 
 class ImageSelection(
@@ -80,7 +81,7 @@ class ImageSelection(
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """The answer to question `n`; False from the asking page withdraws the question."""
+    """The answer to question `n`; the asking page withdraws the question with False."""
 
     n: int
     yes: bool
@@ -95,7 +96,7 @@ class ApprovalRequest(
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """Number of STOPs that the page knew. The server checks only the number in `CommandRequest`."""
+    """Number of STOPs known to the page. The server checks only the number in `CommandRequest`."""
 
 
 class SequenceAction(
@@ -110,16 +111,16 @@ class SequenceAction(
 class ScreenName(
     msgspec.Struct, tag_field="t", tag="name", forbid_unknown_fields=True, frozen=True
 ):
-    """The name of a screen without a sign-in of its own, such as “Tablet in the lab”."""
+    """The name of a screen without its own sign-in, such as “Tablet in the lab”."""
 
     name: Annotated[str, msgspec.Meta(max_length=SCREEN_NAME_LENGTH)] = ""
-    """"": back to the number of the screen."""
+    """"" resets the name to the number of the screen."""
 
 
 class Reconnect(
     msgspec.Struct, tag_field="t", tag="reconnect", forbid_unknown_fields=True, frozen=True
 ):
-    """A request to try all lost connections of the robot now, instead of after the backoff."""
+    """A request to reopen the robot's lost connections now, instead of after the backoff."""
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
@@ -199,5 +200,5 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     Release: "drive",
     Stop: None,
 }
-"""The least role that each message needs at the robot; None: every page may send it. A command may
-need more, see `urc.model.driver.Command`, and taking the controls by force needs ``maintain``."""
+"""The lowest role that may send each message; None: every page may send it. A command may require a
+higher role (see `urc.model.driver.Command`). Taking the controls by force requires ``maintain``."""

@@ -1,4 +1,4 @@
-"""The layout of a binary message with one image or other bytes of a signal.
+"""The layout of a binary message with a signal's image or other bytes.
 
 Layer 3½. Pure::
 
@@ -21,13 +21,13 @@ class PictureMessage(NamedTuple):
     """The bytes of a signal."""
 
     signal_index: int
-    """Index of the signal in the names of `HelloMessage`."""
+    """Index of the signal in the `names` of `HelloMessage`."""
     age_ms: int
     data: bytes
 
 
 def read_picture(message: bytes) -> PictureMessage | None:
-    """Return the content of a binary message; None for a message of another kind."""
+    """Return the content of a binary message; None for other kinds of messages."""
     if len(message) < PICTURE_HEADER.size:
         return None
     kind, type_length, index, age_ms, _ = PICTURE_HEADER.unpack_from(message)

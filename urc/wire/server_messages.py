@@ -1,4 +1,4 @@
-"""The shapes of the messages from the server to a client, by their tag ``t``.
+"""The shapes of server messages, by their tag ``t``.
 
 Layer 3½. Pure: `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
 milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
@@ -88,7 +88,7 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
     version: int
     session: str
-    """Identifier of the session; in a new session, the numbers of log lines restart."""
+    """Identifier of the session; the numbers of log lines restart in each new session."""
     robot: str
     title: str
     now: int
@@ -117,7 +117,7 @@ class ValuesMessage(Outbound, tag="v", frozen=True):
 
 
 class LinkRow(msgspec.Struct, frozen=True):
-    """The state of one transport; `since` is the time in this state, in milliseconds."""
+    """The state of one transport; `since` is the duration of this state, in milliseconds."""
 
     transport: str
     state: str
@@ -127,7 +127,7 @@ class LinkRow(msgspec.Struct, frozen=True):
     attempts: int
     faults: int
     cause: str = ""
-    """Name of the cause of a lost connection; "" if it is unknown."""
+    """Cause of a lost connection, by name; "" for an unknown cause."""
 
 
 class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):
@@ -149,7 +149,7 @@ class LogMessage(Outbound, tag="log", omit_defaults=False, frozen=True):
     """New lines of the log, oldest first; a gap in the numbers shows dropped lines."""
 
     first: int
-    """Number of the first line of the log within the session, from 0."""
+    """Number of the first log line within the session, from 0."""
     lines: list[LogRow]
 
 
@@ -173,7 +173,7 @@ class PongMessage(Outbound, tag="pong", frozen=True):
 
 
 class ErrorMessage(Outbound, tag="error", frozen=True):
-    """The reason why a message was invalid, or why the socket closes."""
+    """The reason why a message was invalid, or why the server closes the socket."""
 
     code: str
     message: str
@@ -187,11 +187,11 @@ class OperatorRow(msgspec.Struct, frozen=True):
 
 
 class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
-    """The lease of the robot: its holder, the client that asks for it, and the latch of STOP."""
+    """The robot's lease: its holder, the client that requests it, and the latch of STOP."""
 
     you: str
     name: str
-    """Name of the page, as other pages show it."""
+    """Name of the page, as shown on other pages."""
     epoch: int
     holder: OperatorRow | None
     asker: OperatorRow | None
@@ -214,7 +214,7 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):
-    """A heartbeat number for the client that drives; its ticks echo the number."""
+    """A heartbeat number for the driving client, which echoes the number in its ticks."""
 
     n: int
 
@@ -287,11 +287,11 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     state: str
     """``unacknowledged``, ``acknowledged``, ``returned``, ``shelved`` or ``suppressed``."""
     number: int
-    """Number of the activation; the order of the numbers is first-out."""
+    """Number of the activation; these numbers give the first-out order."""
     group: int
-    """Number of the burst of alarms."""
+    """Number of the alarm burst."""
     raised: int
-    """Number that an acknowledgement must repeat."""
+    """Number to repeat in an acknowledgement."""
     began: int
     value: str = ""
     active: bool = False
@@ -310,16 +310,16 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
 
 
 class AlarmsMessage(Outbound, tag="alarms", frozen=True):
-    """Changed alarms of the robot; `full`: all alarms that are not normal."""
+    """Changed alarms of the robot; `full`: all non-normal alarms."""
 
     now: int
     """Server time in ms since 1970."""
     rows: list[AlarmRow]
     gone: tuple[str, ...] = ()
-    """Signals whose alarm is normal now."""
+    """Signals whose alarm is now normal."""
     full: bool = False
     flood: bool = False
-    """Whether more than 10 alarms have come in 10 minutes."""
+    """Whether more than 10 alarms began within 10 minutes."""
 
 
 ServerMessage = (

@@ -5,7 +5,7 @@
 import { ALARMS, attribute, button, part, write } from "urc/kit";
 import { hush, say } from "./voice.js";
 
-/** Most drawn alarms; the rest is counted. */
+/** Maximum number of drawn alarms; the widget only counts the others. */
 const MOST_SHOWN = 50;
 
 export default {
@@ -69,14 +69,14 @@ export default {
       write(note, alerts.length === 0 ? `— ${words}` : words);
     }
 
-    /** Text for no alert: all is well only if every limited signal has a value. */
+    /** Text without an alert: “all is well” requires a value of every signal with limits. */
     function calm() {
       const { limited, known } = watched;
       if (isUp && known === limited) return t("✓ no alert");
       return isUp && known > 0 ? t("no alert") : "";
     }
 
-    /** Number of limited signals without a value. */
+    /** Number of signals with limits but without a value. */
     function unknown() {
       const count = watched.limited - watched.known;
       if (!isUp) return t("no connection to URC");
@@ -148,7 +148,7 @@ export default {
       isUp = news.isUp;
       show();
     });
-    follow("lease", show); // who may act
+    follow("lease", show); // the lease determines the rights
     return { destroy: hush };
   },
 };

@@ -2,8 +2,8 @@
 /**
  * A tape that moves past a mark. Pure.
  *
- * Its rungs are drawn for three times the visible range, and then only moved; it is redrawn when the
- * mark comes near an end.
+ * The tape is drawn for three times the visible range, and then only moved. It is redrawn when the mark
+ * approaches an end.
  */
 import { wholes } from "urc/axis_ticks";
 

@@ -6,7 +6,7 @@ import { attribute, clamp, drawing, format, noteOf, number, part, style, svg, wr
 import { digitsOf } from "urc/axis_ticks";
 import { covers, offset, tape } from "./tape.js";
 
-/** Climb below which the flight is level, as a share of a unit. */
+/** Climb below which the flight counts as level, as a fraction of a unit. */
 const LEVEL = 0.05;
 
 export default {

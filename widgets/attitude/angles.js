@@ -3,7 +3,8 @@
  * The attitude of a vehicle, from the angles of its robot. Pure.
  *
  * Axes as in REP 103: FLU is x forward, y left, z up; FRD is x forward, y right, z down. Roll has the
- * same sign in both, pitch and yaw do not: a positive pitch is nose down in FLU, nose up in FRD.
+ * same sign in both conventions. Pitch and yaw have opposite signs: a positive pitch is nose down in FLU
+ * and nose up in FRD.
  *
  * @typedef {{roll: number | null, pitch: number | null, yaw: number | null}} Angles Angles in radians, in
  *   the axes of the robot; null if unknown.
@@ -41,7 +42,7 @@ export function ofQuaternion(parts, order) {
  */
 function ofUnit(x, y, z, w) {
   const sine = Math.min(1, Math.max(-1, 2 * (w * y - z * x)));
-  // At nose straight up or down, roll and yaw have the same axis: yaw gets the whole angle.
+  // With the nose straight up or down, roll and yaw have the same axis: yaw gets the whole angle.
   if (Math.abs(sine) > 1 - 1e-9) {
     const yaw = -2 * Math.sign(sine) * Math.atan2(x, w);
     return { roll: 0, pitch: (Math.sign(sine) * Math.PI) / 2, yaw };

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The views of an attitude. Each has `show(lean)`, which moves elements and creates none.
+ * The views of an attitude. Each view has `show(lean)`, which moves elements but creates no elements.
  *
  * @typedef {import("./angles.js").Lean} Lean
  * @typedef {{show: (lean: Lean) => void}} View
@@ -8,7 +8,7 @@
 import { attribute, clamp, drawing, format, part, style, svg, write } from "urc/kit";
 import { solid } from "./angles.js";
 
-/** Units for each degree: 84 degrees are visible from top to bottom. */
+/** Units per degree: 84 degrees are visible from top to bottom. */
 const PER_DEGREE = 2;
 const BANKS = [-60, -45, -30, -20, -10, 0, 10, 20, 30, 45, 60];
 /** Ends of the bars of the axes, in degrees. */
@@ -40,7 +40,7 @@ class Horizon {
    */
   constructor(el, isVehicle) {
     this.isVehicle = isVehicle;
-    // It has a drawing of its own to be turned: turned within one, all its texts are laid out again.
+    // The horizon is a separate drawing: rotation within another drawing would lay out all texts again.
     this.sphere = drawing(el, ".attitude-sphere");
     this.world = drawing(el, ".attitude-world");
     this.symbol = drawing(el, ".attitude-symbol");

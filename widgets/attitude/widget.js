@@ -8,7 +8,7 @@ import { attribute, mark, noteOf, number, numbers, part, worst, write } from "ur
 import { DEGREES, leanOf, ofQuaternion } from "./angles.js";
 import { viewOf } from "./views.js";
 
-/** Share of a limit from which on it is a caution. */
+/** Fraction of a limit at which a caution begins. */
 const NEAR = 0.8;
 /** Names of the angles. */
 const NAMES = { bank: mark("roll"), nose: mark("pitch"), turn: mark("yaw") };
@@ -64,7 +64,7 @@ function partsOf(view) {
 }
 
 /**
- * Return the state of the shown readings; without any, the state of all bound ones.
+ * Return the state of the shown readings or, without shown readings, of all bound readings.
  *
  * @param {readonly (Reading | undefined)[]} known
  * @param {readonly (Reading | undefined)[]} all
@@ -109,8 +109,8 @@ function passed({ bank, nose }, options) {
 }
 
 /**
- * Describe the attitude in words that need no convention. With an unknown angle it is never called
- * level.
+ * Describe the attitude in words that do not depend on a convention. An attitude with an unknown angle
+ * is never called level.
  *
  * @param {Lean} lean
  * @param {readonly (keyof Lean)[]} missing

@@ -103,7 +103,7 @@ class Lever {
     speak(this.el, value, this.isUpright ? t("up") : t("to the right"), this.isUpright ? t("down") : t("to the left"));
   }
 
-  /** Draw the robot's own position, if it is within the scale. @param {Reading | undefined} reading */
+  /** Draw the position that the robot reports, if the position is within the scale. @param {Reading | undefined} reading */
   echo(reading) {
     const { min, max } = reading?.signal ?? {};
     const value = reading?.value;

@@ -32,7 +32,7 @@ export default {
         if (!value) return;
         const known = meter.show(value);
         const place = known === null ? origin : share(known, ...meter.scale);
-        // On the part that shows it: all parts would inherit a property of the root.
+        // Set on the part that uses the property: all parts would inherit a property of the root.
         style(fill, "--bar-from", Math.min(origin, place).toFixed(4));
         style(fill, "--bar-long", Math.abs(place - origin).toFixed(4));
         if (known !== null) extremes?.add(place);

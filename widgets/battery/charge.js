@@ -13,7 +13,7 @@
  */
 export function timeLeft(level, current, capacity) {
   if (level === null || current === null || typeof capacity !== "number") return null;
-  // With almost no current the result would be absurdly long.
+  // With almost no current, the result would be unrealistically long.
   if (current > -capacity / 1000) return null;
   return (3600 * capacity * Math.max(0, level)) / 100 / -current;
 }
@@ -47,7 +47,7 @@ export function spread(cells) {
  * @returns {[number, number]}
  */
 export function cellScale({ unit, min, max }, options) {
-  // Default: a lithium cell; the options override it.
+  // The default is a lithium cell; options override the default.
   const [empty, full] = unit === "V" ? [3, 4.2] : [0, 100];
   const least = typeof options.cell_min === "number" ? options.cell_min : (min ?? empty);
   const most = typeof options.cell_max === "number" ? options.cell_max : (max ?? full);
@@ -55,7 +55,7 @@ export function cellScale({ unit, min, max }, options) {
 }
 
 /**
- * A running mean over some seconds, so that the remaining time does not jump with each motor start.
+ * A running mean over a few seconds, so that the remaining time does not jump at each motor start.
  */
 export class Mean {
   /** @param {number} seconds */

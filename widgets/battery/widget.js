@@ -8,7 +8,7 @@ import { share } from "urc/axis_ticks";
 import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
 import { INSIDE, mark } from "./drawing.js";
 
-/** Width of a unit's character, relative to a digit. */
+/** Width of a character of the unit, relative to a digit. */
 const UNIT_WIDTH = 0.86;
 const MEAN_S = 30;
 

@@ -1,17 +1,17 @@
 // @ts-check
 /**
  * Gestures on a button: double tap, long press, repeat. A click without a pointer, from a screen reader
- * or a key, counts as the whole gesture if the gesture cannot be told by time.
+ * or a key, counts as the whole gesture if time cannot distinguish the gesture.
  */
 
 import { isDown } from "urc/command_kit";
 
-/** Time of a long press. */
+/** Duration of a long press. */
 export const HOLD_MS = 800;
 /** Longest time between the taps of a double tap. */
 export const DOUBLE_MS = 500;
 const EVERY_MS = 40;
-/** Time after which a touch is a press, and not the start of a scroll. */
+/** Time after which a touch is a press instead of the start of a scroll. */
 const SETTLE_MS = 100;
 
 /**
@@ -40,7 +40,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
       if (gesture === "tap" || isSecond) done();
     }, { signal });
     el.addEventListener("keydown", (event) => {
-      // A held key repeats its clicks: they count as one tap.
+      // A held key repeats its clicks; all these clicks count as one tap.
       if (event.repeat && event.key === "Enter") event.preventDefault();
     }, { signal });
     return () => (firstMs = -Infinity);

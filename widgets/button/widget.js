@@ -8,7 +8,7 @@ import { listen } from "./gesture.js";
 
 /** Time limit of a question. */
 const ASK_MS = 5000;
-/** Taps within this time of the first one do not count: the operator has not read the question yet. */
+/** Time after the first tap in which taps do not count: the operator has not read the question yet. */
 const READ_MS = 400;
 
 export default {
@@ -65,7 +65,7 @@ class Button {
       const end = listen(this.main, {
         gesture,
         repeatMs: Number(options["repeat_ms"] ?? 250),
-        // A repeat skips a pending or cooling command; without the robot the gesture ends.
+        // A repeat skips a pending or cooling command. Without the robot, the gesture ends.
         isReady: gesture === "repeat" ? () => this.giver.isReady : isReady,
         done: () => this.press(),
         progress: (share) => style(fill, "--button-share", share.toFixed(2)),
@@ -79,7 +79,7 @@ class Button {
     el.querySelector(".button-no")?.addEventListener("click", () => this.answer(false), { signal });
     el.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.isAsking) return;
-      event.preventDefault(); // Escape means no here, and not STOP
+      event.preventDefault(); // here, Escape means no instead of STOP
       this.answer(false);
     }, { signal });
   }

@@ -16,7 +16,7 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Most enlargement of an image that fills the background: half of it stays visible. */
+/** Maximum enlargement of an image that fills the background: half of the image stays visible. */
 const MOST_ZOOM = 1.9;
 
 /**
@@ -48,8 +48,8 @@ export function place(picture, box, { fit, rotate, mirror }) {
 }
 
 /**
- * Return the drag of the view as pan and tilt from -1 to 1: the image follows the finger, so the camera
- * turns the other way. Pan is positive to the left (REP 103), tilt upwards.
+ * Return the drag of the view as pan and tilt from -1 to 1. The image follows the finger, so the camera
+ * turns in the opposite direction. Pan is positive to the left (REP 103), tilt upwards.
  *
  * @param {{x: number, y: number, startX: number, startY: number}} hand
  * @param {Size} box
@@ -61,7 +61,7 @@ export function lookOf(hand, box) {
 }
 
 /**
- * Return the age of an image as text, with tenths while they matter.
+ * Return the age of an image as text, with tenths for small ages.
  *
  * @param {number} seconds
  */
@@ -83,7 +83,7 @@ export function fileName(title, when) {
   return `${plain || "camera"}-${stamp}.png`;
 }
 
-/** Images per second, over the last few. */
+/** Rate of the last few images, in images per second. */
 export class Rate {
   constructor() {
     /** @type {number[]} */

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Decoder for the images of the chosen camera, one at a time: the newest wins, none is queued.
+ * Decoder for the images of the chosen camera, one at a time. The newest image replaces any waiting image.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Picture} Picture
  *
@@ -23,7 +23,7 @@ export class Newest {
     this.serial = -1;
     this.isBusy = false;
     this.isOver = false;
-    /** Number of the camera: images of an earlier one are not shown. */
+    /** Number of the camera; images of earlier cameras are not shown. */
     this.source = 0;
     /** @type {Shown | null} */
     this.shown = null;

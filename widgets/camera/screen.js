@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * A canvas that shows whole bitmaps. It takes each bitmap as it is, and the browser scales it when it
- * composes the page: drawing it in its size on the screen costs many times as much without a graphics
- * processor.
+ * A canvas that shows whole bitmaps. The canvas keeps the size of each bitmap, and the browser scales it
+ * when it composes the page. Without a graphics processor, drawing the bitmap at its screen size takes
+ * much longer.
  */
 
 export class Screen {
@@ -17,7 +17,7 @@ export class Screen {
    * Show a bitmap, which is empty afterwards.
    *
    * @param {ImageBitmap} bitmap
-   * @returns {boolean} whether its size differs from the size of the last one
+   * @returns {boolean} whether its size differs from the size of the previous bitmap
    */
   show(bitmap) {
     const { canvas, screen, pen } = this;

@@ -62,7 +62,7 @@ class Camera {
     /** @type {HTMLButtonElement[] | undefined} */
     this.switches = undefined;
     this.fault = "";
-    /** Note for the hand that turns the camera. */
+    /** Note for the operator who turns the camera. */
     this.hand = "";
     this.pictures = new Newest(
       (bitmap) => {
@@ -159,7 +159,7 @@ class Camera {
     this.tell();
   }
 
-  /** Show a button for each camera. Titles come with the signals, maybe after the first reading. */
+  /** Show a button for each camera. Titles arrive with the signals, sometimes after the first reading. */
   showSwitches() {
     const isFirst = !this.switches;
     this.switches ??= this.sources.map((_, index) => {
@@ -205,7 +205,7 @@ class Camera {
     return isGround && !this.isWhole ? "zoom" : "contain";
   }
 
-  /** Place the image in its box: the browser scales it, so that no frame is drawn again. */
+  /** Place the image in its box. The browser scales the image, so that no frame must be redrawn. */
   draw() {
     const size = { width: this.face.clientWidth, height: this.face.clientHeight };
     const { shown } = this.pictures;

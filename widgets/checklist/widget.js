@@ -17,7 +17,7 @@ export default {
     const hasCommand = command("complete") !== null;
     const giver = new CommandState({ give: () => send("complete"), show, t, signal });
     if (!hasCommand) giver.reason = "";
-    /** Ticked items, stored by their text, so that a changed list is not ticked by position. */
+    /** Ticked items, stored by text, so that ticks do not move to other items if the list changes. */
     const kept = memory.read();
     const known = new Set(Array.isArray(kept) ? kept.map(String) : []);
     const boxes = [...el.querySelectorAll(".checklist-item")].map((item) => {

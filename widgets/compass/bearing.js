@@ -60,7 +60,7 @@ export function point(degrees) {
 }
 
 /**
- * Return a bearing in three digits, never 360.
+ * Return a bearing as three digits, from 000 to 359.
  *
  * @param {number | null} degrees
  */

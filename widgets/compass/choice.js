@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Choice of a heading: by a tap on the rose or by arrow keys, then a button that sends it. A choice alone
- * sends nothing.
+ * Choice of a heading by a tap on the rose or by arrow keys. A button sends the chosen heading; the
+ * choice alone sends nothing.
  */
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
@@ -71,7 +71,7 @@ export class Choice {
   click(event) {
     const { left, top, width, height } = this.rose.getBoundingClientRect();
     const [right, down] = [event.clientX - left - width / 2, event.clientY - top - height / 2];
-    // In the middle, the width of a finger would decide about the direction.
+    // In the middle, a finger is too wide to point in a direction.
     if (Math.hypot(right, down) < Math.min(width, height) / 12) return;
     this.choose(Math.round(bearingAt(right, down, this.up)));
   }

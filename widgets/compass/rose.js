@@ -6,7 +6,7 @@ import { svg } from "urc/kit";
 import { bearing } from "./bearing.js";
 
 const LETTERS = ["N", "E", "S", "W"];
-/** Units of the tape for each degree: 120 degrees are visible. */
+/** Units of the tape per degree: 120 degrees are visible. */
 export const PER_DEGREE = 200 / 120;
 
 /** The needle that points straight up. */

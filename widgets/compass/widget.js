@@ -9,9 +9,9 @@ import { PER_DEGREE, drawRose, drawStrip, needle } from "./rose.js";
 
 /** Angle convention of each axis convention: clockwise from north, or counter-clockwise from east. */
 const CONVENTIONS = { bearing: "bearing", NED: "bearing", FRD: "bearing", ENU: "yaw", FLU: "yaw" };
-/** Position of marks outside of the tape, at its end. */
+/** Position, at the end of the tape, of marks beyond the tape. */
 const EDGE = 96;
-/** Distance of a label from the middle beyond which it would be cut, in degrees. */
+/** Distance from the middle beyond which a label would be cut off, in degrees. */
 const SEEN = 53;
 
 export default {

@@ -5,7 +5,7 @@
  * @typedef {{width: number, height: number, metres: Float32Array}} Field Distances; NaN if unknown.
  * @typedef {"16UC1" | "32FC1" | "8UC1"} Encoding
  * @typedef {{encoding: Encoding, width: number, height: number, bigEndian: boolean, scale: number}} Form
- *   `scale`: metres for each unit of the image.
+ *   `scale`: metres per unit of the image.
  */
 import { MOST_PIXELS, isPng, readPng } from "./png.js";
 
@@ -14,8 +14,8 @@ const BYTES = { "8UC1": 1, "16UC1": 2, "32FC1": 4 };
 /**
  * Return the depths in a file or in raw bytes.
  *
- * A PNG may follow the 12 bytes that ROS puts before a compressed depth image: its format, and two
- * numbers for the conversion of floating point depths to integers.
+ * A PNG may follow the 12 bytes that ROS adds before a compressed depth image: the format, and two
+ * numbers for the conversion of floating-point depths to integers.
  *
  * @param {Uint8Array} bytes
  * @param {Form} form
@@ -99,7 +99,6 @@ function pixels(width, height) {
 }
 
 /**
- * Return the field as pixels: near is bright, far is dark, and what is not known is `unknown`.
  * Write the field as pixels: near is bright, far is dark, and unknown pixels are `unknown`.
  * @param {Field} field
  * @param {{near: number, far: number}} clip metres
@@ -120,8 +119,8 @@ export function paint({ metres }, { near, far }, palette, unknown, into) {
 }
 
 /**
- * Return the distance at a point, given in shares of the image: the median of the known pixels among the
- * nine around it; NaN without any.
+ * Return the distance at a point, given as fractions of the image: the median of the known pixels among
+ * the nine pixels around the point, or NaN if none is known.
  *
  * @param {Field} field
  * @param {number} x 0 to 1

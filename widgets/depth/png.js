@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * A decoder for grey PNGs with all 16 bits: the browser's decoder gives only 8. Pure except for
- * DecompressionStream, which browsers and Node have.
+ * A decoder for grey PNGs with all 16 bits: the browser's decoder returns only 8 bits. Pure except for
+ * DecompressionStream, which browsers and Node provide.
  *
  * @typedef {{width: number, height: number, bits: number, values: Uint16Array}} Grey
  */
 
 const MARK = [137, 80, 78, 71, 13, 10, 26, 10];
-/** Size limit above any depth camera's: a hostile file must not fill the memory of the page. */
+/** Size limit, larger than the images of any depth camera: a hostile file must not fill the page's memory. */
 export const MOST_PIXELS = 4_194_304;
 
 /**

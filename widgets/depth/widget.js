@@ -45,7 +45,7 @@ class Depth {
     this.sheet = new Sheet(data);
     this.clip = { near: Number(options["near"] ?? 0.3), far: Number(options["far"] ?? 5) };
     this.palette = palette(options["palette"] === "grey" ? "grey" : "cividis");
-    /** Point of the measurement, in shares of the image. */
+    /** Point of the measurement, as fractions of the image. */
     this.point = { x: 0.5, y: 0.5 };
     /** @type {Field | null} */
     this.field = null;
@@ -104,7 +104,7 @@ class Depth {
     this.move(this.point.x + STEP * way[0], this.point.y + STEP * way[1]);
   }
 
-  /** Return the place of the image in the page: its own shape, within or beyond the canvas. */
+  /** Return the rectangle of the image on the page, with its own aspect ratio, within or beyond the canvas. */
   box() {
     const { left, top, width, height } = this.face.getBoundingClientRect();
     const { width: columns, height: rows } = this.sheet.canvas;

@@ -6,7 +6,7 @@ import { arrow } from "urc/response_curve";
 import { attribute, part } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed } from "urc/motion";
 
-/** Share around the middle without direction: the middle of three fields. */
+/** Fraction around the middle without a direction: the middle of three fields. */
 const REST = 1 / 3;
 
 export default {

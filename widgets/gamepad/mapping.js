@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The mapping of a gamepad's sticks and buttons: shown, and learnt by moving them.
+ * The mapping of a gamepad's sticks and buttons. Operators assign a stick or button by moving it.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("../../urc/web/static/core/types.js").PadView} PadView
@@ -38,9 +38,9 @@ export class Mapping {
     this.places = [];
     /** @type {HTMLButtonElement[]} */
     this.buttons = [];
-    /** Part that is being learnt, or null. @type {Part | null} */
+    /** Part that the operator is assigning, or null. @type {Part | null} */
     this.learnt = null;
-    /** State of the gamepad at the start of learning. @type {PadView | null} */
+    /** State of the gamepad at the start of the assignment. @type {PadView | null} */
     this.before = null;
     /** @type {PadView | null} */
     this.view = null;

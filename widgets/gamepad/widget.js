@@ -49,7 +49,7 @@ function driving(ctx) {
     el: part(el, ".gamepad-grip"),
     keys: [],
     pad: side,
-    isFree: () => false, // touching the picture holds nothing
+    isFree: () => false, // a touch on the picture holds no control
     push({ sticks = [0, 0, 0, 0], buttons = [] }) {
       const [across, along, turned] = sticks;
       const fastest = motion.speeds[motion.speeds.length - 1] ?? 1;

@@ -13,7 +13,7 @@ export default {
    */
   mount(ctx) {
     const address = String(ctx.options["url"] ?? "");
-    // The server replaces the URL of a page by its own; without a robot, as in the gallery, it does not.
+    // The server replaces the page's URL by a URL of its own, but not without a robot, as in the gallery.
     if (!address.startsWith("/robots/")) return { update() {} };
     const shown = new Shown(ctx, address);
     return { update() {}, destroy: () => shown.end() };
@@ -36,7 +36,7 @@ class Shown {
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.late = undefined;
     this.addButton(part(el, ".iframe-top"), signal);
-    // A third-party page reports no keys; only its focus is visible.
+    // A third-party page does not report keys; the widget only detects its focus.
     for (const kind of ["blur", "focus"]) addEventListener(kind, () => this.tell(), { signal });
     const every = Number(options["refresh"] ?? 0);
     if (every > 0) this.timer = setInterval(() => this.refresh(), Math.max(every, SHORTEST_S) * 1000);
@@ -83,7 +83,7 @@ class Shown {
     clearTimeout(this.late);
     for (const old of this.place.querySelectorAll("iframe")) if (old !== frame) old.remove();
     delete frame.dataset["coming"];
-    // The document around the page is ours; it is missing if the server refused it.
+    // The document around the page is from URC; it is missing if the server refused the page.
     const ours = frame.contentDocument;
     const refused = ours?.body.dataset["fault"] ?? "";
     const isThere = ours?.querySelector("iframe") !== null && ours !== null;

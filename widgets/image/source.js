@@ -6,7 +6,7 @@
 const PICTURE = /^data:image\/(png|jpeg|webp|gif|avif|svg\+xml)[;,]/i;
 
 /**
- * Return the URL of the image, or "" if the options have none that a page may show.
+ * Return the URL of the image, or "" if the options contain no image that a page may show.
  *
  * @param {{file?: unknown, source?: unknown}} options `file` is a URL of this server
  */

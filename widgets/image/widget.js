@@ -44,7 +44,7 @@ export default {
         attribute(root, "data-state", picture.state);
         const isNone = picture.state === "none";
         tell(isNone ? t("no picture yet") : noteOf(picture, t));
-        // An old image must not be taken for the present.
+        // An old image must not look current.
         canvas.hidden = picture.state === "gone";
         attribute(root, "data-gone", canvas.hidden ? "yes" : null);
       },

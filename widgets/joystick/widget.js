@@ -52,10 +52,10 @@ class Stick {
     this.shape = settingsOf(options).gate;
     this.stays = { x: options["spring_x"] === false, y: options["spring_y"] === false };
     this.keyLevel = Number(options["keys"] ?? 0.5);
-    /** CSS pixels at full deflection, and middle of the face: measured once for each gesture. */
+    /** CSS pixels at full deflection, and middle of the face; measured once per gesture. */
     this.reach = 1;
     this.shift = { x: 0, y: 0 };
-    /** Kept position, at which the next drag begins. */
+    /** Position that the stick keeps; the next drag begins there. */
     this.base = { x: 0, y: 0 };
     this.at = { x: 0, y: 0 };
     this.kind = "";
@@ -111,7 +111,7 @@ class Stick {
   }
 
   /**
-   * Show the value of an axis, and tell it to screen readers in the same words.
+   * Show the value of an axis, and announce the same text to screen readers.
    *
    * @param {Element | null} el
    * @param {"x" | "y"} axis
@@ -148,7 +148,7 @@ function move(right, down) {
 const WEDGE = 0.35;
 
 /**
- * Return the path of the wedge that points in the direction of the push, as long as its strength.
+ * Return the path of the wedge that points in the direction of the push. Its length shows the strength.
  *
  * @param {number} x away from the operator, -1 to 1
  * @param {number} y to the left

@@ -37,7 +37,7 @@ export default {
       el: field,
       keys: Object.values(CAPS).flat(),
       page: () => (isEverywhere ? "free" : "none"),
-      isFree: () => false, // touching the picture holds nothing
+      isFree: () => false, // a touch on the picture holds no control
       push({ keys }) {
         down = keys;
         const { x: ahead, y: left } = pointed(keys);

@@ -1,9 +1,9 @@
 // @ts-check
-/** The geometry of a dial of 270 degrees, from lower left over the top. It knows no DOM. */
+/** The geometry of a dial of 270 degrees, from the lower left over the top. Pure: no DOM. */
 
-/** Angle of its ends from the top, in degrees. */
+/** Angle between the top and each end, in degrees. */
 export const SWEEP = 135;
-/** Share of the radius below which a pointer has no direction. */
+/** Fraction of the radius below which a pointer has no direction. */
 const BLIND = 0.25;
 
 /**
@@ -30,15 +30,15 @@ export function shareAt(x, y) {
 export class Pull {
   /** @param {number} share position of the hand, 0 to 1 */
   constructor(share) {
-    /** Angle of the pointer; beyond an end it is in the gap, or has crossed it. */
+    /** Angle of the pointer. Beyond an end, the pointer is in the gap or has crossed the gap. */
     this.angle = angleOf(share);
-    /** Whether the pointer has been in the middle since its last direction. */
+    /** Whether the pointer has visited the middle since its last direction. */
     this.isAstray = false;
   }
 
   /**
-   * Follow the pointer, but never across the gap from one end to the other. After a visit to the middle it
-   * counts as a new press.
+   * Follow the pointer, but never across the gap from one end to the other. A pointer that leaves the
+   * middle counts as a new press.
    *
    * @param {number} x to the right of the middle, in radii
    * @param {number} y below the middle, in radii

@@ -1,5 +1,5 @@
 // @ts-check
-/** Round-trip times of the last minutes: median, 95th percentile, and quality. It knows no DOM and no clock. */
+/** Round-trip times of the last minutes: median, 95th percentile and quality. Pure: no DOM, no clock. */
 
 const MOST = 120;
 export const CAUTION_MS = 100;
@@ -27,7 +27,7 @@ export class Trips {
     return sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] ?? null;
   }
 
-  /** Return the share of trips that are too slow for driving, 0 to 1; null without data. */
+  /** Return the fraction of trips that are too slow for driving, 0 to 1; null without data. */
   late() {
     if (this.all.length === 0) return null;
     return this.all.filter((ms) => ms > POOR_MS).length / this.all.length;

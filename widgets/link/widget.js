@@ -72,7 +72,7 @@ export default {
       const words = !isUp
         ? t("No connection to URC")
         : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
-      // Hidden for a lost robot: it is the trip to URC, and would be taken for the trip to the robot.
+      // Hidden for a lost robot: operators could mistake the trip to URC for the trip to the robot.
       const trip = tripMs === null || worst !== "live" ? "" : ` · ${figure(tripMs)} ms`;
       write(now, `${SIGNS[sign]} ${words}${trip}`);
       if (facts) draw(facts);

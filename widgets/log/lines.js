@@ -4,7 +4,7 @@
 const RANKS = { info: 0, warning: 1, error: 2 };
 
 /**
- * Return the selected lines, oldest first. It knows no DOM.
+ * Return the selected lines, oldest first. Pure: no DOM.
  *
  * @param {readonly LogLine[]} lines
  * @param {{level: string, words: string, most: number}} wanted a line must have all words

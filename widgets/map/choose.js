@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Choice of a place or a route, with a confirmation. It knows no Leaflet; a listener draws the choice.
+ * Choice of a place or a route, with a confirmation. Independent of Leaflet: a listener draws the choice.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
@@ -9,7 +9,7 @@
 import { attribute, button, write } from "urc/kit";
 import { distance, distanceText, isInside, lengthOf, placeText } from "./geo.js";
 
-/** Most places of a route; more are no route that a person draws. */
+/** Maximum number of places of a route; a longer route is not drawn by hand. */
 const MOST = 200;
 
 export class Choice {
@@ -88,7 +88,7 @@ export class Choice {
     this.changed();
   }
 
-  /** Start drawing a route, or end it. */
+  /** Start or end the drawing of a route. */
   toggleWay() {
     const isWay = this.mode === "way" || this.mode === "sure";
     this.clear();
@@ -111,7 +111,7 @@ export class Choice {
     this.changed();
   }
 
-  /** Return why it cannot be sent, or "". */
+  /** Return the reason why the choice cannot be sent, or "". */
   hindrance() {
     const outlet = this.mode === "place" ? this.goto : this.waypoints;
     if (this.places.some((place) => !isInside(place, this.fence))) return this.t("outside the fence");
@@ -188,7 +188,7 @@ export class Choice {
 }
 
 /**
- * Round to a millimetre, or to a centimetre on the earth.
+ * Round to a millimetre, or to a centimetre on the Earth.
  *
  * @param {Place} place
  * @param {boolean} isLocal

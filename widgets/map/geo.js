@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Places on the earth, or on a robot's own map. Pure: no DOM, no Leaflet.
+ * Places on the Earth, or on a robot's own map. Pure: no DOM, no Leaflet.
  *
  * A place is `[first, second]`: latitude and longitude in degrees, or y and x in metres on the robot's
  * own map. Leaflet has the upward coordinate first.
@@ -10,7 +10,7 @@
 
 const EARTH_M = 6_371_008.8;
 const RAD = Math.PI / 180;
-/** Largest coordinate on a robot's own map, the circumference of the earth: larger numbers are noise. */
+/** Largest coordinate on a robot's own map: the Earth's circumference. Larger numbers are noise. */
 const FARTHEST_M = 4e7;
 
 /**
@@ -44,7 +44,7 @@ export function lengthOf(way, isLocal) {
 }
 
 /**
- * Return the degrees of latitude and longitude of a metre; 1 and 1 on a robot's own map.
+ * Return one metre in degrees of latitude and longitude; 1 and 1 on a robot's own map.
  *
  * @param {Place} origin
  * @param {boolean} isLocal
@@ -57,7 +57,7 @@ export function perMetre(origin, isLocal) {
 }
 
 /**
- * Return whether a place lies within the fence. Without a fence all places do.
+ * Return whether a place is within the fence; always true without a fence.
  *
  * @param {Place} place
  * @param {readonly Place[]} fence
@@ -75,7 +75,7 @@ export function isInside(place, fence) {
 }
 
 /**
- * Return the fence or route in an option: pairs of numbers; invalid pairs are left out.
+ * Return the fence or route in an option: pairs of numbers, without invalid pairs.
  *
  * @param {unknown} value
  * @param {boolean} isLocal whether pairs are x, y; else latitude, longitude
@@ -112,7 +112,7 @@ export function placeOf(first, second, isLocal) {
  * @param {"NS" | "EW"} sides letters, the positive one first
  */
 export function sexagesimal(degrees, sides) {
-  // Rounded as a whole, so that 59.96 seconds never become 60.0.
+  // The whole angle is rounded, so that 59.96 seconds never become 60.0.
   const tenths = Math.round(Math.abs(degrees) * 36_000);
   const seconds = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
   const minutes = String(Math.floor(tenths / 600) % 60).padStart(2, "0");
@@ -186,11 +186,11 @@ export function readFix(fix) {
       : null;
   const list = Array.isArray(covariance) ? covariance : [];
   const spread = Number(list[0]) + Number(list[4]);
-  // One number for both directions: the root of their mean variance.
+  // One number for both directions: the square root of their mean variance.
   return { place, accuracy: spread > 0 && Number.isFinite(spread) ? Math.sqrt(spread / 2) : null };
 }
 
-/** The trail of past places: a limited number, with a minimum distance. */
+/** The trail of past places, limited in number and with a minimum distance. */
 export class Trail {
   /**
    * @param {number} most largest number of places

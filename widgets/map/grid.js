@@ -1,12 +1,12 @@
 // @ts-check
-/** A grid in metres under the map: without tiles, it shows motion and distances. */
+/** A grid in metres under the map, which shows motion and distances without tiles. */
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
 import { colours, write } from "urc/kit";
 import { wholes } from "urc/axis_ticks";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
-/** Limit of the number of lines, above that of any screen. */
+/** Maximum number of lines; no screen shows this many. */
 const MOST_LINES = 200;
 
 export class Grid {
@@ -81,8 +81,8 @@ export class Grid {
   }
 
   /**
-   * Return the cleared drawing context. The grid moves in each frame of a moving robot, and drawing off
-   * screen pays only for canvases that change less often, so `board` is not used.
+   * Return the cleared drawing context. `board` is not used: off-screen drawing is only worthwhile for
+   * canvases that change rarely, and the grid moves in each frame of a moving robot.
    *
    * @param {number} width in CSS pixels
    * @param {number} height

@@ -43,13 +43,13 @@ class Chart {
     this.note = part(el, ".map-note");
     /** @type {"decimal" | "dms"} */
     this.form = options["format"] === "dms" ? "dms" : "decimal";
-    /** Whether it is the robot's own map; known with the first update. @type {boolean | null} */
+    /** Whether the map is the robot's own map; unknown before the first update. @type {boolean | null} */
     this.isLocal = null;
     this.signal = signal;
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
-    /** What was drawn last; "" after a move of the map. */
+    /** Description of the last drawing; "" after a move of the map. */
     this.drawn = "";
     this.trail = new Trail(Number(options["trail"] ?? 1000), Number(options["trail_step"] ?? 0.2), false);
     /** @type {Place[]} */
@@ -69,7 +69,7 @@ class Chart {
       zoom: Number(options["zoom"] ?? (isLocal ? 5 : 18)),
       minZoom: isLocal ? -3 : 1,
       maxZoom: isLocal ? 10 : 22,
-      // Leaflet's own controls make markup from text, which the page policy forbids.
+      // Leaflet's own controls create markup from text, which the page policy forbids.
       zoomControl: false,
       attributionControl: false,
       zoomAnimation: !isStill(),
@@ -82,7 +82,7 @@ class Chart {
   }
 
   /**
-   * Start the map of the bound inputs: the earth, or the robot's own map.
+   * Start the map for the bound inputs: the Earth, or the robot's own map.
    *
    * @param {Readonly<Record<string, Reading>>} readings
    * @param {Readonly<Record<string, Outlet>>} outputs
@@ -122,7 +122,7 @@ class Chart {
         this.choice?.tap([lat, lng]);
       }
       if (event.key === "Escape" && this.choice && this.choice.mode !== "look") {
-        event.preventDefault(); // Escape means no here, and not STOP
+        event.preventDefault(); // here, Escape means no instead of STOP
         this.choice.clear();
       }
     };
@@ -234,7 +234,7 @@ class Chart {
     style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
     attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
     const look = `${place} ${accuracy} ${isLive}`;
-    if (look === this.drawn && this.hasPlace) return; // most readings of a robot at rest
+    if (look === this.drawn && this.hasPlace) return; // true for most readings of a robot at rest
     if (isLive && this.trail.add(place)) layers.trail.setLatLngs(this.trail.places);
     if (!this.hasPlace) layers.robot.addTo(map);
     layers.robot.setLatLng(place);

@@ -1,15 +1,15 @@
 // @ts-check
-/** Parser for typed numbers, with the reason of a failure. It knows no DOM. */
+/** Parser for typed numbers, with the reason for a failure. Pure: no DOM. */
 
 const PLAIN = /^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d{1,3})?$/i;
-/** Thousands separators: at least two, or one before a decimal separator. The meaning is certain. */
+/** Unambiguous thousands separators: at least two, or one before a decimal separator. */
 const PARTED = /^([+-]?\d{1,3})((?:,\d{3})+)(\.\d*)?$|^([+-]?\d{1,3})((?:\.\d{3})+)(,\d*)?$/;
-/** Ambiguous: a thousand in English, three decimals in other languages. */
+/** Ambiguous: thousands in English, three decimals in other languages. */
 const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}(e[+-]?\d{1,3})?$/i;
 
 /**
- * @param {string} text typed text: blanks and a unit at its end are ignored. A comma is a decimal
- *   separator unless it separates thousands; a single point always is, because the page shows it so
+ * @param {string} text typed text; blanks and a unit at the end are ignored. A comma is a decimal
+ *   separator unless it separates thousands. A single point is always a decimal separator, as on the page
  * @param {{min: number, max: number, unit: string, isWhole: boolean}} bounds
  * @returns {{value: number} | {fault: "empty" | "none" | "whole" | "low" | "high"}
  *   | {fault: "comma", either: [number, number]}}

@@ -18,8 +18,8 @@ export default {
     const field = el.querySelector(".number-field");
     const argument = Object.values(ctx.command("change")?.arguments ?? {})[0];
     const setpoint = new Setpoint(ctx, show);
-    setpoint.isLive = true; // a step is sent at once
-    // Without bounds any number is allowed.
+    setpoint.isLive = true; // a step is sent immediately
+    // Without bounds, any number is allowed.
     const bounds = {
       ...setpoint.bounds,
       min: bound(ctx.options["min"], argument?.min, -Infinity, Math.max),

@@ -52,7 +52,7 @@ export function target({ yaw, pitch }) {
 }
 
 /**
- * Return the visible part of the flat image, in shares of it; left may be below 0 or above 1.
+ * Return the visible part of the flat image, as fractions of the image; left may be below 0 or above 1.
  *
  * @param {View} view
  * @param {number} aspect width by height of the box
@@ -99,7 +99,7 @@ export function poseOf(bytes) {
 }
 
 /**
- * Return the first view of an image: from its file, else from the options.
+ * Return the first view of an image, from its file or otherwise from the options.
  *
  * @param {Pose | null} pose
  * @param {View} otherwise
@@ -107,7 +107,7 @@ export function poseOf(bytes) {
  */
 export function firstView(pose, otherwise) {
   if (!pose || Number.isNaN(pose.startHeading)) return otherwise;
-  // The file counts clockwise from north, and the image's middle has a heading of its own.
+  // The file contains angles clockwise from north, and the heading of the image's middle.
   const middle = Number.isNaN(pose.heading) ? 0 : pose.heading;
   return turned(
     { ...otherwise, yaw: 0, pitch: 0 },

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The renderer of the panorama: a sphere seen from inside, or, without WebGL, a part of the flat image.
+ * The renderer of the panorama: a sphere from the inside or, without WebGL, a part of the flat image.
  *
  * @typedef {import("./look.js").Pose} Pose
  * @typedef {import("./look.js").View} View
@@ -15,7 +15,7 @@
 import { board } from "urc/kit";
 import { crop, target } from "./look.js";
 
-/** Highest pixel density: more is not visible, and fills the memory of a phone. */
+/** Maximum pixel density: a higher density is not visible and fills the memory of a phone. */
 const MOST_DENSITY = 1.5;
 
 /**
@@ -27,7 +27,7 @@ export function sphere(three) {
   renderer.setPixelRatio(Math.min(MOST_DENSITY, globalThis.devicePixelRatio || 1));
   const scene = new three.Scene();
   const camera = new three.PerspectiveCamera(75, 1, 0.1, 10);
-  // Mirrored, because it is seen from inside, and rotated, so that its middle is ahead.
+  // Mirrored because the viewer is inside, and rotated so that the middle of the image is ahead.
   const geometry = new three.SphereGeometry(1, 48, 32).scale(-1, 1, 1).rotateY(-Math.PI / 2);
   const material = new three.MeshBasicMaterial();
   const ball = new three.Mesh(geometry, material);
@@ -38,7 +38,7 @@ export function sphere(three) {
   return {
     canvas: renderer.domElement,
     show(bitmap, pose) {
-      // A new texture for another size: a texture cannot be resized.
+      // Another size needs a new texture, because a texture cannot be resized.
       const old = /** @type {ImageBitmap | undefined} */ (texture?.image);
       if (!texture || old?.width !== bitmap.width || old.height !== bitmap.height) {
         texture?.dispose();
@@ -46,7 +46,7 @@ export function sphere(three) {
         texture.colorSpace = three.SRGBColorSpace;
         texture.generateMipmaps = false;
         texture.minFilter = three.LinearFilter;
-        // The first row of a bitmap is its top, and WebGL does not flip bitmaps.
+        // The first row of a bitmap is the top row, and WebGL does not flip bitmaps.
         texture.flipY = false;
         texture.repeat.y = -1;
         texture.offset.y = 1;
@@ -95,7 +95,7 @@ export function flat() {
       const pen = board(canvas, size);
       const part = crop(view, size.width / Math.max(1, size.height));
       const scale = size.width / part.width;
-      // The image wraps around: left of its left edge is its right edge.
+      // The image wraps around: its right edge adjoins its left edge.
       const first = Math.floor(part.left);
       for (let copy = first; copy < part.left + part.width; copy += 1) {
         const x = (copy - part.left) * scale;

@@ -11,7 +11,7 @@ import { MOST_XMP, bearing, firstView, poseOf, tilted, turned } from "./look.js"
 import { flat, sphere } from "./stage.js";
 
 const STEP = 5;
-/** Shortest interval of reading the pose from a stream of images, in seconds. */
+/** Minimum interval between readings of the pose from a stream of images, in seconds. */
 const POSE_EVERY_S = 1;
 const SIDES = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
@@ -114,7 +114,7 @@ class Panorama {
     this.pose = poseOf(bytes);
     this.home = firstView(this.pose, this.home);
     if (!this.hasMoved) this.view = this.home;
-    // 0: closed already, because a newer one arrived.
+    // 0: the bitmap is already closed, because a newer one has arrived.
     if (bitmap.width > 0) this.stage.show(bitmap, this.pose);
     this.ask();
   }
@@ -182,7 +182,7 @@ class Panorama {
     this.ask();
   }
 
-  /** Draw once in the next frame, after a change only. */
+  /** Draw once in the next frame, and only after a change. */
   ask() {
     if (this.isAsked) return;
     this.isAsked = true;
@@ -212,7 +212,7 @@ class Panorama {
     return made;
   }
 
-  /** Add the button for tilting. Browsers give the sensors to secure contexts only, some after a tap. */
+  /** Add the button for tilting. Browsers allow the sensors only in secure contexts, some only after a tap. */
   offerTilt() {
     const Tilt = /** @type {any} */ (globalThis).DeviceOrientationEvent;
     if (!globalThis.isSecureContext || !Tilt || !matchMedia("(pointer: coarse)").matches) return;

@@ -11,9 +11,9 @@ import { fitted, lengthOf } from "urc/path_simplify";
 /** Distance from the middle to the edge, in units of the drawing, which is 200 wide. */
 const EDGE = 96;
 const FACE = 200;
-/** Most raw points of a stroke: an endless stroke must not fill the memory. */
+/** Maximum number of raw points of a stroke, so that an endless stroke does not fill the memory. */
 const MOST_RAW = 2000;
-/** Step of an arrow key, as a share of the length. */
+/** Step of an arrow key, as a fraction of the length. */
 const STEP = 0.05;
 const ARROWS = Object.values(DIRECTIONS).flat();
 
@@ -61,7 +61,7 @@ class PathPad {
     this.most = Number(options["points"] ?? 100);
     this.reason = ctx.t("not ready yet");
     this.isAnswered = false;
-    /** Drawn strokes, in shares of the length. @type {Point[][]} */
+    /** Drawn strokes, as fractions of the length. @type {Point[][]} */
     this.strokes = [];
     /** The stroke under the pointer. @type {Point[]} */
     this.stroke = [];
@@ -108,7 +108,7 @@ class PathPad {
     return true;
   }
 
-  /** Add the moves between two frames, too, if the browser has them. @param {PointerEvent} event */
+  /** Also add the moves between two frames, if the browser reports them. @param {PointerEvent} event */
   move(event) {
     const all = event.getCoalescedEvents?.() ?? [];
     for (const one of all.length > 0 ? all : [event]) {
@@ -158,7 +158,7 @@ class PathPad {
   }
 
   /**
-   * Return the arguments that the command has; a list is an argument, too.
+   * Return the arguments that the command declares, including lists.
    *
    * @returns {Record<string, any>}
    */
@@ -185,7 +185,7 @@ class PathPad {
       this.keep([]);
       this.outcome = this.isAnswered ? t("✓ done") : t("✓ sent");
     } catch (error) {
-      this.outcome = `▲ ${error instanceof Error ? error.message : error}`; // the path stays
+      this.outcome = `▲ ${error instanceof Error ? error.message : error}`; // the path stays on the pad
     }
     this.isBusy = false;
     this.draw();

@@ -88,7 +88,7 @@ export class History {
     });
   }
 
-  /** Values at the cursor, else at the end. */
+  /** Values at the cursor or, without a cursor, at the end. */
   get values() {
     const { idx } = this.plot.cursor;
     const row = typeof idx === "number" ? idx : this.rows.times.length - 1;
@@ -110,7 +110,7 @@ function shownRows({ times, columns }, factor) {
 }
 
 /**
- * Return the value at a row, or null in a gap: signals rarely come at the same moment.
+ * Return the value at a row, or null in a gap: signals rarely arrive at the same time.
  *
  * @param {readonly (number | null | undefined)[]} column
  * @param {number} row

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The live traces: in each frame the picture moves to the left, and new data is drawn at its right end on
- * a narrow canvas that moves with it. A full narrow canvas is copied into the picture.
+ * The live traces. In each frame, the picture moves to the left, and new data is drawn at its right end
+ * on a narrow canvas that moves with the picture. A full narrow canvas is copied into the picture.
  *
- * A complete redraw costs much more: it happens only after a change of the scale, the size or the
+ * A complete redraw takes much longer, and is only done after a change of the scale, the size or the
  * colours.
  *
  * @typedef {import("./picture.js").Strip} Strip
@@ -22,7 +22,7 @@
 import { Picture } from "./picture.js";
 
 const MAX_DENSITY = 2;
-/** Longest time for which new readings within one column of pixels are collected. */
+/** Longest time for which new readings in one pixel column are collected. */
 const WAIT_S = 0.05;
 
 export class Live {
@@ -101,7 +101,7 @@ export class Live {
     }
   }
 
-  /** Add new data to the picture, from its last readings on. @param {number} perSecond */
+  /** Add new data to the picture, starting at its last readings. @param {number} perSecond */
   keep(perSecond) {
     for (const trace of this.traces) {
       const { ring, kept } = trace;
@@ -122,7 +122,7 @@ export class Live {
   }
 
   /**
-   * Return the length of a line between two of its readings, for its dashes, in pixels.
+   * Return the length of a line between two readings in pixels, for the dash pattern.
    *
    * @param {Trace} trace
    * @param {number} from
@@ -145,7 +145,7 @@ export class Live {
   /**
    * @param {Strip} strip
    * @param {Trace} trace
-   * @param {number} first first of its readings
+   * @param {number} first number of the first reading
    * @param {number} last
    * @param {number} perSecond pixels
    * @param {number} way offset of its dashes

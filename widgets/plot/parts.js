@@ -24,7 +24,7 @@ function placed(name, top, text = "") {
 }
 
 /**
- * Make the labels of a scale, with a line for each label and each limit.
+ * Create the labels of a scale, with a line for each label and each limit.
  *
  * @param {readonly [number, number]} scale
  * @param {readonly [string, number][]} limits
@@ -47,7 +47,7 @@ export function ruled(scale, limits, factor) {
 }
 
 /**
- * Make one entry of the legend: a button that shows or hides the line of a signal.
+ * Create one entry of the legend: a button that shows or hides the line of a signal.
  *
  * @param {string} name
  * @param {string} hint
@@ -84,7 +84,7 @@ const CHARACTERS = 6;
 const rooms = new WeakMap();
 
 /**
- * Write a value of the legend; its width grows on demand.
+ * Write a value of the legend, and widen it if needed.
  *
  * @param {Element} el
  * @param {string} text

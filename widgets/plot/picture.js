@@ -1,16 +1,16 @@
 // @ts-check
 /**
- * The picture of the traces: strips side by side, in a frame that moves to the left with the time.
+ * The picture of the traces: strips side by side, in a frame that moves to the left with time.
  *
- * New data changes the last strip or two; a strip that has left the picture is reused at the other end.
- * The newest data is drawn on a narrow strip above them. Columns are pixels of the screen since time 0.
+ * New data changes the last one or two strips. A strip that has left the picture is reused at the other
+ * end. The newest data is drawn on a narrow strip above them. Columns are screen pixels since time 0.
  *
  * @typedef {object} Strip
  * @property {Sheet} sheet
  * @property {number} number Number of the strip, counted from column 0; NaN if unused.
- * @property {number} from First column that can be drawn on it.
- * @property {number} to Column after the last one.
- * @property {boolean} isDrawn Whether it has content that is not shown yet.
+ * @property {number} from First column that fits on the strip.
+ * @property {number} to Column after the last column of the strip.
+ * @property {boolean} isDrawn Whether the strip has content that is not shown yet.
  */
 import { Sheet } from "urc/offscreen_canvas";
 
@@ -24,7 +24,7 @@ export class Picture {
   /** @param {HTMLElement} place */
   constructor(place) {
     this.place = place;
-    // Two more: the first and last strip may be visible in part, and one starts at the right end.
+    // Two additional strips: the first and last strips can be partly visible, and one starts at the right end.
     this.strips = Array.from({ length: STRIPS + 2 }, made);
     this.newest = made();
     this.all = [...this.strips, this.newest];
@@ -32,10 +32,10 @@ export class Picture {
     this.width = 1;
     this.height = 1;
     this.density = 1;
-    /** Columns of one strip; it is wider by `rim` at both ends, because lines have a width. */
+    /** Columns of one strip. The strip is wider by `rim` at both ends, because lines have a width. */
     this.span = 1;
     this.rim = 0;
-    /** Column at the right end when the strips were last placed. */
+    /** Column at the right end at the last placement of the strips. */
     this.base = 0;
     this.shift = NaN;
   }
@@ -73,8 +73,8 @@ export class Picture {
   }
 
   /**
-   * Return the visible strips between two columns, ready for drawing; a strip that has left the picture is
-   * cleared and reused.
+   * Return the visible strips between two columns, ready for drawing. A strip that has left the picture
+   * is cleared and reused.
    *
    * @param {number} from
    * @param {number} to
@@ -95,8 +95,8 @@ export class Picture {
   }
 
   /**
-   * Start new data at this column, after all is in the picture. The strips are placed again, which keeps
-   * their coordinates small.
+   * Start new data at this column, after all earlier data is in the picture. The strips are placed
+   * again, which keeps their coordinates small.
    *
    * @param {number} column column at the right end
    */

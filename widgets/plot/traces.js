@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The last readings of several signals, and the range of their drawing. Pure.
+ * The latest readings of several signals, and the range of their drawing. Pure.
  */
 
 /** Readings of one signal: the newest `size`, oldest first. A gap is NaN. */
@@ -40,7 +40,7 @@ export class Ring {
   }
 
   /**
-   * Add a reading, after a gap if earlier ones were missed; readings out of order are dropped.
+   * Add a reading, after a gap if readings were missed. Readings out of order are dropped.
    *
    * @param {number} time in seconds
    * @param {number} value
@@ -62,8 +62,8 @@ export class Ring {
   }
 
   /**
-   * Return the number of the first reading at or after a time; the line comes in from the reading before
-   * it.
+   * Return the number of the first reading at or after a time. The drawn line starts at the reading
+   * before it.
    *
    * @param {number} time in seconds
    */
@@ -126,7 +126,7 @@ export function table(rings, from, to) {
 }
 
 /**
- * Return a table as CSV (RFC 4180), its times as ISO 8601.
+ * Return a table as CSV (RFC 4180), with times in ISO 8601 format.
  *
  * @param {readonly string[]} names names of the columns
  * @param {{times: number[], columns: (number | null | undefined)[][]}} rows
@@ -144,7 +144,7 @@ export function csv(names, { times, columns }, epoch) {
 
 /** @param {string} text */
 function quoted(text) {
-  // Neutralises text that a spreadsheet would take for a formula.
+  // Neutralises text that a spreadsheet would treat as a formula.
   const safe = /^[=+\-@\t]/.test(text) ? `'${text}` : text;
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
 }

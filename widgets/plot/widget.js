@@ -11,16 +11,16 @@ import { epoch, legendItem, ruled, writeValue } from "./parts.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
-/** Dashes of lines beyond the colours, and of all lines in a theme with one colour. */
+/** Dash patterns for lines without a colour of their own, and for all lines in a theme with one colour. */
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const HERTZ = 60;
 const MOST_READINGS = 18_000;
-/** Interval of the legend: faster numbers are unreadable, and text is the costliest part of a frame. */
+/** Update interval of the legend: faster numbers are unreadable, and text is the slowest part of a frame. */
 const LEGEND_EVERY_MS = 250;
 const FIT_EVERY_MS = 1000;
-/** Used share of the scale below which it shrinks. */
+/** Used fraction of the scale below which the scale shrinks. */
 const LOOSE = 0.4;
-/** Margin above and below, as a share of the height. */
+/** Margin above and below, as a fraction of the height. */
 const RIM = 0.05;
 
 class Plot {
@@ -45,7 +45,7 @@ class Plot {
     /** Signals of the present legend and scale. @type {Reading["signal"][]} */
     this.signals = [];
     this.symbol = "";
-    /** Whether all signals have one unit; else values keep their declared units. */
+    /** Whether all signals have the same unit; otherwise, values keep their declared units. */
     this.isOneUnit = true;
     this.legendMs = 0;
     /** Whether the legend is up to date. */
@@ -81,7 +81,7 @@ class Plot {
       this.soon();
     });
     sight.observe(this.board);
-    // Time advances without readings. With reduced motion it steps once a second.
+    // The time advances even without readings. With reduced motion, it advances once a second.
     const step = () => {
       if (this.isSeen) this.frame(performance.now());
       else if (!this.isTold) this.tell(); // screen readers need the legend while the plot is hidden
@@ -118,7 +118,7 @@ class Plot {
     this.isTold = false;
   }
 
-  /** Make a line for each signal; its earlier readings stay. */
+  /** Create a line for each signal. Earlier readings stay. */
   begin() {
     const traces = new Map(this.signals.map(({ name, unit }, place) => [`${name} ${unit}`, this.live.traces[place]]));
     this.signals = this.readings.map(({ signal }) => signal);
@@ -140,7 +140,7 @@ class Plot {
   }
 
   /**
-   * Change the displayed unit: the lines stay, and only their labels change.
+   * Change the displayed unit. The lines stay; only their labels change.
    *
    * @param {string} symbol
    * @param {(value: number) => number} factor
@@ -196,13 +196,13 @@ class Plot {
     this.soon();
   }
 
-  /** Draw at once, even if the picture moves only once a second. */
+  /** Draw immediately, even if the picture moves only once a second. */
   soon() {
     if (isStill()) requestAnimationFrame(() => this.frame(performance.now()));
   }
 
   /**
-   * Extend the scale at once for a value beyond its end.
+   * Extend the scale immediately for a value beyond its end.
    *
    * @param {number} value
    */
@@ -374,7 +374,7 @@ class Plot {
     return table(this.live.traces.map(({ ring }) => ring), from, to);
   }
 
-  /** Save the visible range as a file, in the robot's units. */
+  /** Save the visible range to a file, in the robot's units. */
   save() {
     const names = this.signals.map(({ name, unit }) => (unit ? `${name} (${unit})` : name));
     save(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv", "text/csv");

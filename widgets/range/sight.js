@@ -16,8 +16,8 @@
  */
 
 /**
- * Return the kind of a distance by REP 117: beyond the range is clear (+Inf), below it too close (-Inf),
- * and not a number is unknown. Most formats have no infinity, so the ends of the range count as beyond.
+ * Return the kind of a distance by REP 117: above the range is clear (+Inf), below the range is too close
+ * (-Inf), and NaN is unknown. Most formats have no infinity, so the ends of the range count as outside.
  *
  * @param {unknown} value
  * @param {Bounds} bounds
@@ -72,7 +72,7 @@ export function at(bearing, radius) {
 /**
  * Return the outline of a sector between two radii as an SVG path.
  *
- * @param {number} bearing direction of its middle
+ * @param {number} bearing direction of the middle
  * @param {number} width its angle, at most 360
  * @param {number} inner
  * @param {number} outer
@@ -89,7 +89,7 @@ export function sector(bearing, width, inner, outer) {
 }
 
 /**
- * Return one direction for each of `count` sensors: the given ones, the others spread evenly.
+ * Return one direction for each of `count` sensors: the given direction, or evenly spaced by default.
  *
  * @param {readonly unknown[]} given
  * @param {number} count
@@ -147,8 +147,8 @@ export function nearestOf(values, bounds) {
 }
 
 /**
- * Return a note about the other sensors: directions without a measurement, and old values. It is empty if
- * all have the state of the shown one.
+ * Return a note about the other sensors: directions without a measurement, and old values. The note is
+ * empty if all sensors have the state of the shown sensor.
  *
  * @param {readonly string[]} sides direction of each sensor, in words
  * @param {readonly string[]} said note about each, or ""
@@ -165,7 +165,7 @@ export function besides(sides, said, shown) {
   return [...found].map(([words, places]) => `${[...new Set(places)].join(", ")}: ${words}`);
 }
 
-/** The last minutes of one distance, with a limited number of points. */
+/** One distance over the last minutes, with a limited number of points. */
 export class Track {
   /**
    * @param {number} windowS

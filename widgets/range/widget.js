@@ -54,7 +54,7 @@ class View {
     /** Number of distances in the last value of the first input. */
     this.count = 1;
     this.state = "none";
-    // The line advances with the time, also without readings.
+    // The line advances with time, even without readings.
     this.timer = this.graph ? setInterval(() => this.drawGraph(), 1000) : undefined;
   }
 
@@ -122,7 +122,7 @@ class View {
   sensors(reading, others) {
     const { value } = reading;
     if (Array.isArray(value)) this.count = value.length;
-    // A missing value has no count: the sensors keep their number and directions.
+    // A missing value contains no count, so the number and directions of the sensors stay.
     const first = Array.isArray(value) ? value : value === null ? Array(this.count).fill(null) : [value];
     return [
       ...first.map((each) => ({ value: each, reading })),

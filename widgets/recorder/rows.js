@@ -1,12 +1,12 @@
 // @ts-check
 /**
- * The recorded rows, and their table (RFC 4180). It knows no page.
+ * The recorded rows, and their table (RFC 4180). Independent of the page.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Reading} Reading
  * @typedef {readonly [number, string, string]} Row Milliseconds since 1970, signal, value.
  */
 
-/** Text that a spreadsheet would take for a formula. */
+/** Text that a spreadsheet would treat as a formula. */
 const FORMULA = /^[=+\-@\t\r]/;
 const NUMBER = /^[+-]?[\d.]+(e[+-]?\d+)?$/i;
 
@@ -43,7 +43,7 @@ export class Recording {
     this.rows.push([Math.round(dateMs - (nowS - time) * 1000), signal.name, String(value)]);
   }
 
-  /** Return all rows as a table in the order of time. */
+  /** Return all rows as a table, in order of time. */
   table() {
     const rows = [...this.rows].sort((one, other) => one[0] - other[0]);
     const lines = rows.map(([time, name, value]) => [new Date(time).toISOString(), name, value].map(field).join(","));
@@ -52,7 +52,7 @@ export class Recording {
 }
 
 /**
- * Return a quoted field: a robot's text becomes neither another field nor a formula.
+ * Return a quoted field, so that a robot's text does not become another field or a formula.
  *
  * @param {string} text
  */

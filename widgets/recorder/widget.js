@@ -34,7 +34,7 @@ class Recorder {
   update(readings) {
     this.readings = readings;
     attribute(this.root, "data-state", worst(readings).state);
-    if (!this.isOn) this.show(); // the first readings may show that there is no value
+    if (!this.isOn) this.show(); // the first readings can lack a value
   }
 
   /**

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The directions of the rays of a scan: at even steps, or with an angle each. Pure: no DOM.
+ * The directions of the rays of a scan: at even steps, or one angle per ray. Pure: no DOM.
  *
  * Angles are radians from straight ahead, counter-clockwise (REP 103).
  *
@@ -8,16 +8,16 @@
  * @property {number} count number of rays
  * @property {(index: number) => number} angleAt returns the angle of a ray in radians; NaN if unknown
  * @property {(angle: number) => number} rayAt returns the ray in a direction of any turn, or NO_RAY
- * @property {(share: number) => number} across returns the ray at a share of the way from the left to the
- *   right end, or NO_RAY
+ * @property {(share: number) => number} across returns the ray at a fraction of the way from the left to
+ *   the right end, or NO_RAY
  *
- * @typedef {object} Fault Why the rays have no directions: a translatable text, and its names.
+ * @typedef {object} Fault Reason why the rays have no directions: a translatable text, and its names.
  * @property {string} text
  * @property {Record<string, number>} names
  */
 
 const TURN = 2 * Math.PI;
-/** Stands for no ray. */
+/** Value that means “no ray”. */
 export const NO_RAY = 0xffff;
 
 /** Return the angle from 0 to below a full turn. @param {number} angle radians */
@@ -28,7 +28,7 @@ export class Even {
   /**
    * @param {number} count
    * @param {number} start radians of the first ray
-   * @param {number} step radians between two; negative when they go clockwise
+   * @param {number} step radians between two rays; negative for clockwise rays
    */
   constructor(count, start, step) {
     this.count = count;
@@ -63,12 +63,12 @@ export class Even {
 
 /** Number of directions in the look-up table of uneven rays: a tenth of a degree each. */
 const DIRECTIONS = 3600;
-/** Gap between rays, in usual gaps, above which the sector between them is blind. */
+/** Gap between rays, relative to the usual gap, above which the sector between them is blind. */
 const JOINED = 3;
-/** Widest half sector of a ray: a few sensors do not see all around. */
+/** Largest half sector of a ray, because a few sensors do not cover a full turn. */
 const WIDEST = Math.PI / 4;
 
-/** Rays at angles of their own, in any order. @implements {Fan} */
+/** Rays at individual angles, in any order. @implements {Fan} */
 export class Uneven {
   /** @param {readonly unknown[]} angles radians of each ray; other values give rays without direction */
   constructor(angles) {
@@ -76,7 +76,7 @@ export class Uneven {
     this.angles = Float64Array.from(angles, (each) => (isAngle(each) ? each : NaN));
     /** Ray of each direction. */
     this.rays = new Uint16Array(DIRECTIONS).fill(NO_RAY);
-    /** Left end, and angle from there to the right end: a full turn, with ahead in the middle. */
+    /** Left end, and angle from there to the right end: a full turn, with straight ahead in the middle. */
     this.left = Math.PI;
     this.extent = TURN;
     this.place();
@@ -87,7 +87,7 @@ export class Uneven {
       .filter((index) => isAngle(this.angles[index]))
       .map((index) => ({ index, angle: within(this.angleAt(index)) }))
       .sort((one, other) => one.angle - other.angle);
-    /** Gap from each ray to the next one counter-clockwise; a single ray has a full turn. */
+    /** Gap from each ray to the next ray counter-clockwise; a full turn for a single ray. */
     const gaps = around.map(({ angle }, at) => (around[at + 1]?.angle ?? (around[0]?.angle ?? 0) + TURN) - angle);
     const ordered = gaps.filter((gap) => gap > 0).sort((one, other) => one - other);
     const usual = ordered[(ordered.length - 1) >> 1] ?? TURN;
@@ -95,7 +95,7 @@ export class Uneven {
     around.forEach(({ index, angle }, at) => {
       this.fill(angle - half(gaps.at(at - 1) ?? TURN), angle + half(gaps[at] ?? TURN), index);
     });
-    // Rays may be closer than the table's directions: each still gets its own direction.
+    // Rays can be closer together than the table's directions; each ray still gets a direction of its own.
     for (const { index, angle } of around) this.rays[directionOf(angle)] = index;
     const widest = Math.max(0, ...gaps);
     const at = gaps.indexOf(widest);
@@ -153,8 +153,8 @@ function isAngle(value) {
 const mark = (text) => text;
 
 /**
- * Return why these angles do not fit these distances, or null if they do. An angle may be missing where
- * the distance is missing, too.
+ * Return the reason why these angles do not fit these distances, or null if they do. An angle may be
+ * missing if the distance is missing too.
  *
  * @param {readonly unknown[]} angles
  * @param {readonly unknown[]} ranges

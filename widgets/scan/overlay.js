@@ -18,7 +18,7 @@ import { ringStep } from "./rays.js";
  * @property {Record<string, string> | undefined} ink
  */
 
-/** Radius from which on rings have a label, in pixels. */
+/** Minimum radius of a ring with a label, in pixels. */
 const LABELLED_RADIUS = 64;
 const FONT = "600 12px system-ui, sans-serif";
 
@@ -66,7 +66,7 @@ function rings(pen, { most, near, stop, unit, ink }, radius) {
   pen.globalAlpha = 0.5;
   for (let distance = step; distance <= most * 1.001; distance += step) circle(distance);
   pen.globalAlpha = 1;
-  // To the lower right, with an edge: what is ahead stays free, and dots do not cross the figures.
+  // At the lower right, with an edge: the area ahead stays free, and dots do not cross the figures.
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   pen.strokeStyle = ink?.["raised"] ?? "";
@@ -126,7 +126,7 @@ function compass(pen, { heading, ink }, radius) {
     pen.arc(0, 0, radius * share, 0, 2 * Math.PI);
     pen.stroke();
   }
-  // Without a heading the ring shows the robot's own left and right.
+  // Without a heading, the ring shows the robot's own left and right.
   const isKnown = Number.isFinite(heading);
   const words = isKnown ? ["N", "E", "S", "W"] : ["0", "−90", "180", "90"];
   for (let tick = 0; tick < 36; tick += 1) {

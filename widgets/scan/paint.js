@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The views of a scan as pixels: each function fills the buffer of an ImageData. One pass over rays or
- * pixels, without new objects, because a slow device has little time for a frame. Pure: no DOM.
+ * The views of a scan as pixels. Each function fills the buffer of an ImageData in one pass over rays or
+ * pixels, without new objects, because a slow device has little time per frame. Pure: no DOM.
  *
  * @typedef {object} Ink Colours as pixels.
  * @property {number} wall
@@ -29,7 +29,7 @@ export function inkOf(distance, { near, stop }, ink) {
 }
 
 /**
- * Draw a dot for each ray around the middle; near dots are larger, so that colour is not alone.
+ * Draw a dot for each ray around the middle. Near dots are larger, so that colour is not the only cue.
  *
  * @param {Uint32Array} into
  * @param {number} size
@@ -110,7 +110,7 @@ export function view(into, width, height, rays, distances, limits, palette, unkn
     colours[column] = isClear ? 0 : isKnown ? shade(distance, limits.most, palette) : unknown;
     tops[column] = Math.floor((height * (1 - share)) / 2);
   }
-  // Row by row, in the order of the pixels; the lower half mirrors the upper one.
+  // Row by row, in the order of the pixels. The lower half mirrors the upper half.
   for (let row = 0; row < height; row += 1) {
     const depth = Math.min(row, height - 1 - row);
     const from = row * width;
@@ -149,7 +149,7 @@ export function band(reach, size) {
  */
 export function arc(into, { places, depths }, rays, distances, limits, palette, unknown) {
   into.fill(0);
-  // Bars are longer for shorter distances, so that brightness is not alone.
+  // Bars are longer for shorter distances, so that brightness is not the only cue.
   const lengths = distances.map((each) => (each === each ? Math.max(0.06, 1 - each / limits.most) : 0.06));
   const colours = Uint32Array.from(distances, (each) => (each === each ? shade(each, limits.most, palette) : unknown));
   for (let index = 0; index < places.length; index += 1) {
@@ -163,7 +163,7 @@ export function arc(into, { places, depths }, rays, distances, limits, palette, 
 export const ARC = Object.freeze({ inner: 0.5, outer: 0.82 });
 
 /**
- * Draw the distances in their order, first ray left; near is low.
+ * Draw the distances in order, with the first ray at the left. Near distances are low.
  *
  * @param {Uint32Array} into
  * @param {number} width

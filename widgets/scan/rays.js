@@ -11,7 +11,7 @@
 const TURN = 2 * Math.PI;
 
 /**
- * Return the distances for drawing: NaN if unknown, `most` if clear, and 0 if an obstacle is too close
+ * Return the distances to draw: NaN if unknown, `most` if clear, and 0 if an obstacle is too close
  * (REP 117).
  *
  * @param {readonly unknown[]} ranges
@@ -44,9 +44,9 @@ export function directions(fan) {
   return { right, down };
 }
 
-/** Share of the picture's radius that the farthest obstacle takes at most. */
+/** Maximum fraction of the picture's radius for the farthest obstacle. */
 const FILL = 0.9;
-/** A picture this much too large for its obstacles is drawn in a larger scale; a little less is not. */
+/** Fraction of the shown distance at the rim below which a smaller distance replaces it. */
 const LOOSE = 0.75;
 
 /**
@@ -55,7 +55,7 @@ const LOOSE = 0.75;
  * @param {Float32Array} distances
  * @param {number} most greatest distance that the sensor measures
  * @param {number} near distance that must be visible
- * @param {number} shown present distance at the rim: it stays while it fits, so that nothing flickers
+ * @param {number} shown present distance at the rim, which stays while it fits, to avoid flicker
  */
 export function rimOf(distances, most, near, shown) {
   let farthest = 0;
@@ -108,8 +108,8 @@ export function reachOfPixels(size) {
 }
 
 /**
- * Return the nearest obstacle and its direction; null without one in range. An obstacle below the range
- * counts as 0.
+ * Return the nearest obstacle and its direction; null without an obstacle in range. An obstacle below the
+ * range counts as 0.
  *
  * @param {Float32Array} distances
  * @param {Fan} fan
@@ -130,7 +130,7 @@ export function nearest(distances, fan, most) {
 }
 
 /**
- * Return the share of the height that a wall fills at a distance: 1 at `close`, little far away.
+ * Return the fraction of the height that a wall fills at a distance: 1 at `close`, almost 0 far away.
  *
  * @param {number} distance
  * @param {number} close

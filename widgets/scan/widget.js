@@ -15,7 +15,7 @@ import {
   bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
 } from "./rays.js";
 
-/** Largest image in pixels: a slow device fills no more in a frame. */
+/** Largest image in pixels; a slow device cannot fill more per frame. */
 const MOST_PIXELS = 420;
 const INK = /** @type {const} */ (["level", "caution", "alarm", "raised", "faint", "muted", "line", "text", "old"]);
 const VIEWS = /** @type {const} */ (["polar", "map", "graph", "depth", "arc"]);
@@ -94,7 +94,7 @@ class Scan {
     };
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(this.image.data.buffer);
-    /** Size of the picture, cached: reading it from the page would force a layout. */
+    /** Size of the picture, cached because reading it from the page would force a layout. */
     this.room = { width: 0, height: 0 };
     const sizes = new ResizeObserver(([entry]) => {
       if (!entry) return;
@@ -163,8 +163,8 @@ class Scan {
   }
 
   /**
-   * Compute the directions of the rays. If they are unknown there are no rays: a dot in a wrong place would
-   * hide a real obstacle.
+   * Compute the directions of the rays. Without known directions there are no rays: a dot in a wrong
+   * place would hide a real obstacle.
    *
    * @param {Reading} reading reading of the distances
    * @param {Readonly<Record<string, Reading>>} readings
@@ -266,7 +266,7 @@ class Scan {
   }
 
   /**
-   * @param {Pick<Reading, "state">} lead reading whose state is that of the sweep
+   * @param {Pick<Reading, "state">} lead reading that determines the state of the sweep
    * @param {string} aged age of the sweep, as text
    */
   tell(lead, aged) {

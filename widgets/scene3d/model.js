@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The robot's model: from its URDF file, or a box with a nose. Files only come from the profile; a mesh
- * without a file is left out and reported.
+ * The robot's model: from its URDF file, or a box with a nose. Files are only from the profile. A mesh
+ * without a file is omitted and reported.
  *
  * @typedef {typeof import("three")} Three
  * @typedef {import("three").Object3D} Object3D
@@ -83,7 +83,7 @@ export async function urdf(three, url, meshes, changed) {
     })();
   };
   const robot = loader.parse(page);
-  // Three.js makes parts without a material white, which is invisible on a light page.
+  // Three.js draws parts without a material in white, which is invisible on a light page.
   robot.traverse((/** @type {any} */ { material }) => {
     if (material && !material.name && material.color?.getHex() === 0xffffff) material.color.setHex(BARE);
   });
@@ -97,7 +97,7 @@ export async function urdf(three, url, meshes, changed) {
 }
 
 /**
- * Return the file for a path of the model: the one that shares most of the path's end.
+ * Return the file for a path of the model: the file with the longest common ending.
  *
  * @param {string} path path in the model, maybe with a package
  * @param {readonly string[]} files
@@ -116,7 +116,7 @@ export function fileOf(path, files) {
 }
 
 /**
- * Fetch a file that the browser itself parses as XML, because the page policy forbids markup from text.
+ * Fetch a file and let the browser parse it as XML, because the page policy forbids markup from text.
  *
  * @param {string} url
  * @returns {Promise<Document>}

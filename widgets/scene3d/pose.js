@@ -2,7 +2,7 @@
 /**
  * The pose of a model in the scene, and the viewpoint. Pure: no DOM, no three.js.
  *
- * The scene is that of REP 103: x ahead, y left, z up, right-handed. Quaternions are [x, y, z, w].
+ * The scene has the axes of REP 103: x ahead, y left, z up, right-handed. Quaternions are [x, y, z, w].
  *
  * @typedef {[number, number, number]} Vector
  * @typedef {[number, number, number, number]} Quaternion
@@ -43,7 +43,7 @@ export function times([ax, ay, az, aw], [bx, by, bz, bw]) {
  * @param {number} roll
  * @param {number} pitch
  * @param {number} yaw
- * @param {Convention} convention in FRD pitch and yaw have the other sign
+ * @param {Convention} convention in FRD, pitch and yaw have the opposite sign
  * @returns {Quaternion}
  */
 export function fromAngles(roll, pitch, yaw, convention) {
@@ -104,7 +104,7 @@ export function angles([x, y, z, w]) {
 }
 
 /**
- * Return the meaning of a pose in words, with whole degrees: FLU pitch is positive nose down.
+ * Return a pose in words, with whole degrees. FLU pitch is positive with the nose down.
  *
  * @param {Quaternion} turn
  * @returns {{text: string, degrees: number}[]} rotations of at least one degree
@@ -139,7 +139,7 @@ export function cameraAt(view, yaw, size) {
 }
 
 /**
- * Return a flat list of points for three.js, evenly thinned to at most `most`, without invalid ones.
+ * Return a flat list of points for three.js, evenly thinned to at most `most`, without invalid points.
  *
  * @param {readonly unknown[]} values x, y, z of each
  * @param {number} most

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The scene: light, ground, robot, points and camera. It draws on request only, at a limited rate.
+ * The scene: light, ground, robot, points and camera. The scene draws only on request, at a limited rate.
  *
  * @typedef {typeof import("three")} Three
  * @typedef {import("three").Object3D} Object3D
@@ -56,7 +56,7 @@ export class ViewSwitch {
 
   /** @param {number} colour */
   makeGround(colour) {
-    // In pieces of a metre: software renderers lose a long line that begins behind the camera.
+    // In pieces of one metre: software renderers lose a long line that begins behind the camera.
     const ends = [];
     for (let line = -REACH; line <= REACH; line += 1) {
       for (let piece = -REACH; piece < REACH; piece += 1) {
@@ -94,7 +94,7 @@ export class ViewSwitch {
     this.measure();
   }
 
-  /** Measure the model: its size and centre determine the position of the camera. */
+  /** Measure the model. Its size and centre determine the position of the camera. */
   measure() {
     if (!this.model) return;
     const turn = this.robot.quaternion.clone();
@@ -135,7 +135,7 @@ export class ViewSwitch {
     const moved = new this.three.Vector3(...place).sub(this.robot.position);
     this.robot.position.set(...place);
     this.robot.quaternion.set(...turn);
-    // The ground moves along in whole squares, so that it never ends.
+    // The ground follows the robot in whole squares, so that it never ends.
     this.ground.position.set(Math.round(place[0]), Math.round(place[1]), 0);
     if (this.view === "orbit") {
       this.camera.position.add(moved);

@@ -77,7 +77,7 @@ class Scene {
     this.turned = [0, 0, 0, 1];
     /** @type {[number, number, number]} */
     this.at = [0, 0, 0];
-    /** Whether the camera stands where it shows the first known posture. */
+    /** Whether the position of the camera shows the first known posture. */
     this.isFitted = false;
     /** Serial number of the drawn points; -1 without points. */
     this.pointsSerial = -1;
@@ -85,7 +85,7 @@ class Scene {
     try {
       this.stage = new ViewSwitch(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
     } catch {
-      // The words below still describe the pose.
+      // The text below still describes the pose.
       this.stage = null;
       this.fault = t("this browser draws no WebGL");
       return;
@@ -173,7 +173,7 @@ class Scene {
   update(readings) {
     this.readings = readings;
     const all = Object.values(readings).flatMap((each) => (Array.isArray(each) ? each : [each]));
-    // The state is that of the worst bound reading.
+    // The worst bound reading determines the state.
     this.worst = all.reduce((/** @type {Reading | undefined} */ found, each) => worse(found, each), undefined);
     attribute(this.root, "data-state", this.worst?.state ?? "none");
     this.place();
@@ -181,7 +181,7 @@ class Scene {
     this.tell();
   }
 
-  /** Set pose and joints from the readings; unknown values stay as they were. */
+  /** Set pose and joints from the readings. Unknown values do not change them. */
   place() {
     const { readings, stage, model } = this;
     if (!stage) return;
@@ -227,7 +227,7 @@ class Scene {
   setPoints() {
     const reading = this.readings["points"];
     const values = Array.isArray(reading?.value) ? reading.value : [];
-    // Points that are gone are removed, even without newer ones.
+    // Outdated points are removed, even without newer points.
     const serial = reading && reading.value !== null ? reading.serial : -1;
     if (!this.stage || serial === this.pointsSerial) return;
     this.pointsSerial = serial;

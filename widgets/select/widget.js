@@ -125,7 +125,7 @@ class Select {
     const place = this.choices.findIndex(({ value }) => this.word(value) === shown);
     const list = this.place?.querySelector("select");
     if (list) {
-      // During a pending command the selection stays at the hand, so that the next arrow key continues there.
+      // During a pending command, the operator's selection stays, so that the next arrow key continues there.
       const isAsked = this.giver.isPending || this.giver.next !== null;
       const wished = isAsked ? this.chosen : this.wish.isWaiting ? this.wish.value : null;
       const hand = wished === null ? place : this.choices.findIndex(({ value }) => value === wished);
@@ -169,8 +169,8 @@ class Select {
 }
 
 /**
- * Disable a control, but not under the focus: the page would take the focus and the next key. Choices
- * made meanwhile are refused.
+ * Disable a control unless it has the focus: otherwise, the page would get the focus and the next key.
+ * Choices during this time are refused.
  *
  * @param {HTMLSelectElement | HTMLInputElement} control
  * @param {boolean} isLocked
@@ -182,7 +182,7 @@ function lock(control, isLocked) {
 }
 
 /**
- * Return the choices: of the slot, else of the command, else of the signal.
+ * Return the choices of the slot, the command or the signal, in this order of preference.
  *
  * @param {Context} ctx
  * @param {Reading | undefined} state

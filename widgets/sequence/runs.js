@@ -4,8 +4,8 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 
 /**
- * The common part of both kinds of runs. The server runs a sequence of the driver, which continues
- * without this page. The page runs a list of commands, which ends with the page.
+ * The common part of both kinds of runs. The server runs a sequence of the driver, which continues after
+ * the page is closed. The page runs a list of commands, which ends when the page is closed.
  *
  * @typedef {"idle" | "running" | "paused"} State
  */
@@ -24,7 +24,7 @@ class Run {
     this.show = show;
     /** @type {string[]} */
     this.names = [];
-    /** Number of begun steps. */
+    /** Number of started steps. */
     this.place = 0;
     /** @type {State} */
     this.state = "idle";
@@ -41,7 +41,7 @@ class Run {
   end() {}
 }
 
-/** A sequence of the driver; the server reports its state, whichever page started it. */
+/** A sequence of the driver. The server reports its state, no matter which page started it. */
 export class RobotSequence extends Run {
   /**
    * @param {Context} ctx
@@ -54,7 +54,7 @@ export class RobotSequence extends Run {
     const steps = described?.steps ?? [];
     this.names = steps.map(({ text, what }) => ctx.t(text, { what }));
     const name = described?.command ?? "";
-    // A command that is no sequence has itself as its only step.
+    // A plain command is its own only step.
     if (this.names.length === 0) this.names = [described?.title || name];
     this.isSequence = steps.length > 0;
     ctx.follow("sequences", (known) => {
@@ -88,7 +88,7 @@ export class RobotSequence extends Run {
     } catch (error) {
       const isOurs = error instanceof Error && error.name === "Cancelled";
       this.outcome = `${isOurs ? "○" : "▲"} ${error instanceof Error ? error.message : error}`;
-      // A sequence that did not start must not start paused later.
+      // A sequence that failed to start must not start in the paused state later.
       if (this.isSequence && this.state === "idle") ctx.steer("run", "resume");
       if (!this.isSequence) this.isFailed = !isOurs;
     }
@@ -113,7 +113,7 @@ export class RobotSequence extends Run {
   }
 }
 
-/** A list of commands; the page sends one after the other. */
+/** A list of commands, which the page sends one after another. */
 export class OwnList extends Run {
   /**
    * @param {Context} ctx
@@ -125,7 +125,7 @@ export class OwnList extends Run {
     this.outputs = STEPS.filter((name) => ctx.command(name) !== null);
     this.names = this.outputs.map((name) => ctx.command(name)?.title || ctx.command(name)?.command || name);
     this.isHalted = false;
-    /** Reason why it cannot continue, or "". */
+    /** Reason why the run cannot continue, or "". */
     this.ended = "";
     /** @type {(() => void) | null} */
     this.goOn = null;

@@ -24,7 +24,7 @@ export default {
     const run = ctx.command("run") ? new RobotSequence(ctx, isEach, show) : new OwnList(ctx, isEach, show);
     const own = Array.isArray(options["steps"]) ? options["steps"].map(String) : [];
     const names = run.names.map((name, index) => own[index] ?? name);
-    // Names beyond the known steps are shown, too.
+    // Names beyond the known steps are shown too.
     names.push(...own.slice(names.length));
     const items = names.map((name) => {
       const item = document.createElement("li");

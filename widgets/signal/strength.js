@@ -28,7 +28,7 @@ export class Minute {
 
   /**
    * @param {number} time in seconds
-   * @param {number} value the lowest value of each second is kept, because it matters most
+   * @param {number} value strength; the lowest value of each second is kept, because it matters most
    * @returns {boolean} whether the drawing has changed
    */
   add(time, value) {
@@ -45,7 +45,7 @@ export class Minute {
   }
 
   /**
-   * Return the path of the minute in a box 60 wide and 20 high, with gaps where seconds are missing.
+   * Return the path of the minute in a box 60 wide and 20 high, with gaps for missing seconds.
    *
    * @param {number} time now, in seconds
    * @param {string} unit

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { attribute, clamp, keyOf, noteOf, part, style, write } from "urc/kit";
 
-/** Common shapes of all widgets: triangle, diamond and square are alarm, caution and advice. */
+/** Common shapes of all widgets: triangle for alarm, diamond for caution, square for advice. */
 const SHAPES = {
   unknown: "◌",
   plain: "◎",
@@ -35,7 +35,7 @@ export default {
         attribute(root, "data-state", value.state);
         attribute(root, "data-alarm", value.alarm);
         attribute(root, "data-meaning", meaning);
-        // In steps of two characters, so that another word rarely changes the font size.
+        // In steps of two characters, so that a new word rarely changes the font size.
         style(root, "--state-characters", String(clamp(2 * Math.ceil(word.length / 2), 4, 40)));
         write(shape, SHAPES[meaning]);
         write(text, word);
@@ -72,7 +72,7 @@ function wordOf({ value, text, signal }, words, t) {
 }
 
 /**
- * Return the entry of a table for a value, by its displayed word or by the robot's own value.
+ * Return a table's entry for a value, by its displayed word or by the robot's own value.
  *
  * @param {unknown} table
  * @param {unknown} value

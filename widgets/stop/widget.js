@@ -21,7 +21,7 @@ export default {
       note.textContent = words(state, isCut, t);
     }
     whenPressed(main, stop, signal);
-    main.removeAttribute("data-early-stop"); // armed: the page's first script leaves it alone
+    main.removeAttribute("data-early-stop"); // armed: the page's first script no longer handles the button
     onStop(show);
     return {};
   },

@@ -80,7 +80,7 @@ class Switch {
     return typeof said === "number" && this.values[1] === true ? said !== 0 : null;
   }
 
-  /** Displayed state: the requested one if the option says so, else the robot's. */
+  /** Displayed state: the requested state if the option is set so, otherwise the robot's state. */
   get shown() {
     if (this.isOptimistic && this.wish.isWaiting) return this.wish.value === true;
     return this.isOn(this.state?.value);

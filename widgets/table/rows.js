@@ -6,7 +6,7 @@
  * @typedef {{name: string, level: Level, message: string}} Row
  */
 
-/** Levels, the worst first. @type {readonly Level[]} */
+/** Levels, worst first. @type {readonly Level[]} */
 const ORDER = ["error", "warn", "stale", "unknown", "ok"];
 /** Levels by number, as in diagnostic_msgs/DiagnosticStatus. @type {readonly Level[]} */
 const NUMBERS = ["ok", "warn", "error", "stale"];

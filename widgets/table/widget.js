@@ -8,7 +8,7 @@
 import { attribute, many, noteOf, part, worst, write } from "urc/kit";
 import { rowsOf, rowsOfLists, shown } from "./rows.js";
 
-/** Shortest interval of redraws: a table is read, not watched. */
+/** Minimum interval between redraws; readers of a table need no faster updates. */
 const EVERY_MS = 200;
 
 class Table {
@@ -71,7 +71,7 @@ class Table {
     const rows = shown(this.rows, { sort, least, filter: this.filter?.value ?? "" });
     const worse = this.rows.filter(({ level }) => level === "error" || level === "warn").length;
     const { t } = this.ctx;
-    // Old and missing values are not OK, even without a known problem.
+    // Old and missing values do not count as OK, even without a known problem.
     const isOld = this.root.dataset["state"] !== "live" || this.rows.some(({ level }) => level === "stale");
     const isOk = this.rows.every(({ level }) => level === "ok");
     const words = worse > 0 ? t("{count} not OK", { count: worse }) : isOld ? t("not known") : isOk ? t("all OK") : "";
@@ -95,7 +95,7 @@ class Table {
 }
 
 /**
- * Write a symbol and a word; a narrow cell shows the symbol alone.
+ * Write a symbol and a word; a narrow cell shows only the symbol.
  *
  * @param {Element} cell
  * @param {string} text

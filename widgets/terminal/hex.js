@@ -1,5 +1,5 @@
 // @ts-check
-/** Bytes as text, and the history of typed lines. It knows no DOM. */
+/** Bytes as text, and the history of typed lines. Pure: no DOM. */
 
 const MOST_BYTES = 512;
 const MOST_LINES = 100;
@@ -25,7 +25,7 @@ export function hexOf(text) {
 }
 
 /**
- * Return a text without effect on a terminal: control characters become visible.
+ * Return a text that has no effect on a terminal, because control characters become visible.
  *
  * @param {string} text
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** The output: a terminal if it is installed, else a plain list. */
+/** The output: a terminal if one is installed, otherwise a plain list. */
 
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("@xterm/xterm").Terminal} Terminal */
@@ -53,7 +53,7 @@ export class Screen {
       box.className = "terminal-box";
       place.append(box);
       withNonce(() => terminal.open(box));
-      // Read-only: Tab leaves it, Escape is STOP, and the focus stays on the output around it.
+      // Read-only: Tab leaves the terminal, Escape is STOP, and the focus stays on the output around it.
       terminal.attachCustomKeyEventHandler(({ key }) => key.startsWith("Page"));
       for (const part of [terminal.element, terminal.textarea]) if (part) part.tabIndex = -1;
       terminal.write(HIDE_CURSOR); // there is no input here
@@ -82,7 +82,7 @@ export class Screen {
   }
 
   /**
-   * Print a line with its break first: a terminal of one row would else show an empty row.
+   * Print a line break and then a line; otherwise, a terminal of one row would show an empty row.
    *
    * @param {Terminal} terminal
    * @param {string} line
@@ -105,7 +105,7 @@ export class Screen {
 }
 
 /**
- * Let new style elements pass the page policy: the terminal makes its own, and has no option for a nonce.
+ * Allow new style elements under the page policy: the terminal creates some, and has no nonce option.
  *
  * @param {() => void} act must be synchronous
  */

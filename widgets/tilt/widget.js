@@ -54,7 +54,7 @@ class Sensor {
     }
   }
 
-  /** Return why there is no sensor, or "". */
+  /** Return the reason why there is no sensor, or "". */
   missing() {
     if (!isSecureContext) {
       return this.t("Browsers give the tilt sensor to HTTPS pages only: drag on the pad instead.");
@@ -70,7 +70,7 @@ class Sensor {
       return;
     }
     try {
-      // Some browsers need a permission, which they only ask for after a tap.
+      // Some browsers require a permission, and only ask for it after a tap.
       const asks = /** @type {{requestPermission?: () => Promise<string>}} */ (
         /** @type {unknown} */ (DeviceOrientationEvent)
       );
@@ -130,7 +130,7 @@ class Pad {
     this.keyLevel = Number(options["keys"] ?? 0.5);
     this.shape = settingsOf(options).gate;
     this.reach = 1;
-    /** Tilt of the device at the start of the hold: it is the middle. */
+    /** Tilt of the device at the start of the hold, which is the middle. */
     this.rest = sensor.now;
     this.isTilted = false;
   }

@@ -3,9 +3,9 @@
  * The trend of a value, separated from its noise. Pure.
  */
 
-/** Most kept readings; newer ones in between replace the last. */
+/** Maximum number of readings. Newer readings in between replace the last reading. */
 const POINTS = 60;
-/** Fewest readings for a trend. */
+/** Minimum number of readings for a trend. */
 const LEAST_POINTS = 4;
 
 export class Trend {
@@ -35,10 +35,10 @@ export class Trend {
   }
 
   /**
-   * Return 1 if it rises, -1 if it falls, 0 if it is steady, null if unknown.
+   * Return 1 for a rise, -1 for a fall, 0 for a steady value, and null if unknown.
    *
-   * It rises if the regression line climbs over the span by more than twice the scatter around it, and by
-   * more than `least`.
+   * A value rises if its regression line rises over the span by more than twice the scatter around it, and
+   * by more than `least`.
    *
    * @param {number} [least] smallest relevant change over the span
    * @returns {-1 | 0 | 1 | null}

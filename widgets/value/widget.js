@@ -12,7 +12,7 @@ const DRAW_EVERY_MS = 100;
 const MOVE_EVERY_MS = 1000;
 /** Time span of the trend, in seconds. */
 const TREND_S = 10;
-/** Margin above and below, as a share of the height. */
+/** Margin above and below, as a fraction of the height. */
 const RIM = 0.04;
 
 export default {
@@ -32,7 +32,7 @@ export default {
     const history = place && windowS ? new History(place, windowS) : null;
     const facts = new Facts(ctx);
     signal.addEventListener("abort", () => history?.destroy());
-    /** Last drawn state of everything but the number. */
+    /** Last drawn state of all parts except the number. */
     let seen = "";
 
     return {
@@ -43,7 +43,7 @@ export default {
         const symbol = reading.value === null ? "" : reading.unit || known;
         fit(line, "--value-characters", shown.length + symbol.length / 2);
         write(text, shown);
-        // It rarely changes; comparing each part takes longer than writing the number.
+        // The state rarely changes, and comparing each part takes longer than writing the number.
         const look = `${reading.state} ${reading.alarm} ${reading.age} ${symbol}`;
         if (look !== seen) {
           seen = look;
@@ -119,7 +119,7 @@ class Facts {
   }
 }
 
-/** The last minutes as a line, drawn by uPlot if it is installed. */
+/** The last minutes as a line, drawn by uPlot if uPlot is installed. */
 class History {
   /**
    * @param {Element} root contains the three parts
@@ -150,9 +150,9 @@ class History {
     /** uPlot's instance; its types are not part of this page. @type {any} */
     this.plot = null;
     this.isOver = false;
-    // The line advances with the time, also without readings.
+    // The line advances with time, even without readings.
     this.timer = setInterval(() => this.draw(), MOVE_EVERY_MS);
-    // Not the cell's size: the numbers next to the line take some of its width.
+    // Not the cell's size: the numbers next to the line use some of its width.
     this.sizes = new ResizeObserver(() => this.plot?.setSize(sizeOf(this.place)));
     void this.load();
   }
@@ -201,7 +201,7 @@ class History {
       this.draw();
     } else if (serial !== this.serial) {
       this.serial = serial;
-      // At most POINTS in the window: newer readings replace the last point in between.
+      // At most POINTS in the window: newer readings in between replace the last point.
       const isClose = time - last < this.windowS / POINTS && typeof this.values.at(-1) === "number";
       if (isClose || time <= last) this.values[this.values.length - 1] = value;
       else this.push(time, value);
@@ -229,7 +229,7 @@ class History {
   draw() {
     this.drawnMs = performance.now();
     const startS = this.drawnMs / 1000 - this.windowS;
-    // The last point before the window stays: the line comes in from there. A gap needs no start.
+    // The last point before the window stays, because the line starts there. A gap needs no start.
     while ((this.times[1] ?? Infinity) < startS) this.drop();
     if (this.times.length === 1 && (this.times[0] ?? 0) < startS) this.drop();
     const known = this.values.filter((value) => value !== null);

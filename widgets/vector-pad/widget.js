@@ -10,7 +10,7 @@ import { cutTo, polar } from "urc/path_simplify";
 /** Radius of the rim, in units of the drawing, which is 200 wide. */
 const RIM = 90;
 const FACE = 200;
-/** Drag in pixels below which a press is a tap, which sets the end at its place. */
+/** Drag in pixels below which a press is a tap, which sets the end of the vector. */
 const TAP = 6;
 const ARROWS = Object.values(DIRECTIONS).flat();
 
@@ -55,7 +55,7 @@ class VectorPad {
     this.isSentByRelease = options["send"] !== "button";
     this.reason = ctx.t("not ready yet");
     this.isAnswered = false;
-    /** Drawn vector in shares of the length; null without one. @type {[number, number] | null} */
+    /** Drawn vector as fractions of the length; null without a vector. @type {[number, number] | null} */
     this.at = null;
     /** @type {[number, number] | null} */
     this.last = null;
@@ -98,7 +98,7 @@ class VectorPad {
     return true;
   }
 
-  /** Draw from the start of the touch, so that nothing jumps. @param {PointerEvent} event */
+  /** Draw from the start of the touch, so that the vector does not jump. @param {PointerEvent} event */
   move(event) {
     const [right, down] = [event.clientX - this.start[0], event.clientY - this.start[1]];
     if (this.isTap && Math.hypot(right, down) < TAP) return;
@@ -141,7 +141,7 @@ class VectorPad {
     this.draw();
   }
 
-  /** Return the arguments that the command has. */
+  /** Return the arguments that the command declares. */
   given() {
     const [x, y] = this.at ?? [0, 0];
     const { heading, distance } = polar(x, y);

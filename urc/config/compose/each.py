@@ -3,8 +3,8 @@
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
 
-An item with the name of a copy changes this copy: ``joint_2: { unit: deg }`` sets its unit, and
-``joint_2: null`` removes the copy.
+An item with the same name as a copy changes the copy. For example, ``joint_2: { unit: deg }`` sets
+the copy's unit, and ``joint_2: null`` removes the copy.
 """
 
 import re
@@ -39,7 +39,7 @@ class _Copy(NamedTuple):
 
 
 class Expander:
-    """An expander of all `each` keys in one document."""
+    """Expands all `each` keys in one document."""
 
     def __init__(self, document: Document, problems: Problems, budget: ExpansionBudget) -> None:
         self.document = document
@@ -49,7 +49,7 @@ class Expander:
         """Path of the current item."""
 
     def collection(self, tree: Tree, path: Path) -> Tree:
-        """Return a mapping or list after the expansion of every `each` in its items."""
+        """Return a mapping or list with every `each` in its items expanded."""
         if isinstance(tree.value, dict):
             return self._mapping(tree, path)
         return self._list(tree, path)
@@ -133,9 +133,9 @@ class Expander:
     def _variables(
         self, inner: Tree, path: Path, name: str | None
     ) -> Mapping[str, list[object]] | None:
-        """Return the variables of an item, or None without a valid `each`.
+        """Return the variables of an item; None for an item without a valid `each`.
 
-        An `each` of the wrong shape stays in the document, and the shape pass reports an error.
+        An invalid `each` stays in the document, and the shape pass reports the error.
         """
         if not isinstance(inner.value, dict) or "each" not in inner.value:
             return None
@@ -180,7 +180,7 @@ class Expander:
 
 
 class _First:
-    """A reporter of problems in the first copy of an item."""
+    """Reports problems in the first copy of an item."""
 
     def __init__(self, expander: Expander, path: Path) -> None:
         self._expander = expander
@@ -208,7 +208,7 @@ class _First:
 
 
 class _Rest:
-    """A reporter that ignores the problems of all later copies of an item."""
+    """Ignores problems in all later copies of an item."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Say nothing."""
@@ -240,7 +240,7 @@ def _without(tree: Tree, key: str) -> Tree:
 
 
 def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -> list[_Copy]:
-    """Return the items after the generated item `name` was changed or removed."""
+    """Return the items with the generated item `name` changed or removed."""
     result = []
     for copy in items:
         if copy.name == name:
@@ -270,7 +270,7 @@ _BY_NAME: Final = ("simulator", "rules")
 
 
 def expand(document: Document, problems: Problems) -> Document:
-    """Return the document after the expansion of every `each`."""
+    """Return the document with every `each` expanded."""
     everywhere = list(_places(document.data))
     _check_names(document, everywhere, problems)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
@@ -295,7 +295,7 @@ def expand(document: Document, problems: Problems) -> Document:
 
 
 def _without_removals(document: Document, places: list[Path], problems: Problems) -> Document:
-    """Drop and report each removal of an item that does not exist."""
+    """Report and drop each removal of a nonexistent item."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
         items = _at(document.data, path)
@@ -333,7 +333,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
-    """Report names that still contain braces, because the schemas allow braces."""
+    """Report names that still contain braces, which the schemas allow."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
@@ -348,7 +348,7 @@ def _check_names(document: Document, places: list[Path], problems: Problems) -> 
 
 
 def _places(data: object) -> Iterator[Path]:
-    """Yield the paths of all mappings and lists with items that may have an `each`."""
+    """Yield the paths of all mappings and lists that allow an `each` in their items."""
     if not isinstance(data, dict):
         return
     for root in ((), ("driver",)):
@@ -381,7 +381,7 @@ def _has_each(collection: object) -> bool:
 
 
 def _replaced(tree: Tree, path: Path, change: Any, done: Path = ()) -> Tree:
-    """Return `tree` with a changed part at `path`; other parts are shared, not copied."""
+    """Return `tree` with the part at `path` changed; other parts are shared, not copied."""
     if not path:
         result: Tree = change(tree, done)
         return result

@@ -1,8 +1,8 @@
 """Replacement of names in single braces, such as ``{i}`` of an `each`, or ``{params.id}``.
 
-URC replaces names in single braces in all keys and texts while it loads a document. Templates,
-which have double braces, stay unchanged. A text that consists of one name becomes the value itself,
-so the result of ``"{i}"`` may be a number.
+URC replaces names in single braces in all keys and texts while it loads a document. Templates have
+double braces and stay unchanged. A text that is only a name becomes the value itself, so the result
+of ``"{i}"`` may be a number.
 """
 
 import re
@@ -28,7 +28,7 @@ Names = Mapping[str, object]
 
 
 class PlaceholderReporter(Protocol):
-    """An interface for reporting names without a value."""
+    """Reports names without a value."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report an unknown word after the dot of a known `name`."""
@@ -38,7 +38,8 @@ class PlaceholderReporter(Protocol):
 
 
 _NAME: Final = re.compile(
-    # Double braces belong to a template, but {{n}:number} is a field with a filled name.
+    # Double braces belong to a template, but {{n}:number} is a field with a placeholder for its
+    # name.
     r"(?:(?<!\{)|(?<=\{)(?=\{[a-z0-9_.]+\}:[a-z]))"
     r"\{([a-z][a-z0-9_]*)(?:\.([a-z0-9_]+))?\}(?!\})"
 )
@@ -46,7 +47,7 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class ExpansionTooLarge(Exception):
-    """An error for an expansion that exceeds the limits of a document."""
+    """An expansion exceeds the size limits of a document."""
 
 
 class ExpansionBudget:
@@ -57,7 +58,7 @@ class ExpansionBudget:
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Count new nodes and characters; raise `ExpansionTooLarge` beyond the limit."""
+        """Count new nodes and characters; raise `ExpansionTooLarge` above the limit."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:
@@ -104,9 +105,9 @@ class _TemplateFiller:
             if name not in made:
                 made[name] = inner
             elif name not in value:
-                made[key] = inner  # Two keys became one, so this key stays as written.
+                made[key] = inner  # Two keys have the same new name, so this key stays unchanged.
             else:
-                # A key with its full name takes precedence over a filled key.
+                # A literal key takes precedence over a key with replaced names.
                 below, above = (made[name], inner) if name == key else (inner, made[name])
                 if above.value is None:
                     del made[name]
@@ -132,7 +133,7 @@ class _TemplateFiller:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, UnfilledText | None]:
-        """Return the text after the replacement of names, and the original text if it changed."""
+        """Return the text with names replaced, and the original text if a name was replaced."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []
@@ -177,12 +178,12 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
 def fill(
     tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
 ) -> Tree:
-    """Return `tree` after the replacement of every name; parts without names are not copied."""
+    """Return `tree` with every name replaced; parts without names are not copied."""
     return _TemplateFiller(names, budget, listener).tree(tree, path)
 
 
 def fill_key(key: str, names: Names, budget: ExpansionBudget) -> str:
-    """Return a key after the replacement of every name."""
+    """Return a key with every name replaced."""
     return str(_TemplateFiller(names, budget, None).text(key, ())[0])
 
 

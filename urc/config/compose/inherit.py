@@ -32,7 +32,7 @@ _INCLUDED: Final = {
     "driver": ("driver",),
     "interface": ("interface",),
 }
-"""Kinds of documents that a document may include, by the document's own kind."""
+"""Kinds of documents that a document may include, by its own kind."""
 
 
 class Composed(NamedTuple):
@@ -47,8 +47,8 @@ class Composed(NamedTuple):
 def compose(document: Document, library: Library) -> Composed:
     """Merge a document with the documents that it extends and includes.
 
-    The library reads the documents, and collects the problems of references and clashes. The shape
-    pass reports all other problems of the sources and of the result.
+    The library reads the documents, and collects problems in references and contradictory values.
+    The shape pass reports all other problems of the sources and the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -56,7 +56,7 @@ def compose(document: Document, library: Library) -> Composed:
 
 
 def override(document: Document, overrides: Node) -> Document:
-    """Return a driver after the changes under a robot's `overrides`."""
+    """Return a driver with the changes under a robot's `overrides`."""
     mark = overrides.document.at(overrides.path)
     if mark is None:
         return document  # every part has a mark
@@ -69,11 +69,11 @@ def override(document: Document, overrides: Node) -> Document:
 
 
 class _Composer:
-    """A merger of one document with its sources."""
+    """Merges one document with its sources."""
 
     def __init__(self, library: Library) -> None:
         self.sources: dict[str, Document] = {}
-        """Merged documents by file."""
+        """Documents before the merge, by file."""
         self._library = library
         self._problems = library.problems
         self._whole: dict[str, Document | None] = {}
@@ -173,7 +173,7 @@ class _Composer:
         for path, first, second in clashes.found:
             home = second.home
             place = f"{first.home.file}:{first.mark.span.line}"
-            # A document of one value, so that the problem points at the value itself.
+            # The document contains only this value, so the problem points at the value itself.
             value = Document(home.file, home.text, home.lines, second.value, second.mark)
             found = value.problem(
                 (),
@@ -186,7 +186,7 @@ class _Composer:
 
 
 class _Clashes:
-    """A collector of contradictory values in two includes."""
+    """Collects contradictory values in two included documents."""
 
     def __init__(self, settled: object) -> None:
         self._settled = settled

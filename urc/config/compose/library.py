@@ -1,4 +1,4 @@
-"""Reader of all documents that one document refers to.
+"""Reads all documents that one document refers to.
 
 A path in a reference is relative to the referring document. A name without a suffix refers to a
 document that ships with URC.
@@ -23,12 +23,12 @@ _FILE_CODES: Final = (
 )  # fmt: skip
 _NAME: Final = re.compile("[a-z][a-z0-9-]*")
 _SHIPPED: Final = {"robot": ".", "driver": "drivers", "interface": "interfaces"}
-"""Folders of the shipped documents, below `robots`, by kind of document."""
+"""Folders of the shipped documents below `robots`, by document kind."""
 _ARTICLES: Final = {"interface": "an interface"}
 
 
 class Library:
-    """A reader of documents that reads each file once and records its path."""
+    """Reads each document once and records its path."""
 
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
@@ -46,7 +46,7 @@ class Library:
         return read_document(path)
 
     def follow(self, reference: Node, kinds: tuple[str, ...]) -> Document | None:
-        """Return the document that a reference names, or None after a reported problem."""
+        """Return the document that a reference names; None if a problem was reported."""
         here = reference.document.source_of(reference.path).file
         if _NAME.fullmatch(reference.data):
             named = _shipped(reference.data, kinds)
@@ -113,7 +113,7 @@ class Library:
 
 
 def _shipped(name: str, kinds: tuple[str, ...]) -> str | None:
-    """Return the path of a document that ships with URC, or None."""
+    """Return the path of a document that ships with URC; None for an unknown name."""
     files = (shipped("robots") / _SHIPPED[kind] / f"{name}.yaml" for kind in kinds)
     return next((os.path.normpath(file) for file in files if file.is_file()), None)
 

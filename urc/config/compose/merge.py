@@ -1,9 +1,9 @@
 """Merge of two data trees with source positions; the upper tree overrides the lower tree.
 
-Mappings are merged by key, and lists of named items by name. The upper tree replaces all other
-values. Rules of a simulator are merged by name, and rules without a name are kept. The value
+Mappings are merged by key, and lists of named items are merged by name. The upper tree replaces all
+other values. Rules of a simulator are merged by name, and rules without a name are kept. The value
 ``null`` removes a key, and ``remove: true`` removes an item of a list. Every mark in the result
-keeps its document, so every problem keeps its position.
+refers to its document, so every problem has its original position.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Tree(NamedTuple):
     value: object
     mark: Mark
     home: Document
-    """Document of the data; marks inside the data may name another document."""
+    """Document of the data; marks inside the data may refer to another document."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
@@ -43,7 +43,7 @@ def _pinned(tree: Tree) -> Mark:
 
 
 def mark_inside(inner: Tree, around: Tree) -> Mark:
-    """Return the mark of `inner`, with its document if `around` is in another document."""
+    """Return the mark of `inner`; add its document if `around` is in another document."""
     return _pinned(inner) if inner.home is not around.home else inner.mark
 
 
@@ -63,7 +63,7 @@ def children(tree: Tree) -> dict[str | int, Tree]:
 
 
 def item_name(value: object) -> str | None:
-    """Return the name of an item of a list, or None."""
+    """Return the name of a list item; None for an item without a name."""
     if isinstance(value, dict):
         for key in _NAMES:
             name = value.get(key)
@@ -82,7 +82,7 @@ def count_nodes(value: object) -> int:
 
 
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
-    """Return `base`, overridden by the values of `over`.
+    """Return `base` with the values of `over` merged into it.
 
     The base is not modified. `path` is the position of both trees in their documents. The callback
     `clash` receives each replaced value and its replacement.
@@ -91,7 +91,7 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
         base = _driver_in_full(base, over.value)
     if isinstance(base.value, dict) and isinstance(over.value, dict):
         if path[-1:] == ("framing",) and _has_other_type(base.value, over.value):
-            return over  # another framing type has other keys
+            return over  # other framing types have other keys
         return _mappings(base, over, path, clash)
     if isinstance(base.value, list) and isinstance(over.value, list):
         old, new = _by_name(base), _by_name(over)
@@ -106,7 +106,7 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
 
 
 def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
-    """Return a driver's name as a mapping if `over` adds params or overrides."""
+    """Convert a driver's name to a mapping if `over` adds params or overrides."""
     if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
         return base
     mark = base.mark.copy({"use": _pinned(base)})
@@ -170,7 +170,7 @@ def _lists(
 
 
 def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
-    """Merge rules by name; new rules are first in the result."""
+    """Merge rules by name; the result starts with the new rules."""
     left, items = dict(new), []
     for inner in children(base).values():
         name = item_name(inner.value)

@@ -1,7 +1,7 @@
 """Replacement of a driver's parameters, such as ``{params.id}``, in keys and texts.
 
-Each robot gives the values of its driver's parameters, and URC replaces the parameters while it
-loads the documents. The values of settings come from the operator.
+Each robot sets its driver's parameters, and URC replaces them while it loads the documents. The
+operator provides the values of settings.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ _SAMPLES: Final[Mapping[str, Value]] = {
 def fill_params(
     document: Document, given: Node | None, use: Node | None, problems: Problems
 ) -> Document:
-    """Return a driver's document after the replacement of its parameters.
+    """Return a driver's document with its parameters replaced.
 
     `given` contains the robot's values, and `use` is the robot's reference to the driver. To check
     a driver without a robot, pass None for `given` and `use`. Each parameter without a default then
@@ -141,7 +141,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 
 
 class _ParameterFiller:
-    """A replacer of the parameters in one document that records the used parameters."""
+    """Replaces the parameters in one document and records the used parameters."""
 
     def __init__(self, document: Document, values: Mapping[str, Value], problems: Problems) -> None:
         self.used: set[str] = set()

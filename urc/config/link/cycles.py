@@ -1,4 +1,4 @@
-"""Search for cycles: signals that depend on themselves, and sequences that run themselves."""
+"""Searches for cycles: signals that depend on themselves, and sequences that run themselves."""
 
 from collections.abc import Callable, Iterable
 
@@ -6,7 +6,7 @@ __all__ = ["cycle_from"]
 
 
 def cycle_from(start: str, following: Callable[[str], Iterable[str]]) -> list[str]:
-    """Return the shortest path from `start` back to `start`, or an empty list.
+    """Return the shortest path from `start` back to `start`; an empty list without a cycle.
 
     Args:
         start: first name of the path.

@@ -1,4 +1,4 @@
-"""Checks of all names of transports, signals, settings and arguments in a driver."""
+"""Checks all names of transports, signals, settings and arguments in a driver."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -40,7 +40,7 @@ _NUMBERS: Final = ("port", "integer", "number")
 def check_option(
     part: Node, kind: str, template: Template, settings: Mapping[str, Setting], problems: Problems
 ) -> None:
-    """Report a setting in `template` with the wrong type for the option at `part`.
+    """Report a setting in `template` if its type is wrong for the option at `part`.
 
     For built-in transports, `kind` is the name of a definition in the driver's schema.
     """
@@ -66,7 +66,7 @@ def check_option(
 
 
 class NameUses:
-    """The names that a driver uses; rules report declared names without a use."""
+    """The names that a driver uses; rules report unused declarations."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()
@@ -208,7 +208,7 @@ class _Linker:
             )
 
     def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
-        """Return an unknown name as written in the document, and a hint."""
+        """Return the unknown name in the document's notation, and a hint."""
         if name == NONCE:
             return "nonce", "a nonce is only available in 'send'"
         if name == COUNTERS:
@@ -237,7 +237,7 @@ class _Linker:
 def link_driver(
     part: Node, driver: Driver, settings: Mapping[str, Setting], problems: Problems
 ) -> NameUses:
-    """Check every name in the driver at `part`; return the names in use."""
+    """Check every name in the driver at `part`; return the used names."""
     linker = _Linker(driver, settings, problems)
     answered = {one.transport for one in driver.commands.values() if one.reply}
     answered |= {one.transport for one in driver.polls if one.reply}
@@ -306,7 +306,7 @@ def _check_arguments_used(part: Node, send: WriteSpec, problems: Problems) -> No
 
 
 def _has_single_braces(part: Node, name: str) -> bool:
-    """Return whether 'send' has the argument in single braces, as in an f-string of Python."""
+    """Return whether 'send' has the argument in single braces, as in a Python f-string."""
     send = part.get("send")
     return send is not None and isinstance(send.data, str) and f"{{{name}}}" in send.data
 

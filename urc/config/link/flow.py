@@ -1,4 +1,4 @@
-"""Checks of names and arguments in conditions, in reply matching and in calls of commands."""
+"""Checks names and arguments in conditions, reply matching and command calls."""
 
 from collections.abc import Iterable, Mapping
 from typing import Protocol
@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Linker(Protocol):
-    """The functions of the link pass that this module needs."""
+    """The link pass functions that this module needs."""
 
     driver: Driver
     problems: Problems
@@ -186,7 +186,7 @@ def link_refusals(linker: Linker, part: Node, faults: tuple[ErrorReply, ...]) ->
 
 
 def said_on(driver: Driver, transport: str) -> Iterable[str]:
-    """Return the names that every template of a transport may use, such as counters and clocks."""
+    """Return the names that all templates of a transport may use, such as counters and the time."""
     learnt = driver.learnt(transport) if transport in driver.transports else frozenset()
     return (COUNTERS, NONCE, NOW, *learnt)
 
@@ -197,7 +197,7 @@ def link_keepalives(linker: Linker, part: Node) -> None:
         keepalive = linker.driver.transports[name].keepalive
         if keepalive is None:
             continue
-        linker.transport(inner, "type", name)  # a keepalive uses it
+        linker.transport(inner, "type", name)  # a keepalive uses the transport
         place = inner.must("keepalive")
         for one in place.listed("after"):
             _link_counting(linker, one, name)
@@ -212,7 +212,7 @@ def link_keepalives(linker: Linker, part: Node) -> None:
 
 
 def _link_counting(linker: Linker, part: Node, transport: str) -> None:
-    """Check each command that counts as traffic for a keepalive."""
+    """Check that `part` names a command that can count as traffic for the transport's keepalive."""
     command = find_command(linker, part, str(part.data))
     if command is not None and (command.steps or command.transport != transport):
         what = "is a sequence" if command.steps else f"goes to {command.transport!r}"
@@ -242,7 +242,7 @@ def link_arguments(
     for name, inner in given.items():
         argument = known_argument(name, inner, command, problems)
         if argument is not None and not (isinstance(inner.data, str) and "{{" in inner.data):
-            check_value(inner, argument, problems)  # a template has its value only at runtime
+            check_value(inner, argument, problems)  # a template's value is known only at runtime
     missing = [
         name
         for name, one in command.arguments.items()

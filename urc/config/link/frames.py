@@ -1,4 +1,4 @@
-"""Checks of constant frames that their framing cannot carry.
+"""Checks whether the framing can carry constant frames.
 
 Frames with expressions can only be checked later, when URC builds them.
 """
@@ -66,7 +66,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
 
 
 def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | None:
-    """Return the bytes of a constant text, or None for a variable or invalid text."""
+    """Return the bytes of a constant text; None for a variable or invalid text."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
         return None
@@ -77,7 +77,7 @@ def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | 
 
 
 def _bytes(send: WriteSpec) -> bytes | None:
-    """Return the bytes of constant ``hex`` or ``bytes``, or None for variable bytes."""
+    """Return the bytes of constant ``hex`` or ``bytes``; None for variable bytes."""
     pieces = cast("tuple[object, ...]", send.options.get("pieces", (None,)))
     fixed = [one for one in pieces if isinstance(one, bytes)]
     return b"".join(fixed) if len(fixed) == len(pieces) else None
@@ -88,7 +88,7 @@ def _what(send: WriteSpec) -> str:
 
 
 def _check_end(part: Node, problems: Problems) -> None:
-    """Warn of a text that ends with a backslash and a letter instead of a control character."""
+    """Warn about a text that ends with a backslash and a letter instead of a control character."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
         problems.warn(
             part,

@@ -1,4 +1,4 @@
-"""Checks of the names in an interface: widgets, and their bindings and options."""
+"""Checks the names in an interface: widgets, and their bindings and options."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, before an interface changes the slots."""
+    """Return the widget of each slot, before any interface changes it."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
@@ -44,7 +44,7 @@ def link_interface(
     registry: WidgetFolder,
     problems: Problems,
 ) -> Interface:
-    """Return the interface with the widgets that it declares for its slots.
+    """Return the interface with its linked widgets.
 
     `slots` contains the slots of the driver. Without a driver, the check covers only the interface.
     """
@@ -88,7 +88,7 @@ def _use(
     registry: WidgetFolder,
     problems: Problems,
 ) -> WidgetUse | None:
-    """Return the slot `base` with the changes at `part`; None after a reported problem."""
+    """Return the slot `base` with the changes at `part`; None if a problem was reported."""
     name = part.text("use", base.widget if base else "")
     if not name:
         if driver is not None:
@@ -131,7 +131,7 @@ def _use(
 
 
 class _CollectedBindings(NamedTuple):
-    """The collected bindings of a widget, with the same fields as in `WidgetUse`."""
+    """The collected bindings of a widget; the fields are the same as in `WidgetUse`."""
 
     inputs: dict[str, str]
     lists: dict[str, tuple[str, ...]]
@@ -212,7 +212,7 @@ def _bind_input(
 def _check_required(
     part: Node, widget: Widget, bound: Mapping[str, object], driver: Driver, problems: Problems
 ) -> None:
-    tried = part.named("bind")  # their problems are already reported
+    tried = part.named("bind")  # problems in these bindings are already reported
     ports = (*widget.inputs, *widget.outputs)
     meant = {close for key in tried if key not in ports for close in closest(key, ports)}
     for port in (*widget.inputs.values(), *widget.outputs.values()):
@@ -264,7 +264,7 @@ def _check_signal(
 
 
 def misfit(port: WidgetPort, signal: Signal) -> str:
-    """Return the reason why a signal does not fit an input, or "" if it fits."""
+    """Return the reason why a signal does not fit an input; "" if the signal fits."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
         return f"type {' or '.join(port.types)} is expected, but the signal is {signal.type}"

@@ -1,4 +1,4 @@
-"""Checks that messages fit the type of their transport."""
+"""Checks whether messages fit the type of their transport."""
 
 from collections.abc import Iterator, Mapping
 
@@ -31,7 +31,7 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
         if keepalive is not None:
             _check_send(keepalive.get("send"), spec, problems)
         for key in ("on_connect", "on_close"):
-            is_asked = False  # the step before makes a request with a reply
+            is_asked = False  # whether the previous step sends a request with a reply
             for step in inner.listed(key):
                 _check_step(step, spec, problems, wants_topic=not is_asked)
                 send = step.get("send")
@@ -107,7 +107,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
 
 
 def _check_ros(part: Node, problems: Problems) -> None:
-    """Report messages without a type, or in a form that a ROS bridge cannot carry."""
+    """Report a message without a type, or in a form that a ROS bridge cannot carry."""
     for key in ("text", "hex", "bytes", "struct"):
         if key in part.data:
             problems.error(
@@ -170,7 +170,7 @@ def _check_read(
 
 
 def _answers(part: Node) -> list[Node]:
-    """Return a received frame with its stages and all error replies."""
+    """Return the parts of a received frame, its stages and all its error replies."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
     refusals = [inner for one in given for inner in one.listed("errors")]
@@ -178,7 +178,7 @@ def _answers(part: Node) -> list[Node]:
 
 
 def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
-    """Report the use of response headers if the transport has none."""
+    """Report the use of response headers on a transport without response headers."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,

@@ -21,7 +21,7 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Names of the shipped widgets that give a value of a certain type, by type."""
+"""Names of the shipped widgets that provide a value, by value type."""
 
 
 def link_output(
@@ -93,7 +93,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
 def _check_hold(
     part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
-    """Report a mismatch of hold-to-run outputs and held commands; return whether both match."""
+    """Report a mismatch of hold-to-run output and held command; return whether they match."""
     if port.is_held and command.hold is None:
         problems.error(
             part,
@@ -137,7 +137,7 @@ def _check_values(
 ) -> None:
     """Report required arguments without a value, and values of the wrong type or unit."""
     if port.types and not port.arguments:
-        return  # it gives a value without a name
+        return  # the output provides a value without a name
     taken = targets(command, port, given)
     missing = [
         name
@@ -189,7 +189,7 @@ def _remedy(
 
 
 def _giver(argument: Argument) -> str:
-    """Return a hint with the names of widgets that give a value for an argument."""
+    """Return a hint with the names of widgets that provide a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
     return f"use a widget that gives a value for {argument.name}: {widgets}" if widgets else ""
 
@@ -234,7 +234,7 @@ def _is_of_type(port: WidgetPort, argument: Argument) -> bool:
 
 
 def _misfit(port: WidgetPort, argument: Argument) -> str:
-    """Return the reason why an argument cannot take an output's value, or "" if it can."""
+    """Return the reason why an output's value does not fit an argument; "" if the value fits."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
         return f"the value is {given}, but the argument is {argument.type}"
@@ -244,6 +244,6 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
 
 
 def _place(part: Node, source: str) -> Node:
-    """Return the node of a value in the `args` of a binding, or the node of the binding."""
+    """Return the node of a value in a binding's `args`; the binding's node if missing."""
     args = part.get("args") if isinstance(part.data, dict) else None
     return (args.get(source) if args is not None else None) or part

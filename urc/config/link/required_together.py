@@ -1,4 +1,4 @@
-"""Checks of the relations that a widget's manifest declares between bindings and options."""
+"""Checks the relations that a widget's manifest declares between bindings and options."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -23,7 +23,7 @@ _LOCAL: Final = re.compile(r"/(?![/\\])")
 def link_together(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Check the bindings and options that depend on each other.
+    """Check bindings and options that depend on each other.
 
     `use` is the complete declaration of the slot. `part` is the part of the slot that this document
     declares.
@@ -41,7 +41,7 @@ def link_together(
 def _check_needs(
     part: Node, use: WidgetUse, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
-    tried = part.named("bind")  # their problems are already reported
+    tried = part.named("bind")  # problems in these bindings are already reported
     given = {name for name, value in use.options.items() if value not in ("", None)}
     if widget.at_least_one_of and not {*bound, *tried, *given} & {*widget.at_least_one_of}:
         options = [name for name in widget.at_least_one_of if name in widget.options]
@@ -82,7 +82,7 @@ def _check_groups(
 def _check_instead(
     part: Node, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
-    """Warn of a binding or option in this document that another binding of the slot replaces.
+    """Warn about a binding or option in this document that another binding of the slot replaces.
 
     Bindings in a driver cause no warning, because an interface may override the bindings.
     """
@@ -149,7 +149,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not smaller than the option that limits its value."""
+    """Report an option that is not smaller than its upper limit, which is another option."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None
@@ -183,7 +183,7 @@ def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
 def _check_given(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Report an option's value that its command argument cannot take."""
+    """Report an option's value that is invalid for its command argument."""
     options = part.get("options")
     if options is None:
         return
@@ -218,7 +218,7 @@ def _check_text(
 
 
 def _read(text: str, argument: Argument) -> bool | float | str | None:
-    """Convert a text to an argument's value as a page does; None for an invalid text."""
+    """Convert a text to an argument's value, as pages do; None for an invalid text."""
     if argument.type == "boolean":
         return {"true": True, "false": False}.get(text)
     if argument.type not in ("integer", "number"):

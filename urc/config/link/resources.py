@@ -1,7 +1,7 @@
-"""Checks of files and web pages in a widget's options.
+"""Checks files and web pages in a widget's options.
 
 The dashboard serves only the files that a document names for its widgets. Served files must be in
-the document's folder, so that no package can publish other files of the server.
+the document's folder, so packages cannot publish other files of the server.
 
 The content security policy of a page contains the host of every embedded web page. The URLs of web
 pages must therefore be unambiguous for all browsers.
@@ -135,7 +135,8 @@ def _is_host(host: str) -> bool:
     labels = host.removesuffix(".").split(".")
     if not all(labels):
         return False
-    # Browsers also read `127.1` and `0x7f000001` as addresses. Only the usual notation is allowed.
+    # Browsers also interpret `127.1` and `0x7f000001` as addresses. Only the usual notation is
+    # allowed.
     if _NUMBER.fullmatch(labels[-1]):
         try:
             ipaddress.IPv4Address(host)

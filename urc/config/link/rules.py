@@ -1,4 +1,4 @@
-"""Checks of the emulated robot's rules and initial values."""
+"""Checks the emulated robot's rules and initial values."""
 
 from collections.abc import Iterable, Mapping
 
@@ -181,7 +181,7 @@ def _check_poll(linker: Linker, part: Node, rule: SimulatorRule) -> None:
 
 def _elsewhere(linker: Linker, part: Node, rule: SimulatorRule, transport: str) -> None:
     if transport not in linker.driver.transports:
-        return  # reported at the request
+        return  # reported for the command or poll
     text = f"{rule.request!r} is sent to {transport!r}, but this rule is for {rule.transport!r}"
     linker.problems.error(part, "wrong-transport", text)
 
@@ -222,7 +222,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
 
 
 def _check_word(linker: Linker, part: Node, value: Template) -> None:
-    """Check a constant text that a rule gives to a signal."""
+    """Check a constant text that a rule assigns to a signal."""
     signal = linker.driver.signals[part.name]
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})

@@ -1,4 +1,4 @@
-"""Checks of computed signals: their names and their cycles."""
+"""Checks the names and cycles of computed signals."""
 
 from collections.abc import Callable, Iterable, Mapping
 

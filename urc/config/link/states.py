@@ -1,4 +1,4 @@
-"""Check of comparisons: a signal with named states is compared only with these names."""
+"""Checks whether expressions compare signals with named states only with these names."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -14,7 +14,7 @@ __all__ = ["check_words"]
 def check_words(
     problems: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
 ) -> None:
-    """Warn of each comparison of a signal with a text that is not one of its states."""
+    """Warn about each comparison of a signal with a text that is not one of its states."""
     worded = {
         name: dict(signals[name].states)
         for name in template.names
@@ -39,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Yield the name and the text of each comparison between a name and one or more texts."""
+    """Yield each name and text that an expression compares."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue
@@ -55,7 +55,7 @@ def _compared(python: str) -> Iterable[tuple[str, str]]:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name of the value that `node` reads, or "" if `node` reads no value."""
+    """Return the name of the value that `node` reads; "" for other nodes."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return str(node.slice.value) if isinstance(node.value, ast.Name) else ""
     return ""

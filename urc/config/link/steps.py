@@ -1,4 +1,4 @@
-"""Checks of sequences: names in their steps, and cycles."""
+"""Checks sequences: names in their steps, and cycles."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ __all__ = ["link_sequences", "steps_of"]
 
 
 def steps_of(part: Node) -> Node:
-    """Return the list of steps of the sequence at `part`, which is a list or a mapping."""
+    """Return the list of steps of the sequence at `part`, which may be a mapping."""
     return part.must("steps") if isinstance(part.data, dict) else part
 
 
@@ -57,13 +57,13 @@ def link_sequences(linker: Linker, part: Node) -> None:
         spec = linker.driver.transports[name]
         for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
             if steps:
-                linker.transport(inner, "type", name)  # these steps use it
+                linker.transport(inner, "type", name)  # these steps use the transport
                 is_late = key != "on_connect"
                 _Walk(linker, is_named=False, is_late=is_late).steps(inner.must(key), steps)
 
 
 class _Walk:
-    """The check of one sequence; earlier steps define names for later steps."""
+    """Checks one sequence; earlier steps define names for later steps."""
 
     def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
         self._linker = linker
@@ -157,7 +157,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that a transport's login defines, without the names of its steps."""
+        """Return the names that a transport's login defines; no names for the login's own steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -192,7 +192,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first sequence with a loop, among `start` and its called sequences, or ""."""
+    """Return the first sequence with a loop among `start` and its called sequences; "" if none."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

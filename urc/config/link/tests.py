@@ -1,4 +1,4 @@
-"""Checks of the names in a document's tests."""
+"""Checks the names in a document's tests."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -21,7 +21,7 @@ def link_test(
     settings: Mapping[str, Setting],
     problems: Problems,
 ) -> DocumentTest:
-    """Return the test with converted values and with the index of its poll; report mistakes."""
+    """Return the test with converted values and the index of its poll; report mistakes."""
     if test.steps:
         _check_polls(part, driver, problems)
         steps = _link_steps(part, test.steps, driver, problems)
@@ -133,7 +133,7 @@ def _link_steps(
 
 
 def _link_expect(part: Node, driver: Driver, problems: Problems) -> dict[str, Expected]:
-    """Return the expected values in the types of their signals."""
+    """Return the expected values, converted to the types of their signals."""
     return {
         name: _state(name, inner, driver, problems) for name, inner in part.named("expect").items()
     }
@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the expected value at `part`; None if it is empty or invalid, or if `is_part`."""
+    """Return the expected value at `part`; None if empty, invalid, or with `is_part`."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)
@@ -246,7 +246,7 @@ def _reply_to(
     poll = driver.polls[waiting]
     if test.feed and poll.reply is None:
         problems.error(inner, "no-reply", f"poll {waiting} expects no reply")
-    # A transport that the driver does not have is reported at its poll.
+    # The check of the poll reports an unknown transport.
     if test.feed and poll.transport in driver.transports and poll.transport not in test.feed:
         problems.error(
             inner,
@@ -295,7 +295,7 @@ def _check_argument(
 ) -> None:
     argument = known_argument(name, part, command, problems)
     if argument is None or may_fail:
-        return  # a test of a failure may give invalid values
+        return  # a test of a failure may use invalid values
     try:
         elements = fit_argument(part.data, argument.type, argument.items, argument.size)
     except ValueError as error:

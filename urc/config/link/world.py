@@ -1,4 +1,4 @@
-"""Checks of the names in an emulated robot's world, and of its rules' ``world`` readings."""
+"""Checks the names in an emulated robot's world, and the ``world`` readings in its rules."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ def link_world(
 ) -> WorldSpec:
     """Check every name in a world; return the world with the commands that reset its watchdog.
 
-    `state` contains the names of the emulated robot's state, and `parts` the nodes of the
+    `state` contains the names of the emulated robot's state. `parts` contains the nodes of the
     simulator.
     """
     driver, problems, own = linker.driver, linker.problems, {*state}

@@ -1,4 +1,4 @@
-"""Parser of bytes: names of control characters, numbers, lists of names and numbers, or text."""
+"""Parser for bytes: names of control characters, numbers, lists of names and numbers, or text."""
 
 import re
 from typing import Final
@@ -24,7 +24,7 @@ _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"
 
 
 def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
-    """Return the bytes at `part`: empty without a part, None after a reported problem."""
+    """Return the bytes at `part`; empty without a part, None if a problem was reported."""
     if part is None:
         return b""
     if isinstance(part.data, list):

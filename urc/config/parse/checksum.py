@@ -1,4 +1,4 @@
-"""Parser of a checksum: algorithm, range of bytes, and declared position.
+"""Parser for checksums: algorithm, range of bytes, and declared position.
 
 The framing resolves positions that depend on the rest of the frame, such as `at: end` or `over:
 payload`.
@@ -31,7 +31,7 @@ _NEEDED: Final = {
 
 
 class DeclaredTrailer(NamedTuple):
-    """The declared position of a checksum after a text, or after each line of a text."""
+    """The declared position of a checksum after a text or after each of its lines."""
 
     mark: bytes
     is_padded: bool
@@ -41,7 +41,7 @@ class DeclaredTrailer(NamedTuple):
 
 
 class DeclaredChecksum(NamedTuple):
-    """A declared checksum before its position is resolved."""
+    """A declared checksum with an unresolved position."""
 
     part: Node
     algorithm: CrcSpec | FoldSpec | str
@@ -66,7 +66,7 @@ class DeclaredChecksum(NamedTuple):
 
 
 def parse_checksum(part: Node, encoding: str, problems: Problems) -> DeclaredChecksum | None:
-    """Return the checksum at `part`, or None after a reported problem."""
+    """Return the checksum at `part`; None if a problem was reported."""
     algorithm = _algorithm(part.must("algorithm"), problems)
     salt = _salt(part.get("salt"), encoding, problems)
     over, at = part.get("over"), part.get("at")

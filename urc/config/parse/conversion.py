@@ -1,4 +1,4 @@
-"""Parser of the conversion of a signal or field."""
+"""Parser for the conversion of a signal or field."""
 
 import re
 from itertools import pairwise
@@ -46,7 +46,7 @@ def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Co
 
 
 def _numbers_in(absent: object) -> tuple[float, ...]:
-    """Return the number in a text, if any, because some forms of frames read values as text.
+    """Return the number in a text, if any, because some frame forms read values as text.
 
     A text with leading zeros is not a number: ``"000"`` does not mean 0.
     """

@@ -1,4 +1,4 @@
-"""Parser of a driver: mapping → `Driver`, with compiled patterns and templates."""
+"""Parser for drivers: mapping → `Driver`, with compiled patterns and templates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,7 +34,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: parse_transport(inner, problems, catalog)
         for name, inner in part.named("transports").items()
     }
-    # With only one transport, messages and commands need not name it.
+    # With only one transport, messages and commands need not name the transport.
     types, enums = _types(part, problems)
     lines = _Lines(transports, FormContext("", _set_by_frames(part), types, enums, catalog))
     transports = {
@@ -50,7 +50,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: _message(inner, lines, problems) for name, inner in part.named("messages").items()
     }
     polls = tuple(_poll(inner, lines, commands, problems) for inner in part.listed("polls"))
-    # A sequence with the name of a command is reported by the check of names.
+    # The check of names reports a sequence with the name of a command.
     commands = {**_sequences(part, lines, problems), **commands}
     signals = {
         name: parse_signal(inner, spoken_name(name), problems)
@@ -97,9 +97,9 @@ def _types(part: Node, problems: Problems) -> tuple[Mapping[str, Any], Mapping[s
 
 
 class _Lines:
-    """The transports of a driver; the only transport of a driver is the default.
+    """The transports of a driver; a driver's only transport is the default.
 
-    Transports with `mode: forward` are ignored in the choice of the default.
+    Transports with `mode: forward` are never the default.
     """
 
     def __init__(self, transports: Mapping[str, TransportSpec], context: FormContext) -> None:
@@ -114,7 +114,7 @@ class _Lines:
         return part.text(key, self.only)
 
     def context(self, name: str) -> FormContext:
-        """Return the context of forms on the transport `name`; an unknown transport is allowed."""
+        """Return the form context for the transport `name`, which may be unknown."""
         spec = self._transports.get(name)
         encoding = spec.encoding if spec else FormContext().encoding
         return self._context._replace(encoding=encoding, framing=spec.framing if spec else None)
@@ -200,7 +200,7 @@ def _argument(part: Node, problems: Problems) -> Argument:
 
 
 def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
-    """Report a reserved name, and keys without effect for an argument's type."""
+    """Report a reserved name, and keys that have no effect for an argument's type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
         problems.error(

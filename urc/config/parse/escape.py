@@ -1,4 +1,4 @@
-"""Parser of byte stuffing: escaped bytes and their replacements."""
+"""Parser for byte stuffing: escaped bytes and their replacements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ __all__ = ["parse_escape"]
 def parse_escape(
     part: Node, layout: FrameLayout, options: Mapping[str, Any], encoding: str, problems: Problems
 ) -> EscapeSpec | None:
-    """Return the byte stuffing under ``escape``; None if missing or invalid."""
+    """Return the byte stuffing under ``escape``; None if it is missing or invalid."""
     if "escape" not in part.data:
         return None
     inner = part.must("escape")
@@ -120,7 +120,7 @@ def _table(
 
 
 def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Problems) -> None:
-    """Report a replacement of an escaped byte if the replacement needs an escape itself."""
+    """Report a replacement for an escaped byte if the replacement itself needs an escape."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
         text = f"{wrong:02X} replaces an escaped byte, but needs an escape itself"

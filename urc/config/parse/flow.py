@@ -1,4 +1,4 @@
-"""Parser of queues, rates, conditions, held commands and keepalives."""
+"""Parser for queues, rates, conditions, held commands and keepalives."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -41,7 +41,7 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""The empty frame of a sequence, because only the steps of a sequence send frames."""
+"""Empty frame of a sequence, which sends frames only in its steps."""
 
 
 def line_with_flow(
@@ -159,7 +159,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` of a held command, which sends its next value anyway."""
+    """Report `resend` and `extend` of a held command, because the next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold', because the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
@@ -214,7 +214,7 @@ def poll_with_flow(
     poll = poll._replace(run=str(run.data), arguments=_arguments(part))
     command = commands.get(poll.run)
     if command is None:
-        return poll  # an unknown name is reported elsewhere
+        return poll  # the link pass reports an unknown name
     defaults = {name: one.default for name, one in command.arguments.items()}
     return poll._replace(
         transport=command.transport,
@@ -377,12 +377,12 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice in the notation of a document's key."""
+    """Return a choice in the notation of document keys."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _retries(part: Node | None, problems: Problems) -> tuple[int, Retry]:
-    """Return the number of retries, and the delays before them."""
+    """Return the number of retries and the delays before retries."""
     if part is None:
         return 0, Retry()
     if not isinstance(part.data, dict):

@@ -1,4 +1,4 @@
-"""Lookup of the form of a frame, and the interface of the form parsers.
+"""Finds the form of a frame, and defines the interface of the form parsers.
 
 Each form has a module in the package ``forms``. Modules of received forms have the functions of
 `ReadForm`, and modules of sent forms have the functions of `WriteForm`.
@@ -56,7 +56,7 @@ class ReadForm(Protocol):
     """A module that parses one form of received frames."""
 
     def parse_read(self, part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-        """Return the declaration at `part`, or None after a reported problem."""
+        """Return the declaration at `part`; None if a problem was reported."""
 
     def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
         """Return the position of `field`, as arguments of `Problems.error`."""
@@ -66,14 +66,14 @@ class WriteForm(Protocol):
     """A module that parses one form of sent frames."""
 
     def parse_write(self, part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-        """Return the declaration at `part`, or None after a reported problem."""
+        """Return the declaration at `part`; None if a problem was reported."""
 
     def templates(self, part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
         """Return every template of the frame, with its position."""
 
 
 def read_form(part: Node) -> tuple[Node, ReadForm] | None:
-    """Return the value under the form's key in a reply or message, and the form's module."""
+    """Return the value under a form's key in a reply or message, and the form's module."""
     for key in READ_FORMS:
         inner = part.get(key)
         if inner is not None:
@@ -82,7 +82,7 @@ def read_form(part: Node) -> tuple[Node, ReadForm] | None:
 
 
 def write_form(part: Node) -> tuple[Node, WriteForm]:
-    """Return the value under ``send:`` or under its form's key, and the form's module."""
+    """Return the value under ``send:`` or under a form's key in it, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:

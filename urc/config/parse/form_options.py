@@ -1,4 +1,4 @@
-"""Parser of the keys next to a received form: `fields`, `set`, `when` and `lines`."""
+"""Parser for the keys next to a received form: `fields`, `set`, `when` and `lines`."""
 
 from urc.config.node import Node, Problems
 from urc.config.parse.conversion import parse_conversion, parse_states

@@ -1,6 +1,6 @@
-"""Parser of a frame layout: positions of start, length field, payload, checksum and end.
+"""Parser for frame layouts: positions of start, length field, payload, checksum and end.
 
-Positions are byte offsets from the start of the frame, without a delimiter or byte stuffing.
+Positions are byte offsets from the start of the frame; delimiters and byte stuffing do not count.
 """
 
 from typing import Any, Final, NamedTuple
@@ -106,7 +106,7 @@ def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
 
 
 def checksums_of(part: Node) -> list[Node]:
-    """Return the checksums of the framing at `part`, which may declare one or several."""
+    """Return the checksums of the framing at `part`, which may have one or several."""
     inner = part.get("checksum") if part.text("type") != "xml" else None
     if inner is None:
         return []
@@ -128,7 +128,7 @@ def _check_marks(part: Node, problems: Problems) -> None:
 def _placed(
     part: Node, frame: _BareLayout, written: list[DeclaredChecksum], problems: Problems
 ) -> FrameLayout:
-    """Return the layout after the positions of all parts are resolved."""
+    """Return the layout with the positions of all parts resolved."""
     start, end, size, length = frame
     head, tail = len(start), len(end)
     if length is not None and length.is_loose:
@@ -138,7 +138,7 @@ def _placed(
     places: list[int] = []
     lasts: list[bool] = []
     for one in written:
-        # Checksums at the end keep their order, so a later one moves the earlier ones back.
+        # Checksums at the end keep their order, so a later checksum moves earlier checksums back.
         behind = [other.size for other in written[len(places) + 1 :] if other.at is None]
         last = -len(end) - one.size - sum(behind)
         at = last if one.at is None else one.at
@@ -167,7 +167,7 @@ def _placed(
 def _checksum(
     written: DeclaredChecksum, at: int, is_last: bool, layout: FrameLayout
 ) -> ChecksumSpec:
-    # A window without an end stops at a checksum at the end, or at the end bytes.
+    # A window without an end stops before the checksum at the frame's end, or before the end bytes.
     behind = len(layout.end)
     if is_last:
         behind = -at if at < 0 else behind + written.size
@@ -218,7 +218,7 @@ def _over(written: DeclaredChecksum, behind: int, layout: FrameLayout) -> ByteRa
 def _check_checksum(
     part: Node, checksum: ChecksumSpec, layout: FrameLayout, problems: Problems
 ) -> None:
-    """Report a checksum or window outside the frame, and a checksum over another part."""
+    """Report a checksum or window outside the frame, and a checksum that overlaps another part."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
         text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
@@ -262,7 +262,7 @@ def _check_window(
             problems.warn(part, "outside-frame", text, at=where)
         return
     if size < layout.head + layout.tail:
-        return  # reported elsewhere
+        return  # `_check_size` reports this
     start = over.start if over.start >= 0 else size + over.start
     stop = size if over.stop is None else over.stop if over.stop >= 0 else size + over.stop
     if not 0 <= start <= size or not 0 <= stop <= size:
@@ -322,7 +322,7 @@ def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
 
 
 def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Problems) -> None:
-    """Report a length field over the start bytes, or with keys without effect."""
+    """Report a length field that overlaps the start bytes, or has keys without effect."""
     if length.offset < len(start):
         problems.error(
             part,
@@ -351,7 +351,7 @@ def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Proble
 
 
 def _check_loose(part: Node, problems: Problems) -> None:
-    """Report keys that need a fixed payload position, for a length field of variable size."""
+    """Report keys that need a fixed payload position, if the length field has a variable size."""
     for key in ("payload", "escape"):
         if key in part.data:
             text = f"'{key}' has no effect when 'until' ends the length"

@@ -1,4 +1,4 @@
-"""Parser of the framing of a transport or reply: mapping → `FramingSpec`."""
+"""Parser for the framing of a transport or reply: mapping → `FramingSpec`."""
 
 from collections.abc import Callable
 from re import _constants, _parser  # type: ignore[attr-defined]  # no public API for the syntax tree
@@ -96,7 +96,7 @@ def _delimiter(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
 def _check_raw(
     part: Node, layout: FrameLayout, options: dict[str, Any], problems: Problems
 ) -> None:
-    """Warn of a binary checksum that may contain a delimiter."""
+    """Warn about a binary checksum that may contain a delimiter."""
     specs = () if layout.digits else (*layout.checksums, layout.checksum)
     trailing = layout.trailer.checksum if layout.trailer else None
     ends = options["tx"] + options["rx"]
@@ -195,7 +195,7 @@ def _check_case(
     before: list[tuple[bytes, FramingSpec]],
     problems: Problems,
 ) -> None:
-    """Report an unreachable case, and a case with a framing of different start bytes."""
+    """Report an unreachable case, and a case whose framing has other start bytes."""
     for other, _ in before:
         if first.startswith(other):
             problems.error(

@@ -1,4 +1,4 @@
-"""Check for HTTP headers that a document may not set."""
+"""Checks for HTTP headers that a document must not set."""
 
 from urc._headers import is_reserved
 from urc.config.node import Node, Problems
@@ -8,7 +8,7 @@ __all__ = ["check_headers"]
 
 def check_headers(part: Node, problems: Problems) -> None:
     """Report each header of `part` that identifies the client or controls the request."""
-    headers = part.entries().get("headers")  # most transport types have none
+    headers = part.entries().get("headers")  # most transport types have no headers
     for name, inner in headers.entries().items() if headers else ():
         if is_reserved(name):
             problems.error(

@@ -1,4 +1,4 @@
-"""Parser of an interface: grid → rectangular slots."""
+"""Parser for interfaces: grid → rectangular slots."""
 
 import re
 from typing import Final
@@ -14,7 +14,7 @@ _MOST: Final = 48
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
 _EMPTY = re.compile(r"\.+")
 _Cell = tuple[str, int]
-"""The slot name in a cell, and its offset in the text of the grid."""
+"""The slot name in a cell, and the name's offset in the grid's text."""
 
 
 def parse_interface(part: Node, name: str, problems: Problems) -> Interface:

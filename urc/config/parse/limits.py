@@ -1,4 +1,4 @@
-"""Parser of the limits of a signal: its alarm limits, alarm states and their attributes."""
+"""Parser for a signal's limits: alarm limits, alarm states and their attributes."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -32,7 +32,7 @@ def parse_limits(
         part: the signal.
         kind: type of the signal, or of the elements of an array.
         bounds: smallest and largest valid value.
-        states: pairs of a raw text and its displayed word.
+        states: pairs of a raw text and the displayed word.
         problems: collector of problems.
     """
     inner = part.get("limits")
@@ -145,9 +145,9 @@ def _attributes(
     words: Mapping[str, Node],
     problems: Problems,
 ) -> tuple[tuple[str, AlarmAttributes], ...]:
-    """Return the attributes of the limits and alarm states that differ from the default ones.
+    """Return the attributes of limits and alarm states that differ from the default attributes.
 
-    The keys at `part` are the defaults of the keys of a single limit or state.
+    The keys at `part` are the defaults for the keys of each limit or state.
     """
     usual = AlarmLimits()
     found = []

@@ -1,4 +1,4 @@
-"""Parser of the settings and tags of a profile."""
+"""Parser for the settings and tags of a profile."""
 
 from typing import Final
 
@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Value types of the settings that do not contain text, by type of setting."""
+"""Value types of non-text settings, by type of setting."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:
@@ -67,7 +67,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
 
 
 def parse_tags(part: Node, problems: Problems) -> tuple[str, ...]:
-    """Return the tags of the robot at `part`; report each tag that is listed twice."""
+    """Return the tags of the robot at `part`; report duplicate tags."""
     tags: dict[str, None] = {}
     for inner in part.listed("tags"):
         if inner.data in tags:
@@ -82,7 +82,7 @@ def parse_tags(part: Node, problems: Problems) -> tuple[str, ...]:
 
 
 def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> None:
-    """Report a setting of type ``choice`` without choices, and other settings with choices."""
+    """Report a setting of type ``choice`` without choices, and any other setting with choices."""
     if kind == "choice" and not choices:
         problems.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
     if kind != "choice" and choices:
@@ -97,7 +97,7 @@ def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Pr
 
 
 def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> Value:
-    """Return the value of a setting in a document, or None after a reported problem."""
+    """Return the value of a setting in a document; None if a problem was reported."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:
         value = fit(part.data, wanted)
@@ -118,5 +118,5 @@ def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Pro
 
 
 def _is_host(text: str) -> bool:
-    """Return whether a text may be a host name or address, without scheme, port and spaces."""
+    """Return whether a text may be a host name or address, without a scheme, port or spaces."""
     return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)

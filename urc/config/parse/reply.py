@@ -1,4 +1,4 @@
-"""Parser of the reply to a request: mapping → `Reply`, with stages and error replies."""
+"""Parser for the reply to a request: mapping → `Reply`, with stages and error replies."""
 
 from urc.config.form_table import READ_FORMS
 from urc.config.node import Node, Problems
@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
-"""Keys that are allowed for a whole reply, but not for one of its stages."""
+"""Keys that are valid for a whole reply but not for one of its stages."""
 _BESIDE_SILENCE = (
     "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
 )  # fmt: skip
@@ -29,7 +29,7 @@ _MOST_BUSY_S = 600.0
 
 
 def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> Reply | None:
-    """Return the reply at `part`, or None without a part."""
+    """Return the reply at `part`; None without a part."""
     if part is None:
         return None
     own, context = parse_own_framing(part, problems, context)
@@ -65,9 +65,9 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
-    """Return the implied reply of a request if its protocol always replies, or None.
+    """Return the implied reply of a request whose protocol always replies; otherwise None.
 
-    Without the implied reply, a refused request would count as done as soon as it is sent.
+    Without the implied reply, a refused request would count as complete as soon as it is sent.
     """
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
@@ -121,7 +121,7 @@ def _asides(part: Node, problems: Problems, context: FormContext) -> Provisional
 
 
 def _aside(part: Node | None, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return the declaration of a frame in any form; a plain text is a pattern."""
+    """Return the declaration of a frame in any form; plain text is a pattern."""
     if part is None:
         return None
     if isinstance(part.data, dict):
@@ -149,7 +149,7 @@ def parse_errors(
 
 
 def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> None:
-    """Report each of `keys` that occurs in `part`, with the reason `why`."""
+    """Report each key of `keys` in `part`, with the reason `why`."""
     for key in keys:
         if key in part.data:
             problems.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
@@ -158,12 +158,12 @@ def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> N
 def parse_own_framing(
     part: Node, problems: Problems, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
-    """Return the reply's own framing or None, and the context for the reply's forms."""
+    """Return the reply's own framing, if any, and the context for the reply's forms."""
     inner = part.get("framing")
     if inner is None:
         return None, context
     if context.catalog is None:
-        return None, context  # no transports in this document, which was reported
+        return None, context  # the missing transports are already reported
     spec = parse_framing(inner, context.encoding, problems, context.catalog)
     return spec, context._replace(framing=None)
 

@@ -1,4 +1,4 @@
-"""Parser of a signal: mapping → `Signal`, with its conversion, limits, axes and formula."""
+"""Parser for signals: mapping → `Signal`, with conversion, limits, axes and formula."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -58,10 +58,10 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
 
 
 def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[str, Signal]:
-    """Return the signals with the age in seconds at which each signal becomes stale.
+    """Return the signals, each with the age in seconds at which it becomes stale.
 
-    The default age is three periods of the signal's fastest poll, at least 1 s, or 5 s without a
-    poll. The default age of a computed signal is the smallest age of its inputs.
+    The default age is three periods of the signal's fastest poll, but at least 1 s. Without a poll,
+    the default age is 5 s. The default age of a computed signal is the smallest age of its inputs.
     """
     aged = {name: _with_age(one, polls) for name, one in signals.items()}
     for name, one in signals.items():
@@ -72,7 +72,7 @@ def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[st
 
 
 def _bases(name: str, signals: Mapping[str, Signal]) -> set[str]:
-    """Return the received signals that a computed signal depends on, even through a cycle."""
+    """Return the received signals that a computed signal depends on; cycles are allowed."""
     found: set[str] = set()
     seen: set[str] = set()
     waiting = [name]
@@ -111,7 +111,7 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
 
 
 def _check_rotation(part: Node, kind: str, problems: Problems) -> None:
-    """Warn of a received rotation signal without an axis convention."""
+    """Warn about a received rotation signal without an axis convention."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
     is_angle = kind in _NUMBERS and part.text("unit") in _ANGLE_UNITS
     if is_named and is_angle and "value" not in part.data:

@@ -1,4 +1,4 @@
-"""Parser of an emulated robot: its world, and the rules of each transport."""
+"""Parser for emulated robots: the world, and the rules of each transport."""
 
 import math
 from collections.abc import Mapping
@@ -41,16 +41,16 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("fov", "tilt"),
 }
-"""Fields that documents give in degrees, by part of the world."""
+"""Fields whose unit in documents is degrees, by part of the world."""
 _KEYS: Final = {"first": "from", "last": "to"}
-"""Keys of a laser in documents, by field of the model."""
+"""Keys of a laser in documents, by model field."""
 _LONGEST_S: Final = 3600.0
 
 Spec = TypeVar("Spec", bound=Any)
 
 
 def parse_world(part: Node, problems: Problems) -> WorldSpec:
-    """Return the world at `part`, before its names are resolved."""
+    """Return the world at `part`, with unresolved names."""
     if "body" not in part.data:
         text = "this world lacks 'body'"
         hint = "write body: { type: differential }, or another kind"
@@ -104,7 +104,7 @@ def _pair(part: Node, key: str) -> tuple[float, float]:
 
 
 def _filled(spec: Spec, part: Node, key: str) -> Spec:
-    """Return `spec` with the values of the document, and convert degrees to radians."""
+    """Return `spec` with the values in the document; degrees become radians."""
     values: dict[str, object] = {}
     inner = part.get(key)
     for field in spec._fields:
@@ -180,7 +180,7 @@ def _plan(part: Node) -> PlanSpec:
             for one in part.listed("boxes")
         ),
         holes=tuple(Box(*_pair(one, "at"), *_pair(one, "size")) for one in part.listed("holes")),
-        ground=part.text("ground", "floor"),  # type: ignore[arg-type]  # one of them
+        ground=part.text("ground", "floor"),  # type: ignore[arg-type]  # the schema's enum
     )
 
 
@@ -192,7 +192,7 @@ _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
 class SimulatorSpec(NamedTuple):
-    """The parsed emulated robot of a document, before names are resolved."""
+    """The parsed emulated robot of a document, with unresolved names."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
     """By transport."""
@@ -202,7 +202,7 @@ class SimulatorSpec(NamedTuple):
 def parse_simulator(
     sources: Sources, driver: Driver, catalog: Registries, problems: Problems
 ) -> SimulatorSpec:
-    """Return the rules of each transport and the world, before names are resolved."""
+    """Return the rules of each transport and the world, with unresolved names."""
     found: dict[str, list[SimulatorRule]] = {}
     context = FormContext(catalog=catalog)
     if any(_needs_types(part.data) for part in sources.rules.values()):
@@ -227,7 +227,7 @@ def parse_simulator(
 
 
 def _check_names(part: Node, rules: list[SimulatorRule], problems: Problems) -> None:
-    """Report two rules with the same name, because derived documents refer to rules by name."""
+    """Report rules with equal names, because derived documents refer to rules by name."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:

@@ -1,4 +1,4 @@
-"""Parser of sequences: list of steps → `Step` values."""
+"""Parser for sequences: list of steps → `Step` values."""
 
 from typing import Final, NamedTuple
 
@@ -32,12 +32,12 @@ _NO_PATTERN: Final = "^$"
 
 
 class StepContext(NamedTuple):
-    """Properties of a sequence that the parsers of its steps need."""
+    """Properties of a sequence that the step parsers need."""
 
     transport: str
-    """Default transport of the steps, or "" if each step must name its transport."""
+    """Default transport of the steps; "" if each step must name its transport."""
     is_named: bool
-    """Whether the steps form a named sequence, and may therefore name a transport."""
+    """Whether the steps form a named sequence; only its steps may name a transport."""
     forms: FormContext
 
 
@@ -238,7 +238,7 @@ def _if(
 
 
 def _values(parts: dict[str, Node], problems: Problems) -> dict[str, Template | Value]:
-    """Return the given values, and compile texts as templates."""
+    """Return the given values, with texts compiled as templates."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):

@@ -1,4 +1,4 @@
-"""Parser of a document's test: mapping → `DocumentTest`."""
+"""Parser for a document's tests: mapping → `DocumentTest`."""
 
 from typing import Final
 
@@ -10,9 +10,9 @@ from urc.model.values import Value
 __all__ = ["parse_test"]
 
 _AT_ONCE: Final = ("feed", "reply_to", "run", "args", "expect", "sent", "fails")
-"""Keys that only a test without steps may have."""
+"""Keys that are valid only in a test without steps."""
 _IN_STEPS: Final = ("polls", "ready")
-"""Keys that only a test with steps may have."""
+"""Keys that are valid only in a test with steps."""
 _VERBS: Final = (
     "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
 )  # fmt: skip
@@ -29,7 +29,7 @@ _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
 
 
 def parse_test(part: Node, problems: Problems) -> DocumentTest:
-    """Return the test at `part`, before names are resolved."""
+    """Return the test at `part`, with unresolved names."""
     line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
     if isinstance(reply_to, float):
@@ -141,7 +141,7 @@ def _pieces(part: Node, problems: Problems) -> Fed | tuple[Fed, ...]:
 
 
 def _wire(part: Node, problems: Problems) -> Fed:
-    """Return the data under ``feed``: a text, bytes under ``hex``, or a message."""
+    """Return the data under ``feed``: text, bytes under ``hex``, or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
     inner = part.get("hex")

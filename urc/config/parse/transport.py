@@ -1,4 +1,4 @@
-"""Parser of a driver's transport: mapping → `TransportSpec`."""
+"""Parser for a driver's transports: mapping → `TransportSpec`."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -37,11 +37,11 @@ _OTHER_WORDS = {
     "ros2": "ros",
     "roslibjs": "ros",
 }
-"""Types of transports, by the corresponding word of other programs."""
+"""Transport types, by the corresponding word in other programs."""
 
 
 def _other_word(word: str) -> str:
-    """Return a hint with the type for a word of other programs, or ""."""
+    """Return a hint with the type for another program's word; "" for an unknown word."""
     other = _OTHER_WORDS.get(word.lower())
     return f"use the word '{other}'" if other else ""
 
@@ -84,7 +84,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
-    """Return the framing of received frames, with any separate framing of sent frames."""
+    """Return the framing of received frames, with the framing of sent frames if it is separate."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema requires 'framing' for streams
@@ -96,7 +96,7 @@ def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries)
 
 
 def _option(part: Node, problems: Problems) -> object:
-    """Return an option: a scalar, a template, or a list or mapping of scalars and templates."""
+    """Return an option as a scalar, a template, or a list or mapping of scalars and templates."""
     tree = compiled_tree(part, problems)
     if isinstance(tree, Template) and tree.is_constant:
         return tree.evaluate({})

@@ -1,4 +1,4 @@
-"""Parser of a driver's reusable structs under ``types``, in the order of their dependencies."""
+"""Parser for a driver's reusable structs under ``types``, in dependency order."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,7 +15,7 @@ Items = tuple[Item, ...]
 def parse_types(
     part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], problems: Problems
 ) -> Mapping[str, Items]:
-    """Return the items of each type of the driver at `part`, by name; none for an invalid type."""
+    """Return the items of each type of the driver at `part`, by name; no items if invalid."""
     parts = part.named("types")
     types: dict[str, Items] = {}
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}
@@ -37,7 +37,7 @@ def _parse(
     enums: Mapping[str, tuple[tuple[int, str], ...]],
     problems: Problems,
 ) -> None:
-    """Parse the dependencies of the type `name`, then the type itself."""
+    """Parse the dependencies of the type `name`, and then the type itself."""
     if name in types:
         return
     types_above = (*above, name)

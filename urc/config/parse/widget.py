@@ -1,4 +1,4 @@
-"""Parser of a widget's manifest, and reader of a folder with widgets."""
+"""Parser for widget manifests, and reader for a folder with widgets."""
 
 import re
 from collections.abc import Iterable
@@ -136,7 +136,7 @@ def _check_defaults(options: Node, problems: Problems) -> None:
 
 
 def _nearby(file: FilePath) -> str:
-    """Return a path relative to the current folder, or the absolute path if necessary."""
+    """Return a path relative to the current folder if possible, otherwise the absolute path."""
     try:
         return str(file.relative_to(FilePath.cwd()))
     except (OSError, ValueError):
@@ -144,7 +144,7 @@ def _nearby(file: FilePath) -> str:
 
 
 class WidgetFolder:
-    """The widgets of one folder. A manifest is read once, at the first use of the widget."""
+    """The widgets of one folder. Each manifest is read once, on the first use of its widget."""
 
     def __init__(self, folder: FilePath) -> None:
         self.folder = folder
@@ -154,7 +154,7 @@ class WidgetFolder:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Return the path of every requested manifest, even if missing."""
+        """Return the paths of all requested manifests, including missing manifests."""
         return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
 
     def names(self) -> list[str]:
@@ -165,7 +165,7 @@ class WidgetFolder:
             return []
 
     def get(self, name: str) -> Widget | None:
-        """Return a widget, or None if the widget is missing or its manifest is invalid."""
+        """Return a widget; None if the widget is missing or its manifest is invalid."""
         if name not in self._widgets:
             self._widgets[name] = self._read(name) if self.has(name) else None
         return self._widgets[name]

@@ -1,1 +1,1 @@
-"""Rules that check a complete profile."""
+"""Rules that check complete profiles."""

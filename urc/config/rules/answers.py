@@ -1,4 +1,4 @@
-"""Rules about transports without replies, and about silence as a reply."""
+"""Rules for transports without replies, and for silence as a reply."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ _HINT: Final = "remove 'replies: never', or remove the waits for this transport"
 
 
 def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report waits on a transport without replies, and silence as a reply without error replies."""
+    """Report waits on a transport without replies, and silence as success without error replies."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
         _check_silence(inner, one.reply, driver.transports.get(one.transport), problems)

@@ -1,6 +1,6 @@
-"""Rules about traffic: rates, timeouts and secrets.
+"""Rules for traffic: rates, timeouts and secrets.
 
-All rules give warnings about declared values, never about defaults.
+All rules warn about declared values, never about defaults.
 """
 
 from collections.abc import Iterator
@@ -23,11 +23,11 @@ __all__ = ["check_flow"]
 _GOOD_BYE_S = 2.0
 """Time limit of ``on_close`` in seconds, as in `urc.protocol.engine`."""
 _BITS_OF_A_BYTE = 10
-"""Number of bits per byte on a serial line, including start and stop bit."""
+"""Number of bits per byte on a serial line, including the start bit and the stop bit."""
 
 
 def check_flow(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
-    """Warn of excessive traffic, early timeouts and visible secrets in the driver at `part`.
+    """Warn about excessive traffic, early timeouts and visible secrets in the driver at `part`.
 
     `secrets` contains the names of secret settings.
     """
@@ -79,7 +79,7 @@ def _wait_s(step: Step) -> float:
 
 
 def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Problems) -> None:
-    """Warn of polls that need more than the baud rate of a serial line."""
+    """Warn about polls that exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -106,7 +106,7 @@ def _least_bytes(poll: Poll) -> int:
 def _check_stages(
     part: Node, reply: Reply, transport: str, driver: Driver, problems: Problems
 ) -> None:
-    """Warn of a long second stage that delays the polls of its transport."""
+    """Warn about a long second stage that delays its transport's polls."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
         return
     periods = [poll.every_s for poll in driver.polls if poll.transport == transport]
@@ -123,7 +123,7 @@ def _check_stages(
 
 
 def _check_haste(part: Node, driver: Driver, name: str, problems: Problems) -> None:
-    """Warn of a verification that ends before its signals are polled again."""
+    """Warn about a verification that ends before its signals are polled again."""
     verify = driver.commands[name].verify
     if verify is None:
         return
@@ -155,7 +155,7 @@ def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
 
 
 def _digested(part: Node, send: WriteSpec) -> set[str]:
-    """Return the settings that are sent only as part of a changing hash."""
+    """Return the settings that are sent only inside a changing hash."""
     inner, form = write_form(part)
     found = [template for _, template in form.templates(inner, send)]
     digested = {name for one in found for name in digested_settings(one)}
@@ -163,7 +163,7 @@ def _digested(part: Node, send: WriteSpec) -> set[str]:
 
 
 def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
-    """Warn of commands that send a secret without `redact`."""
+    """Warn about commands that send a secret without `redact`."""
     asked = [
         (inner.must("send"), driver.commands[name].send)
         for name, inner in part.named("commands").items()

@@ -1,7 +1,7 @@
-"""Rules about frames: patterns that match too much, and unused names.
+"""Rules for frames: patterns that match too much, and unused names.
 
-All are warnings. Two declarations for the same frame are reported only if an example frame matches
-both.
+All are warnings. The rules report two declarations of the same frame only if an example frame
+matches both.
 """
 
 import re
@@ -22,18 +22,18 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""Sample values of a field; a pattern may reject some values."""
+"""Sample values of a field; some patterns reject some of the values."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
 _GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
 _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
-"""Pattern of the parts of a group that may match empty text."""
+"""Pattern of the syntax in a group that may match empty text."""
 
 
 def check_frames_apart(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of ambiguous, empty or unused declarations of frames in the driver at `part`."""
+    """Warn about ambiguous, empty or unused frame declarations in the driver at `part`."""
     _check_messages(part, driver, problems)
     for inner, reply in _replies(part, driver):
         _check_refusals(inner, reply, problems)
@@ -96,7 +96,7 @@ def _stages(part: Node, reply: Reply) -> Iterator[tuple[Node, ReadSpec]]:
 
 
 class _Text:
-    """A declaration of text frames, with a matching test and sample frames."""
+    """A declaration of text frames, with sample frames and a method that matches frames."""
 
     def __init__(self, pattern: Pattern | None, text: str = "") -> None:
         self._pattern = pattern
@@ -129,7 +129,7 @@ def _finds(pattern: Pattern, text: str) -> bool:
 
 
 def _head(source: str) -> str:
-    """Return the fixed characters at the start of a pattern, or "" if they are not obvious."""
+    """Return the fixed characters at the start of a pattern; "" if they are not obvious."""
     found = _LETTERS.match(source)
     if found is None or "|" in source:
         return ""
@@ -137,7 +137,7 @@ def _head(source: str) -> str:
 
 
 def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of a message if an earlier message already matches all its frames."""
+    """Warn about a message if an earlier message already matches all its frames."""
     seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
@@ -162,7 +162,7 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return an example of a frame that both declarations match, as text, or None."""
+    """Return text with an example frame that matches both; None if no frame matches both."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:
@@ -199,7 +199,7 @@ def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
 
 
 def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
-    """Return the constants by offset and size; None if a match depends on other conditions."""
+    """Return the constants by offset and size; None if a match has other conditions."""
     found: dict[tuple[int, int], object] = {}
     offset = 0
     for item in items:
@@ -215,7 +215,7 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
 
 
 def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
-    """Warn of an error pattern that matches a successful reply, because errors are tried first."""
+    """Warn about an error pattern that matches a successful reply: errors take precedence."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
     errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
     asides = [("resend", "a resend request"), ("extend", "a busy reply")]
@@ -248,7 +248,7 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
 
 
 def _check_shared_refusals(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of a transport's error pattern that matches a successful reply."""
+    """Warn about a transport's error pattern that matches a successful reply."""
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
         requests = [(one.transport, one.reply) for one in driver.commands.values()]
@@ -271,7 +271,7 @@ def _patterns_of(asides: ProvisionalReplies) -> Iterator[Pattern]:
 
 
 def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None:
-    """Warn of a binary error reply that differs from a successful reply only in fields."""
+    """Warn about a binary error reply that differs from a successful reply only in its fields."""
     given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
     if len(given) != len(reply.faults) or reply.read.form != "struct":
         return
@@ -293,7 +293,7 @@ def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None
 def _check_empty(
     part: Node, read: ReadSpec, signals: Mapping[str, Signal], problems: Problems
 ) -> None:
-    """Warn of a numeric field with a group that may match empty text."""
+    """Warn about a numeric field if its group may match empty text."""
     pattern = read.options.get("pattern")
     if read.form != "regex" or not isinstance(pattern, Pattern):
         return
@@ -329,7 +329,7 @@ def _is_plain_number(signal: Signal) -> bool:
 
 
 def _check_words(part: Node, problems: Problems) -> None:
-    """Warn of unused types and enums."""
+    """Warn about unused types and enums."""
     if "types" not in part.data and "enums" not in part.data:
         return
     everywhere = _words(part.data)
@@ -346,7 +346,7 @@ def _check_words(part: Node, problems: Problems) -> None:
 
 
 def _words(data: Any) -> Counter[str]:
-    """Return the number of occurrences of each word in the texts of a part."""
+    """Count the occurrences of each word in the texts of a part."""
     return Counter(word for text in _texts(data) for word in _WORD.findall(text))
 
 

@@ -1,8 +1,9 @@
-"""Rules about held commands: watchdog, lease, repetition and load of the transport.
+"""Rules for held commands: watchdog, lease, repetition and transport load.
 
 If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
-therefore declare the watchdog. A contradiction with the declared watchdog is an error, because the
-motion would stutter or outlast the lease. All other problems of held commands are warnings.
+therefore declare the watchdog. A lease or period that contradicts the declared watchdog is an
+error, because the motion would stutter or outlast the lease. All other problems of held commands
+are warnings.
 """
 
 import math
@@ -20,10 +21,10 @@ from urc.model.payload import WriteSpec, each_of
 __all__ = ["check_motion", "least_frame_bytes"]
 
 _ASKED: Final = frozenset(("websocket", "ros"))
-"""Transport types with their own liveness check during held commands."""
+"""Transport types with a built-in liveness check during held commands."""
 LONG_LEASE_S: Final = 0.5
 _BITS_OF_A_BYTE: Final = 10
-"""Number of bits per byte on a serial line, including start and stop bit."""
+"""Number of bits per byte on a serial line, including the start bit and the stop bit."""
 _ROUNDING: Final = 1.000001
 
 
@@ -66,7 +67,7 @@ def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, problems: Problems) -> None:
-    """Warn of motion over a transport that cannot detect a frozen robot program."""
+    """Warn about motion over a transport that cannot detect a frozen robot program."""
     part, command, _ = one
     is_asked = spec.type in _ASKED or spec.never_replies
     if is_asked or spec.stale_after_s is not None or spec.connection == "per_request":
@@ -157,7 +158,7 @@ def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
 def _check_baud(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Report held commands that need more than the baud rate of a serial line."""
+    """Report held commands that exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -180,7 +181,7 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Warn of held commands through an MQTT broker without a last will."""
+    """Warn about held commands through an MQTT broker without a last will."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
@@ -195,12 +196,12 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest possible period in milliseconds, if all periods grow equally."""
+    """Return the shortest possible period in milliseconds, with all periods scaled equally."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 
 def _notices(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether URC would notice a silent robot on a transport."""
+    """Return whether URC would detect a silent robot on a transport."""
     if spec.stale_after_s is not None or spec.timeouts.idle_s is not None:
         return True
     asked = [poll for poll in driver.polls if poll.transport == spec.name]
@@ -214,7 +215,7 @@ def _notices(spec: TransportSpec, driver: Driver) -> bool:
 def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
     """Return the minimum size of a frame with its framing, in bytes.
 
-    A part that depends on values counts as one byte. Byte stuffing is not counted.
+    A variable part counts as one byte. Byte stuffing does not count.
     """
     frames = each_of(send)
     return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)

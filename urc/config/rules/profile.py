@@ -1,4 +1,4 @@
-"""The last pass: rules about a complete profile, which give only warnings."""
+"""The last pass: rules for a complete profile, which only warn."""
 
 import re
 from pathlib import PurePath
@@ -15,7 +15,7 @@ from urc.model.interface import Interface
 __all__ = ["check_profile"]
 
 _ENDINGS: Final = (".yaml", ".yml")
-"""File suffixes of documents; other sources of text have no file name."""
+"""File suffixes of documents; text from other sources has no file name."""
 
 
 def check_profile(
@@ -25,7 +25,7 @@ def check_profile(
     uses: NameUses,
     problems: Problems,
 ) -> None:
-    """Warn of unused declarations, inconsistent names, unfilled slots and fast polls."""
+    """Warn about unused declarations, inconsistent names, unfilled slots and fast polls."""
     _check_name(sources, problems)
     _check_unused(sources, driver, uses, problems)
     _check_slots(sources, interfaces, problems)
@@ -38,7 +38,7 @@ def check_profile(
 
 
 def _check_name(sources: Sources, problems: Problems) -> None:
-    """Warn of a robot with a different name from its file."""
+    """Warn about a robot whose name differs from its file name."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
     # In a package, the folder has the robot's name, and the file is always `robot.yaml`.
@@ -82,9 +82,9 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
 
 
 def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn of a slot that the robot's document fills but no interface shows.
+    """Warn about a slot that the robot's document fills, but that no interface shows.
 
-    A driver's document may fill slots for other interfaces, so its slots are not checked.
+    A driver's document may fill slots for other interfaces, so the driver's slots are not checked.
     """
     if not sources.interfaces:
         return
@@ -102,9 +102,9 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: P
 
 
 def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn of an unfilled slot in a robot's own grid.
+    """Warn about an unfilled slot in a robot's own grid.
 
-    An interface in a separate document is not checked, because it may serve several drivers with
+    Interfaces in separate documents are not checked, because they may serve several drivers with
     different slots.
     """
     for name, interface in interfaces.items():
@@ -129,7 +129,7 @@ def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems
 
 
 def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
-    """Return the first grid of an interface that shows a slot, and the slot's text offset."""
+    """Return the first grid that shows a slot, and the slot's offset in the grid's text."""
     for page in (part, *part.named("tabs").values()):
         one = page.get("grid")
         several = [*page.named("layouts").values(), *page.named("left_handed").values()]
@@ -141,9 +141,9 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 
 
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
-    """Warn of a poll with a reply timeout longer than its period.
+    """Warn about a poll with a reply timeout longer than its period.
 
-    A declared timeout that is not above the default causes no warning.
+    A declared timeout causes no warning if it is not longer than the default.
     """
     if poll.reply is None:
         return
@@ -155,7 +155,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
         timeouts = driver.must("transports").must(poll.transport).get("timeouts")
         where = timeouts.get("reply") if timeouts else None
         if where is None:
-            return  # a default is not a decision of the author
+            return  # the author did not choose the default
         seconds = Problems().duration(timeouts, "reply", 2.0) if timeouts else None
     if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
         problems.warn(
@@ -168,7 +168,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
 
 
 def _place(part: Node, near: Node) -> str:
-    """Return the position of `part` as text, relative to `near`."""
+    """Return the line of `part`, with the file name if it differs from the file of `near`."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
     line = f"line {mark.span.line if mark else 1}"
@@ -176,7 +176,7 @@ def _place(part: Node, near: Node) -> str:
 
 
 def _check_rate(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of polls that exceed the request rate of their transport in total."""
+    """Warn about polls that together exceed the request rate of their transport."""
     for name, transport in driver.transports.items():
         if not transport.min_gap_s:
             continue

@@ -1,4 +1,4 @@
-"""Rules about the traffic of a transport, such as late motion and the rate of polls.
+"""Rules for a transport's traffic, such as late motion and poll rates.
 
 All rules check declared values, never defaults.
 """
@@ -13,7 +13,7 @@ __all__ = ["check_traffic"]
 
 
 def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report problems of the traffic and motion of the driver at `part`."""
+    """Report problems with the traffic and motion of the driver at `part`."""
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         spec = driver.transports.get(command.transport)
@@ -37,7 +37,7 @@ def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of commands without a reply on a transport that counts the robot's unread bytes."""
+    """Warn about commands without a reply on a transport that counts the robot's unread bytes."""
     requests = [
         (inner, one.transport, one.reply, one.priority)
         for name, inner in part.named("commands").items()
@@ -63,7 +63,7 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of two transports that listen on the same port of this machine."""
+    """Warn about two transports that listen on the same port of this machine."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
         options = driver.transports[name].options
@@ -89,7 +89,7 @@ def _written(value: object) -> str:
 
 
 def _check_kept(part: Node, command: Command, problems: Problems) -> None:
-    """Report a motion command that a broker would store or repeat."""
+    """Report a motion command that a broker or ROS bridge would store or repeat."""
     attributes = command.send.options.get("attributes")
     if not isinstance(attributes, Mapping):
         return
@@ -107,7 +107,7 @@ def _check_kept(part: Node, command: Command, problems: Problems) -> None:
 
 
 def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Problems) -> None:
-    """Warn of a held command that repeats faster than its rate limit allows."""
+    """Warn about a held command that repeats faster than its rate limit allows."""
     if command.hold is None:
         return
     repeat_s = command.hold.repeat_s
@@ -115,7 +115,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
         (spec.min_gap_s if command.priority != "realtime" else 0.0, "the line's 'min_gap'"),
         (1 / command.rate_per_s if command.rate_per_s else 0.0, "its 'rate_limit'"),
     ):
-        if limit_s > repeat_s * 1.001:  # Tolerance, because 1/20 s and 50 ms are the same.
+        if limit_s > repeat_s * 1.001:  # Tolerance for rounding: 1/20 s and 50 ms are equal.
             problems.warn(
                 part.must("repeat"),
                 "hold-rate-limited",
@@ -126,9 +126,9 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
 
 
 def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Problems) -> None:
-    """Warn of a transport that becomes stale, or closes, between two polls."""
+    """Warn about a transport that becomes stale or closes between two polls."""
     if any(one.transport == spec.name for one in driver.messages.values()):
-        return  # unsolicited messages come at an unknown rate
+        return  # unsolicited messages arrive at an unknown rate
     periods = [poll.every_s for poll in driver.polls if poll.transport == spec.name and poll.reply]
     keepalive = spec.keepalive
     if keepalive is not None:

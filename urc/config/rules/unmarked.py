@@ -1,7 +1,7 @@
-"""Checks of unmarked motion commands, and of autonomous motion without an end.
+"""Checks for unmarked motion commands, and for autonomous motion without an end.
 
-A command suggests motion by its name, by the units and names of its arguments, or by its message
-type. Only whole words match: ``moves_left`` does not match ``move``.
+A command may suggest motion by its name, by its arguments' units and names, or by its message type.
+Only whole words match: ``moves_left`` does not match ``move``.
 """
 
 import re
@@ -34,7 +34,7 @@ _QUIET: Final = _words(
     " max min mode name off offset on param pause ping query read reset save select show signal"
     " state status stop store subscribe test timeout trim tune unlock version volume zero"
 )
-"""Words in a name that rule out motion; ``drive_mode``, for example, has the word ``mode``."""
+"""Words that rule out motion, such as ``mode`` in ``drive_mode``."""
 _BOUND: Final = _words("limit max maximum min minimum top")
 """Words in the names of arguments that limit motion."""
 _MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
@@ -53,7 +53,7 @@ _HINT_OF_STEPS: Final = (
 
 
 def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of each command or sequence that suggests motion but is not marked as motion."""
+    """Warn about each command or sequence that suggests motion but is not marked."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
             command = driver.commands[name]
@@ -72,9 +72,9 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of autonomous motion without a stop command and without a confirmation.
+    """Warn about autonomous motion without a stop command or a confirmation.
 
-    Held commands get no warning, because their release ends the motion.
+    Held commands cause no warning, because their release ends the motion.
     """
     if any(one.stops or one.hold is not None for one in driver.commands.values()):
         return
@@ -103,9 +103,9 @@ def _says_no(part: Node) -> bool:
 
 
 def why_it_moves(name: str, command: Command) -> str:
-    """Return the reason why a command suggests motion, in words; "" if it does not."""
+    """Return the reason why a command suggests motion; "" for other commands."""
     if command.send.options.get("verb") == "cancel":
-        return ""  # a cancel ends motion, whatever its name
+        return ""  # a cancel ends motion, regardless of its name
     words = words_of(name)
     pair = " ".join(words[:2])
     is_quiet = pair not in _PAIRS and not _QUIET.isdisjoint(words)
@@ -136,7 +136,7 @@ def _motion_word(words: tuple[str, ...]) -> str:
 
 
 def _type_of_motion(send: Mapping[str, object]) -> str:
-    """Return the reason why a message type suggests motion; "" if it does not."""
+    """Return the reason why a message type suggests motion; "" for other types."""
     attributes = send.get("attributes")
     kind = attributes.get("type") if isinstance(attributes, Mapping) else None
     if not isinstance(kind, str):

@@ -1,7 +1,7 @@
-"""The shape pass: a check of a document against the schema of its kind.
+"""The shape pass checks a document against the schema of its kind.
 
 The fast check of `urc.config.schemas` accepts valid documents. The library `jsonschema` checks all
-other documents, and `urc.config.shape.report` rewords its errors.
+other documents, and `urc.config.shape.report` converts its errors to problems.
 """
 
 import math
@@ -42,9 +42,8 @@ def check_shape(document: Document) -> list[Problem]:
 def check_source(document: Document) -> list[Problem]:
     """Check one source of a merged document for problems that the merge would hide.
 
-    The merge may remove unknown keys, and keys that are allowed only in the source. Missing keys
-    are not reported, because another source may add them. The shape pass also checks the merged
-    document.
+    The merge may remove unknown keys and source-only keys. Missing keys are not reported, because
+    another source may add them. The shape pass also checks the merged document.
     """
     if not kind_of(document):
         return [_without_kind(document)]
@@ -80,7 +79,7 @@ def _source_schema(name: str) -> Mapping[str, Any]:
 
 
 def _optional(schema: Any) -> Any:
-    """Return a schema without required keys, except keys that select a schema branch."""
+    """Return a schema without lists of required keys, except in ``if`` conditions."""
     if isinstance(schema, list):
         return [_optional(item) for item in schema]
     if not isinstance(schema, dict):
@@ -93,7 +92,7 @@ def _optional(schema: Any) -> Any:
 
 
 def _without_nothing(value: object) -> object:
-    """Return data without null values, which would remove keys in a merge."""
+    """Return data without null values, because a null removes a key in a merge."""
     if isinstance(value, dict):
         return {key: _without_nothing(item) for key, item in value.items() if item is not None}
     if isinstance(value, list):
@@ -120,7 +119,7 @@ def check_options(
 def check_inline(
     document: Document, path: Path, value: object, schema: Mapping[str, Any]
 ) -> list[Problem]:
-    """Return the problems of a part of a document; `schema` must not refer to a file."""
+    """Return the problems in a part of a document; `schema` must not refer to a file."""
     if shipped_check().is_valid_inline(schema, value):
         return []
     from urc.config.shape.report import report

@@ -62,7 +62,7 @@ _SPAN: Final = re.compile(
     r"(?P<unit>hz|ms|msec|milli(?:s|second)s?|s|secs?|seconds?|m|mins?|minutes?|h|hours?)",
     re.IGNORECASE,
 )
-"""A duration or a rate, as other programs write it."""
+"""Pattern of a duration or rate in the notation of other programs."""
 _UNITS: Final = "a duration has the unit ms, s, m (minutes) or h"
 _NUMBERS: Final = {"integer", "number"}
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
@@ -71,11 +71,11 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""Hints, by misplaced key and another valid key of the same mapping."""
+"""Hints by misplaced key and by another valid key of the same mapping."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
-    """Return a hint with the known key that an unknown key probably means."""
+    """Return a hint with the probable meaning of an unknown key."""
     renamed = renamed_hint(path, key, known)
     if renamed:
         return renamed
@@ -96,7 +96,7 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Pat
 
 
 def _place_hint(value: object, known: Mapping[str, Any]) -> str:
-    """Return a hint with the host and port of a URL, in the keys of a transport."""
+    """Return a hint with a URL's host and port as keys of a transport."""
     found = _URL.match(value) if isinstance(value, str) else None
     if found is None:
         return "write 'host' and 'port', such as host: robot.local, port: 9090"
@@ -104,12 +104,12 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
     written = [f"host: {host}"]
     written += [f"port: {found['port']}"] if found["port"] else []
     written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
-    # The quoted names keep a missing 'host' from being reported a second time.
+    # Because of the quoted names, a missing 'host' is not reported again.
     return f"write 'host' and 'port': {', '.join(written)}"
 
 
 def word_hint(word: str, words: Sequence[str]) -> str:
-    """Return a hint with the known word that an unknown word probably means, or ""."""
+    """Return a hint with the probable meaning of an unknown word; "" if no word is similar."""
     if word == "watch" and "drive" in words:
         return "visitors with the role 'watch' give no commands; the lowest role is 'drive'"
     other = _SAME_TYPES.get(word.lower(), "")
@@ -120,7 +120,7 @@ def word_hint(word: str, words: Sequence[str]) -> str:
 
 
 def example_of(schema: Mapping[str, Any], key: str) -> str:
-    """Return the schema's example of a missing key, or ""."""
+    """Return the schema's example of a missing key; "" without an example."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
     if key == "urc":
@@ -163,7 +163,7 @@ def _quoted(value: object) -> str:
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
-    """Return a hint for the conversion of a value to one of `types`, or ""."""
+    """Return a hint to convert a value to one of `types`; "" without a suitable hint."""
     if value is None:
         return "give the key a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -187,7 +187,7 @@ def type_hint(
 
 
 def text_hint(document: Document, path: Path, value: str, schema: Mapping[str, Any]) -> str:
-    """Return a hint for a text that does not match the pattern of its schema, or ""."""
+    """Return a hint for a text that does not match its schema's pattern; "" without a hint."""
     if schema.get("title") == "duration":
         found = _SPAN.fullmatch(value.strip())
         if found is None:
@@ -207,7 +207,7 @@ def _listed(types: object) -> Sequence[str]:
 
 
 def _duration(number: float, unit: str) -> str:
-    """Return a duration of the language, from a number and a unit of other programs."""
+    """Return a duration in document notation, from a number and a unit of another program."""
     if unit.lower() == "hz":
         return f"{1000 / number:.0f}ms" if number > 0 else "1s"
     plain = unit.lower()

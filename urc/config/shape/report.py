@@ -1,4 +1,4 @@
-"""Conversion of errors from `jsonschema` to problems with exact positions.
+"""Converts errors from `jsonschema` to problems with exact positions.
 
 URC imports this module only for invalid documents, because `jsonschema` takes 80 ms to import.
 """
@@ -86,7 +86,7 @@ def report(
 def _branches(
     validator: Any, condition: Any, instance: Any, schema: Mapping[str, Any]
 ) -> Iterator[ValidationError]:
-    """Check ``then`` or ``else``; report their missing keys as missing in the outer schema."""
+    """Check ``then`` or ``else``; report missing keys for the outer schema."""
     branch = "then" if validator.evolve(schema=condition).is_valid(instance) else "else"
     for error in validator.descend(instance, schema.get(branch, True), schema_path=branch):
         if not error.path and "properties" in schema and "properties" not in error.schema:
@@ -124,7 +124,7 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem]:
     known = error.schema.get("properties", {})
-    # Where any key is allowed, none is unknown.
+    # A mapping that allows any key has no unknown keys.
     is_closed = bool(known) and error.schema.get("additionalProperties") is False
     misspelt = [
         key_hint(key, known, error.value[key], path)
@@ -137,7 +137,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
         if name not in error.value and not any(f"'{name}'" in hint for hint in misspelt)
     ]
     if not missing:
-        return []  # its misspelt form is already reported
+        return []  # the misspelt key is already reported
     verb = "is" if len(missing) == 1 else "are"
     names = " and ".join((", ".join(missing[:-1]), missing[-1])) if missing[1:] else missing[0]
     return [
@@ -152,7 +152,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 
 def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
-    """Return a problem with an invalid key name; `path` is the path of the mapping."""
+    """Return a problem for an invalid key name; `path` is the path of the mapping."""
     if not isinstance(error.value, str):
         return [_other_one(document, path, error)]
     message = f"{_cut(error.value)} is not a valid name here"
@@ -247,7 +247,7 @@ def _other_one(document: Document, path: Path, error: _Error) -> Problem:
 
 
 def _in_names(tell: _Report) -> _Report:
-    """Wrap a report function for errors about key names; the errors have the mapping's path."""
+    """Wrap a report function to report errors in key names separately."""
 
     def choose(document: Document, path: Path, error: _Error) -> list[Problem]:
         return (_wrong_name if error.is_name else tell)(document, path, error)

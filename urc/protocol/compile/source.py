@@ -1,9 +1,8 @@
 """Construction of functions from generated source text, with readable tracebacks.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
-Text of a document becomes part of the generated source only inside the `repr()` of a constant.
-`linecache` keeps the source during the lifetime of the function, so tracebacks show the generated
-lines.
+Text from a document enters the generated source only inside the `repr()` of a constant. `linecache`
+keeps the source for the lifetime of the function, so that tracebacks show the generated lines.
 """
 
 import weakref

@@ -1,7 +1,7 @@
-"""Builder of the source text of a generated struct function.
+"""Builder for the source text of a generated struct function.
 
 Pure. WARNING: the source is compiled and run. The source may contain only text of this package, the
-`repr()` of constants, and names from `SourceBuilder.bind`. Text of a document must never become
+`repr()` of constants, and names from `SourceBuilder.bind`. Text from a document must never become
 part of the source.
 """
 

@@ -1,8 +1,7 @@
-"""The form of envelopes: publish, call, goal and request.
+"""The form for envelopes: publish, call, goal and request.
 
-Pure. An envelope has an address (attributes) and a body. The body of an envelope is in another
-form, such as JSON. JSON bodies are not encoded as text, because each transport for messages has its
-own encoding.
+Pure. An envelope has an address (attributes) and a body. The body uses another form, such as JSON.
+JSON bodies are not encoded as text, because each message transport has its own encoding.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,15 +26,15 @@ _UP: Final = (".", "..")
 class _AddressPiece(NamedTuple):
     template: Template
     is_value: bool
-    """Whether the piece contains an argument of the command, and not only text or settings."""
+    """Whether the piece contains a command argument, not only text or settings."""
 
 
 class PathTemplate:
-    """A writer for addresses: paths of requests, and names of topics, services and actions.
+    """A writer for addresses: request paths, and the names of topics, services and actions.
 
     An argument value fills exactly one segment of the address, so the value cannot redirect the
-    request. An argument value that is the whole address may have several segments. The values of
-    settings are trusted like the text of the document.
+    request. An argument value that is the whole address may have several segments. Setting values
+    are trusted, like the document's own text.
     """
 
     def __init__(
@@ -75,7 +74,7 @@ def place_writer(name: str, tree: object) -> PathTemplate | None:
 
 
 def _path(text: str, is_whole: bool) -> str:
-    """Return a value, quoted for a URL path."""
+    """Return a value quoted for use in a URL path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
         raise NotWritable(f"{quoted(text)} would change the path")
@@ -83,7 +82,7 @@ def _path(text: str, is_whole: bool) -> str:
 
 
 def _name(text: str, is_whole: bool, *, what: str) -> str:
-    """Return a value, checked for use in the name of a topic, service or action."""
+    """Check a value for use in the name of a topic, service or action, and return it."""
     for sign in (*_WILD, *(() if is_whole else ("/",))):
         if sign in text:
             raise NotWritable(f"{quoted(text)} would change the {what}: {sign!r} is not allowed")
@@ -99,7 +98,7 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
 """Attributes that identify an envelope; all other attributes are delivery options."""
 _TEXTS: Final = ("query", "headers")
-"""Attributes that are mappings of text values."""
+"""Attributes whose values are mappings to text."""
 
 
 class EnvelopeWriter:
@@ -131,7 +130,7 @@ class EnvelopeWriter:
         return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values by name; None for an envelope that does not match."""
+        """Return the values by name; None if the envelope does not match."""
         envelope = frame.payload
         if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
             return None

@@ -53,7 +53,7 @@ class AnyReader:
 
 
 class RawReader:
-    """A reader that returns every frame of bytes as one field."""
+    """A reader that returns the bytes of each frame as one field."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._field = cast("str", spec.options["field"])

@@ -1,4 +1,4 @@
-"""Field conversions of one frame, ``set`` and ``when``.
+"""Field conversions, ``set`` and ``when`` for one frame.
 
 Pure. `ShapedReader` wraps the reader of a form, for reading and writing.
 """
@@ -16,7 +16,7 @@ __all__ = ["ShapedReader"]
 
 
 class ShapedReader:
-    """A reader that converts the fields of a form, checks ``when``, and adds values of ``set``."""
+    """A reader that converts a form's fields, checks ``when``, and adds the values from ``set``."""
 
     def __init__(self, inner: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
         self._inner = inner
@@ -36,7 +36,7 @@ class ShapedReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields; None for a frame that does not match."""
+        """Return the fields; None if the frame does not match."""
         raw = self._inner.read(frame)
         if raw is None:
             return None
@@ -72,7 +72,7 @@ class ShapedReader:
             return False  # it reads a field of another frame
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame with `fields`, except for the fields of ``set``."""
+        """Return a frame with `fields`, except the fields of ``set``."""
         raw: dict[str, object] = {}
         for name, value in fields.items():
             if name in self._sets:

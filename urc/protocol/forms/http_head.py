@@ -1,6 +1,6 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. The reader for status and headers wraps the reader of the body, for reading and writing.
+Pure. The reader for status and headers wraps the body's reader, for both reading and writing.
 """
 
 from collections.abc import Mapping
@@ -13,9 +13,9 @@ from urc.protocol.values.payload import Frame, NotWritable, PayloadReader
 __all__ = ["LOCATION", "STATUS", "HeadReader", "is_redirect"]
 
 STATUS: Final = "status"
-"""Name of the status in the header declarations."""
+"""Name used for the status in header declarations."""
 _REDIRECTS: Final = 3
-"""First digit of redirect statuses."""
+"""First digit of redirect status codes."""
 LOCATION: Final = "location"
 """Header with the target URL of a redirect."""
 
@@ -37,7 +37,7 @@ class HeadReader:
         self._head = dict(spec.head)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields; None for a frame that does not match."""
+        """Return the fields; None if the frame does not match."""
         found = self._reader.read(frame)
         if found is None:
             return None

@@ -2,10 +2,10 @@
 
 Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
 decoder of `msgspec` skips all other data, and a generated function extracts the fields
-(`urc.protocol.compile.source`). If a document has another structure, the decoder raises an error.
-After an error of the decoder, the reader decodes the whole document, and follows the paths step by
-step. JMESPath expressions always require decoding the whole document. Typed and complete decoding
-return the same fields.
+(`urc.protocol.compile.source`). If a document has a different structure, the decoder raises an
+error. The reader then decodes the whole document and follows the paths step by step. JMESPath
+expressions always require decoding the whole document. Typed and complete decoding return the same
+fields.
 """
 
 import json
@@ -26,7 +26,7 @@ _Find = Callable[[Any], object]
 
 
 class JsonReader:
-    """A reader for the values at paths, which also writes documents with values at paths."""
+    """A reader for the values at given paths, which also writes documents with such values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         paths = cast("Mapping[str, object]", spec.options["paths"])
@@ -53,7 +53,7 @@ class JsonReader:
         return self.read_whole(frame)
 
     def read_whole(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the same fields as `read`, without the generated types."""
+        """Return the same fields as `read` without using the generated types."""
         document = self._document(frame)
         if document is _MISSING:
             return None

@@ -47,7 +47,7 @@ class JsonWriter:
         return value
 
     def completed(self, value: object) -> object:
-        """Return a ROS message, with zeros for missing members as in a ROS bridge."""
+        """Return a ROS message with zeros for missing members, as a ROS bridge does."""
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:

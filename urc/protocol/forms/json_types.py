@@ -24,7 +24,7 @@ class _Shape:
     def __init__(self) -> None:
         self.names: dict[str, _Shape] = {}
         self.element: _Shape | None = None
-        """Type of all elements of an array; None for a value that is not an array."""
+        """Type of all elements of an array; None if the value is not an array."""
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
@@ -60,7 +60,8 @@ class ExtractionPlan(NamedTuple):
     """A plan for extracting the fields at given paths from a document."""
 
     decode: Callable[[bytes], Any]
-    """Function that decodes a document, or raises `msgspec.DecodeError` for another structure."""
+    """Function that decodes a document, or raises `msgspec.DecodeError` for a different
+    structure."""
     want: PathNode
 
     def access(self, want: PathNode, step: str | int) -> str:
@@ -74,8 +75,8 @@ class ExtractionPlan(NamedTuple):
 
         Args:
             variable: name of the variable with the decoded value.
-            begin: function that returns the beginning of the source line of a field, before the
-                value; "": the field is skipped.
+            begin: function that returns the text before the value in a field's source line; ""
+                means that the field is skipped.
         """
         yield from self._picking(self.want, variable, "    ", begin)
 
@@ -124,7 +125,7 @@ def plan_of(paths: Mapping[str, JsonPath]) -> ExtractionPlan | None:
 def build_pick(plan: ExtractionPlan) -> Callable[[bytes], dict[str, object] | None]:
     """Return a function that extracts the fields found in a document.
 
-    The returned function raises `msgspec.DecodeError` for a document of another structure.
+    The returned function raises `msgspec.DecodeError` for a document with a different structure.
     """
     lines = ["    v = decode(data)", "    found = {}"]
     lines += plan.picking("v", "found[{!r}] = ".format)

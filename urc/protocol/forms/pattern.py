@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression with linear run time. Every repeat is possessive, and matches
-only characters that cannot follow the repeat.
+A pattern becomes a regular expression with linear run time. Every repeat is possessive and matches
+only characters that cannot follow it.
 """
 
 import re
@@ -49,7 +49,7 @@ class PatternReader:
         self._holes = cast("tuple[PatternField, ...]", spec.options["holes"])
         self._tail = cast("str", spec.options["tail"])
         self._start = _start(self._holes, self._tail)
-        """First literal word of the pattern; "": the pattern begins with a field."""
+        """First literal word of the pattern; "" means that the pattern begins with a field."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
         """Regular expression of the pattern. Patterns are compiled on first use, because a document
         test uses only a few patterns of a driver."""
@@ -86,7 +86,7 @@ class PatternReader:
             return None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the text of the pattern with the values of `fields`."""
+        """Return the pattern's text, filled with the values of `fields`."""
         pieces = []
         for hole in self._holes:
             value = fields.get(hole.name) if hole.name else None
@@ -176,7 +176,7 @@ def _field(kind: FieldKind, after: str) -> str:
 
 
 def _cast_of(hole: PatternField) -> Callable[[str], object]:
-    """Return a function that converts text to a value; the text of an empty column becomes None."""
+    """Return a function that converts text to a value; an empty column becomes None."""
     cast_to = CASTS[hole.kind]
     if not hole.width:
         return cast_to
@@ -186,7 +186,7 @@ def _cast_of(hole: PatternField) -> Callable[[str], object]:
         if hole.kind in ("word", "text"):
             return inner or None
         if not inner.isascii() or "_" in inner:
-            raise ValueError(text)  # int() and float() accept more than robots mean
+            raise ValueError(text)  # int() and float() accept more notations than robots use
         return cast_to(inner) if inner else None
 
     return column

@@ -31,7 +31,7 @@ class RegexReader:
         return {name: text for name, text in found.items() if text is not None}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a text that matches the pattern, with `fields` as the named groups."""
+        """Return text that matches the pattern, with `fields` as the named groups."""
         texts = {name: self._text(name, value) for name, value in fields.items()}
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return the text of a field as required by the group, for example with leading zeros."""
+        """Return a field's text in the format of the group, for example with leading zeros."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:

@@ -12,7 +12,7 @@ __all__ = ["KeyvalueReader", "SplitReader"]
 
 
 class SplitReader:
-    """A reader for values by position. An empty part is a value that is not available."""
+    """A reader for values by position. An empty part means that the value is not available."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -21,7 +21,7 @@ class SplitReader:
         self._has_more = bool(options["has_more"])
         self._strip = cast("str | None", options["strip"])
         self._tail = cast("str", options.get("tail", ""))
-        """Name of the field for all remaining parts; "": no such field."""
+        """Name of the field for all remaining parts, or ""."""
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -53,7 +53,7 @@ class SplitReader:
         return found
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the joined parts, with an empty text or a dash for missing parts."""
+        """Return the joined parts, with empty text or a dash for each missing part."""
         filler = "" if self._by else "-"
         names = self._names[:-1] if self._tail else self._names
         parts = [field_text(fields.get(name)) or filler for name in names]
@@ -71,7 +71,7 @@ class SplitReader:
 
 
 class KeyvalueReader:
-    """A reader for values by key. A key without text is a value that is not available."""
+    """A reader for values by key. A key without text means that the value is not available."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -115,7 +115,7 @@ class KeyvalueReader:
         return {name: part.strip(self._strip) for name, part in named if name}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the key-value pairs of `fields` as one text."""
+        """Return `fields` as key-value pairs in one text."""
         keys = {name: key for key, name in self._names.items()}
         texts = {keys[name]: field_text(value) for name, value in fields.items() if name in keys}
         pairs = [field_text(fields.get(name)) or "-" for name in self._first]

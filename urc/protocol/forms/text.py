@@ -16,7 +16,7 @@ _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
     r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
-"""Pattern of an expression with a name and formatting filters only, so the value can be read
+"""Pattern of an expression with only a name and formatting filters, whose value can be read
 back."""
 
 
@@ -28,7 +28,7 @@ class TextWriter:
         self._encoding = context.encoding
 
     def write(self, namespace: Mapping[str, object]) -> Payload:
-        """Return the rendered text in the encoding of the connection."""
+        """Return the rendered text in the connection's encoding."""
         text = text_of(self._template.evaluate(namespace))
         try:
             return text.encode(self._encoding)
@@ -37,9 +37,9 @@ class TextWriter:
             raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the text at the positions of plain names, by name; None for another frame.
+        """Return the text at each plain name, keyed by name; None if the frame does not match.
 
-        The number of a counter has the key ``seq.NAME``. A field ends at the next occurrence of its
+        A counter's number has the key ``seq.NAME``. A field ends at the next occurrence of its
         following literal text. The last field ends before the literal text at the end of the frame.
         """
         try:

@@ -1,4 +1,4 @@
-"""Topics and subscriptions of a driver on a transport for messages.
+"""A driver's topics and subscriptions on a message transport.
 
 Pure. A topic may have MQTT wildcards (version 5.0, section 4.7): ``+`` for one level, and ``#`` at
 the end for all following levels.
@@ -35,7 +35,7 @@ class TopicReader:
         self._is_plain = not _WILD.search(self._topic)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields; None for another topic, or a message that does not match."""
+        """Return the fields; None if the topic or the message does not match."""
         topic = frame.topic
         if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
             return None
@@ -96,7 +96,7 @@ def frame_of(payload: Payload, encoding: str) -> Frame:
 def listened(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, Mapping[str, Value]]:
-    """Return the subscription options of a driver on a transport, by topic.
+    """Return a driver's subscription options on a transport, keyed by topic.
 
     If several declarations have the same topic, the first options take precedence, and later
     options add missing keys.
@@ -113,7 +113,7 @@ def listened(
 def paths_by_topic(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, list[Path]]:
-    """Return the paths that a driver reads in the messages of each topic; see `paths_of`."""
+    """Return the paths that a driver reads in each topic's messages; see `paths_of`."""
     found: dict[str, list[Path]] = {}
     for read in _reads(driver, transport):
         if read.topic is not None:

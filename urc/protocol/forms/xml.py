@@ -1,6 +1,6 @@
 """The form ``xml``: fields at element paths in a document.
 
-The form uses the parser of the standard library. A document with a document type declaration is
+The form uses the parser of the standard library. Documents with a document type declaration are
 rejected before parsing. XML entities therefore cannot expand, and external resources are never
 loaded.
 """
@@ -22,7 +22,7 @@ _MAX_DEPTH = 100
 
 
 class XmlReader:
-    """A reader for the texts and attributes of XML elements, which also writes XML documents."""
+    """A reader for the text and attributes of XML elements, which also writes XML documents."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._paths = dict(cast("Mapping[str, XmlPath]", spec.options["paths"]))

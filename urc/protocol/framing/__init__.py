@@ -1,1 +1,1 @@
-"""All framings. Each family of framings is a module that is imported on first use."""
+"""All framings. Framing families, each a module that is imported on first use."""

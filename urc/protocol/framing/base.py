@@ -1,4 +1,4 @@
-"""Interfaces and shared code of the framings.
+"""Interfaces and shared code for the framings.
 
 Pure. Each framing works in both directions, so an emulated robot can use the same declaration
 (`reversed`).
@@ -7,7 +7,7 @@ Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer
 Remaining bytes stay in the buffer, so another decoder can continue if a reply has a different
 framing. Memory is bounded: the buffer never exceeds the maximum frame size. Time is linear: bytes
 are scanned once, and rescanned only within a `RescanBudget`. After invalid bytes, the decoder
-reports one violation, and continues at the next possible start of a frame.
+reports one violation and continues at the next possible frame start.
 """
 
 from collections.abc import Callable
@@ -41,7 +41,7 @@ class FramingError(UrcError):
 
 
 class FrameFault(NamedTuple):
-    """A violation of the framing: received bytes that are not a valid frame."""
+    """A framing violation: received bytes that are not a valid frame."""
 
     code: str
     """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
@@ -74,7 +74,7 @@ class Decoder(Protocol):
         """Remove and return the next frame or violation; return None if incomplete."""
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames and violations that silence until `now` has completed."""
+        """Return the frames and violations completed by silence until `now`."""
 
 
 class Framing(Protocol):
@@ -137,13 +137,13 @@ class StreamDecoder:
         self._is_case = True
 
     def _refused(self, error: BadFrame) -> FrameFault | None:
-        """Return the violation for an invalid frame; None for a silently dropped frame."""
+        """Return the violation for an invalid frame; None if the frame is dropped silently."""
         if error.code == SKIPPED and not self._is_case:
             return None
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return the number of bytes before the next `mark`, complete or cut off at the end."""
+        """Return the number of bytes before the next `mark`, which may be cut off at the end."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:
@@ -153,7 +153,7 @@ class StreamDecoder:
         return found - stream.at
 
     def _skip(self, count: int) -> FrameFault | None:
-        """Discard `count` bytes outside any frame; return a violation if not yet reported."""
+        """Discard `count` bytes outside any frame; return a violation unless already reported."""
         stream = self._stream
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count

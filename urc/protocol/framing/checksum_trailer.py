@@ -1,7 +1,7 @@
-"""Checksums after a text of variable length.
+"""Checksums after variable-length text.
 
-Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes the
-checksum. Without the checksum, all parts of the content have fixed positions.
+Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes it.
+Without the checksum, all parts of the content have fixed positions.
 """
 
 from urc.model.framing import TrailerSpec
@@ -16,7 +16,7 @@ class ChecksumTrailer:
     def __init__(self, spec: TrailerSpec, start: bytes) -> None:
         self._spec = spec
         self._before = b"" if spec.each else start
-        """Bytes of the frame before the text; all positions count these bytes."""
+        """Bytes of the frame before the text, which all positions include."""
         self._checksum = Checksum(spec.checksum)
         self._size = self._checksum.size
 
@@ -63,7 +63,7 @@ class ChecksumTrailer:
                 raise BadFrame("short-frame", f"{len(text)} bytes are too few for the checksum")
             return text[:-size], text[-size:]
         if spec.checksum.spelling == "raw":
-            # Raw bytes may contain the separator: only the place is reliable.
+            # Raw bytes may contain the separator: only its position is reliable.
             content, digits = text[: -size - len(spec.mark)], text[-size:]
             is_marked = text[:-size].endswith(spec.mark)
         else:

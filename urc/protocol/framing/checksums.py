@@ -91,7 +91,7 @@ class Checksum:
         return place
 
     def _window(self, frame: bytes | bytearray, place: int) -> bytes:
-        """Return the input of the checksum, with zeros in place of the checksum."""
+        """Return the checksum input, with zeros in place of the checksum itself."""
         start, data = cut(frame, self.spec.over)
         stop = start + len(data)
         first, last = max(start, place), min(stop, place + self.size)
@@ -111,7 +111,7 @@ class Checksum:
 
 
 def cut(frame: bytes | bytearray, window: ByteRange) -> tuple[int, bytes]:
-    """Return the start and the bytes of `window`; raise `BadFrame` when `frame` is too short."""
+    """Return the start and the bytes of `window`; raise `BadFrame` if `frame` is too short."""
     start, stop, _ = slice(window.start, window.stop).indices(len(frame))
     if start > stop:
         raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")

@@ -53,7 +53,7 @@ class DelimiterFraming(NamedTuple):
 
 
 class DelimiterDecoder(StreamDecoder):
-    """A decoder for frames with a delimiter, in linear time even if a frame arrives byte by byte.
+    """A decoder for delimited frames that takes linear time even if bytes arrive one at a time.
 
     A frame over the size limit is dropped and reported once. After a dropped frame, decoding
     continues at the next delimiter.
@@ -76,7 +76,7 @@ class DelimiterDecoder(StreamDecoder):
         """Number of scanned bytes without a delimiter."""
         self._is_skipping = False
         self._credit: RescanBudget | None = None
-        """Rescan budget for a case of a `switch`; None outside of a `switch`. In a `switch`, only
+        """Rescan budget for a case of a `switch`; None outside a `switch`. In a `switch`, only
         the first byte of a frame over the size limit is dropped."""
 
     def restart(self) -> None:
@@ -141,7 +141,7 @@ class DelimiterDecoder(StreamDecoder):
             return self._refused(error)
 
     def _wait(self, credit: RescanBudget | None) -> FrameFault | None:
-        """Keep the bytes of an incomplete frame; return a violation if over the size limit."""
+        """Keep an incomplete frame's bytes; return a violation if they exceed the size limit."""
         stream, keep = self._stream, len(self._delimiter) - 1
         fault = None
         if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):

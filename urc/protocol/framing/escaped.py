@@ -1,9 +1,9 @@
-"""Framings with byte stuffing of the whole content between two markers.
+"""Framings that stuff the whole content between two markers.
 
 Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between the
-markers is stuffed last, so length field and checksum refer to the original bytes. If every marker
-byte in the content is escaped, an ordinary search finds the markers. If a marker begins with the
-escape byte, and the content contains doubled escape bytes, the decoder processes all escapes in
+markers is stuffed last, so the length field and the checksum refer to the original bytes. If every
+marker byte in the content is escaped, an ordinary search finds the markers. If a marker begins with
+the escape byte and the content contains doubled escape bytes, the decoder processes all escapes in
 order. A frame with a length field is decoded byte by byte up to its length.
 """
 
@@ -121,7 +121,7 @@ class _DoubledDecoder(StreamDecoder):
                 return found
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start of a frame, skipping doubled escape bytes and ends."""
+        """Advance to the next start marker, skipping doubled escape bytes and end markers."""
         stream, start = self._stream, self._start
         if not start:
             self._searched = 0 if len(stream) else -1
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return the frame, a violation or None; if `_searched` is -1, search again."""
+        """Return a frame, a violation or None; if `_searched` becomes -1, search again."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -160,7 +160,7 @@ class _DoubledDecoder(StreamDecoder):
             elif there.startswith(end):
                 return self._frame(place)
             else:
-                # An invalid escape: the frame that began here has lost its end.
+                # An invalid escape: the end of the frame that began here is missing.
                 gone = place - stream.at if self._start else place + 2 - stream.at
                 self._searched = -1
                 return self._skip(gone)
@@ -185,7 +185,7 @@ class _DoubledDecoder(StreamDecoder):
 
 
 class _LengthDecoder(StreamDecoder):
-    """A decoder for frames with a length field that counts the original bytes, before stuffing."""
+    """A decoder for frames whose length field counts the original bytes, before stuffing."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, framing: EscapedFraming, length: LengthField
@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes; the result has the same form as the result of `_read`."""
+        """Check the end bytes, and return the same kind of result as `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:

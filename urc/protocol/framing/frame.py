@@ -22,7 +22,7 @@ __all__ = ["BadFrame", "LengthField", "FrameCodec", "length_of"]
 Open = Callable[[bytes], bytes]
 
 _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
-"""Start values of the CRCs that the standard library computes, by CRC parameters."""
+"""Start values of the CRCs that the standard library computes, keyed by CRC parameters."""
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:
@@ -115,7 +115,7 @@ class FrameCodec:
     def close(self, payload: bytes) -> bytes:
         """Return the frame of `payload`; raise `BadFrame` if the payload does not fit.
 
-        All bytes outside of the payload and of the declared parts of the frame are zeros.
+        All bytes outside the payload and the frame's declared parts are zero.
         """
         layout = self.layout
         if self._stuffing is not None:
@@ -182,7 +182,7 @@ def _digits_of(data: bytes, digits: Digits) -> bytes:
 
 
 def length_of(spec: LengthSpec) -> "LengthField | DigitLength":
-    """Return a length field of the kind that `spec` declares."""
+    """Return a length field of the kind declared by `spec`."""
     return DigitLength(spec) if spec.is_loose else LengthField(spec)
 
 
@@ -214,7 +214,7 @@ class LengthField:
         return number * spec.unit + spec.adjust
 
     def write(self, frame: bytearray, stop: int) -> None:
-        """Write the size of `frame` into its length field, before offset `stop`.
+        """Write the size of `frame` into its length field, which must end by offset `stop`.
 
         Raises:
             BadFrame: the length field does not fit, or cannot represent the size.

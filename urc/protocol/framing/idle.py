@@ -92,7 +92,7 @@ class _WholeDecoder(StreamDecoder):
 class _IdleDecoder(_WholeDecoder):
     """A decoder for frames that end with silence.
 
-    The parameter `now` of `push` is the time of receipt. Without `now`, only `tick` ends frames.
+    The argument `now` of `push` is the time of receipt. Without `now`, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:
@@ -134,7 +134,7 @@ class _IdleDecoder(_WholeDecoder):
         return frames
 
     def _end(self, now: float) -> None:
-        """Complete the frame if `now` is `gap_s` or more after the newest byte."""
+        """Complete the frame if `now` is at least `gap_s` seconds after the newest byte."""
         if self._newest is None:
             if len(self._stream):
                 self._newest = now  # bytes left by another decoder

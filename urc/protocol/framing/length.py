@@ -27,7 +27,7 @@ __all__ = ["LengthFraming"]
 
 
 class LengthFraming(NamedTuple):
-    """Frames of fixed size or with a length field, equal in both directions."""
+    """Frames of fixed size or with a length field, the same in both directions."""
 
     codec: FrameCodec
     max_bytes: int
@@ -113,7 +113,7 @@ class _MeasuredDecoder(StreamDecoder):
         return self._leave(gone) if gone else None
 
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
-        """Return the payload, a violation, or None for a violation that is already reported."""
+        """Return the payload, a violation, or None for an already reported violation."""
         try:
             payload = self._codec.open(frame)
         except BadFrame as error:

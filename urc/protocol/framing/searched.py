@@ -37,7 +37,7 @@ seconds."""
 class RegexFraming(NamedTuple):
     """Frames that match a pattern.
 
-    If `tx` is declared, every sent frame ends with `tx`, and need not match the pattern.
+    If `tx` is declared, every sent frame ends with `tx` and need not match the pattern.
     """
 
     search: Search
@@ -102,7 +102,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._codec = codec
         self._tried = 0
-        """Number of bytes that have been searched without a match."""
+        """Number of bytes searched so far without a match."""
         self._newest = 0.0
 
     @property
@@ -205,7 +205,7 @@ class BracketsFraming(NamedTuple):
 
 
 class BracketsDecoder(StreamDecoder):
-    """A decoder for frames between two markers, in linear time."""
+    """A linear-time decoder for frames between two markers."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, start: bytes, end: bytes, opened: Open, max_bytes: int
@@ -236,7 +236,7 @@ class BracketsDecoder(StreamDecoder):
                     return None
                 fault = self._overflow()
             else:
-                # Another opening marker: the frame before it has lost its end.
+                # Another opening marker: the end of the previous frame is missing.
                 last = data.rfind(self._open, stream.at + len(self._open), close)
                 if last < 0:
                     frame = self._frame(close)
@@ -255,7 +255,7 @@ class BracketsDecoder(StreamDecoder):
         return self._skip(gone) if gone else None
 
     def _overflow(self) -> FrameFault | None:
-        """Continue at the newest opening marker; an earlier frame exceeds the size limit."""
+        """Continue at the newest opening marker; the frame before it exceeds the size limit."""
         stream = self._stream
         fault = self._too_long()
         last = stream.data.rfind(self._open, stream.at + len(self._open))

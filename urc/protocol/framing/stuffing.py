@@ -19,7 +19,7 @@ _ANY: Final = range(256)
 
 
 class Stuffing:
-    """Encoding and decoding of byte stuffing, in linear time."""
+    """Linear-time encoding and decoding of byte stuffing."""
 
     def __init__(self, spec: EscapeSpec) -> None:
         self.spec = spec
@@ -75,7 +75,7 @@ def _meant(spec: EscapeSpec) -> Mapping[int, int]:
 
 
 class Unstuffer:
-    """An incremental decoder of byte stuffing, for one byte at a time."""
+    """An incremental decoder of byte stuffing, which processes one byte at a time."""
 
     def __init__(self, stuffing: Stuffing) -> None:
         self._stuffing = stuffing

@@ -29,7 +29,8 @@ class SwitchFraming(NamedTuple):
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
     otherwise: Framing | None = None
-    """Framing of frames that match no case; None: frames that match no case are invalid."""
+    """Framing of frames that match no case; None means that frames that match no case are
+    invalid."""
     is_robot: bool = False
     """Whether the framing is for the robot's end of the connection, in an emulated robot."""
 
@@ -147,7 +148,7 @@ class _SwitchDecoder(StreamDecoder):
         return self._lost(*found[:2], closes=found.closes)
 
     def _choose(self) -> FrameFault | None:
-        """Select the case of the next frame, and advance to the frame."""
+        """Select the case for the next frame, and advance to that frame."""
         stream = self._stream
         if self._other is not None:
             self._choose_here(self._other)
@@ -168,7 +169,7 @@ class _SwitchDecoder(StreamDecoder):
         return fault
 
     def _choose_here(self, other: StreamDecoder) -> None:
-        """Select the case of a frame at the next byte, or `other` if no case matches."""
+        """Select the case for the frame at the next byte, or `other` if no case matches."""
         stream = self._stream
         front = bytes(stream.data[stream.at : stream.at + self._longest])
         chosen = next((one for first, one in self._cases if front.startswith(first)), None)

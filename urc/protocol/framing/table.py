@@ -17,7 +17,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class AsymmetricFraming(NamedTuple):
-    """A framing that combines a framing for sent data with another framing for received data."""
+    """A framing with separate framings for sent and received data."""
 
     sent: Framing
     received: Framing

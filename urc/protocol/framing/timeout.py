@@ -1,4 +1,4 @@
-"""Timeouts and removal of terminal escape sequences, for any framing.
+"""Timeouts, and removal of terminal escape sequences, for any framing.
 
 Theory of operation. An incomplete frame blocks all later frames: a corrupted length field may
 require bytes that never arrive. With a timeout, silence after the newest byte ends the wait. After
@@ -29,7 +29,7 @@ _LONGEST: Final = 300
 
 
 class TimeoutFraming(NamedTuple):
-    """A framing with a timeout for incomplete frames, or with removal of escape sequences."""
+    """A framing that adds a timeout for incomplete frames, or removes escape sequences."""
 
     framing: Framing
     timeout_s: float | None
@@ -69,7 +69,7 @@ class _PatientDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the timeout, or the deadline of the framing if earlier."""
+        """Time of the timeout, or the framing's deadline if it is earlier."""
         if self._told:
             return float("-inf")
         own, timeout = self._decoder.deadline, self._framing.timeout_s
@@ -103,7 +103,7 @@ class _PatientDecoder:
         return self._decoder.next(now)
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames and violations that silence until `now` has completed."""
+        """Return the frames and violations completed by silence until `now`."""
         frames = self._decoder.tick(now)
         self._discard(now)
         told, self._told = self._told, []

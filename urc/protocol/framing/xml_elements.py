@@ -19,7 +19,7 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""Terminators of sections without tags, by the first characters of the section."""
+"""Terminators of sections without tags, keyed by the section's first characters."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
@@ -73,7 +73,7 @@ class _XmlDecoder(StreamDecoder):
         self._looked = 0
         """Number of scanned bytes of the current element."""
         self._tag = -1
-        """Offset of an incomplete tag; -1 outside of tags."""
+        """Offset of an incomplete tag; -1 outside tags."""
         self._quote = b""
         self._until = b""
         """Terminator of the current comment, declaration or plain text."""

@@ -1,10 +1,10 @@
 """Alarm states of signals over time.
 
 Callers pass the time, because the module reads no clock. A value equal to the limit causes an
-alarm, and so does an alarm state. The alarm ends when the value is inside the limit by
-``hysteresis``. The key ``for`` delays the alarm until the value has been beyond the limit for this
-time, and ``off_delay`` delays its end. A delayed change happens at `AlarmMonitor.deadline`, even
-without another sample.
+alarm, and so does an alarm state. The alarm ends when the value is within the limit by at least
+``hysteresis``. The key ``for`` delays the alarm until the value has been beyond the limit for that
+time, and ``off_delay`` delays the alarm's end. A delayed change happens at `AlarmMonitor.deadline`,
+even without another sample.
 """
 
 from urc.model.values import Alarm, AlarmLimits, Reading, state_texts
@@ -47,9 +47,9 @@ class AlarmMonitor:
             for word in limits.states
         }
         self._due: dict[Alarm, float] = {}
-        """Start times of pending and active alarms, by crossed level."""
+        """Start times of pending and active alarms, keyed by crossed level."""
         self._ends: dict[Alarm, float] = {}
-        """End times of active alarms whose value is normal again, by level."""
+        """End times of active alarms whose value is normal again, keyed by level."""
         self._begun: frozenset[Alarm] = frozenset()
         """Levels whose alarm has begun."""
 
@@ -61,7 +61,7 @@ class AlarmMonitor:
 
     def update(self, value: Reading, now: float) -> Alarm:
         """Process a new value, and return its alarm."""
-        if value is None:  # not available, so no alarm can be judged
+        if value is None:  # not available, so no alarm can be determined
             self._due.clear()
             self._ends.clear()
             return self.tick(now)

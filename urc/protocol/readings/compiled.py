@@ -56,7 +56,7 @@ def _head_check(prefix: str, encoding: str) -> list[str]:
     """Return source lines that reject most frames without `prefix`.
 
     Frames with leading blanks or non-ASCII bytes pass the generated check, because the decoder may
-    skip blanks, or may report undecodable bytes.
+    skip blanks or report undecodable bytes.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []
@@ -159,5 +159,5 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _skipped(kind: FieldKind, raw: str) -> str:
-    """Return the source text that checks a skipped field, and rejects frames that do not match."""
+    """Return source text that checks a skipped field and rejects non-matching frames."""
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")

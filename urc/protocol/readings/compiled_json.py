@@ -40,7 +40,7 @@ def build_fast_json(
     checks = [of_json_type(values[name].signal.type, raws[name]) for name in names]
     lines += [f"    if not ({' and '.join(checks or ['True'])}):"]
     lines += ["        return careful(v, frame, now)"]
-    # Another structure or an invalid document: the closures tell them apart.
+    # A different structure or an invalid document: the closures determine which.
     otherwise = (DecodeError, UnicodeError, RecursionError)
     scope = {
         "AttributeError": AttributeError,

@@ -57,7 +57,7 @@ def build_fast_struct(
 
 
 def _numbers(items: tuple[Item, ...]) -> list[Item]:
-    """Return the integer items of the outermost level without conversions other than a scale."""
+    """Return the outermost integer items that have no conversion other than a scale."""
     return [
         item
         for item in items

@@ -1,7 +1,7 @@
-"""Shared code of the generated decoders for converting a raw field to a sample.
+"""Code shared by the generated decoders, which converts a raw field to a sample.
 
-Each engine builds the source text for field conversions, checks and samples once. For a
-value of the wrong type or range, the closures (`slow`) read the frame again.
+Each engine builds the source text for field conversions, checks and samples once. If a value has
+the wrong type or is out of range, the closures (`slow`) read the frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,8 +17,8 @@ __all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Compiled = Callable[[Frame, float], "Taken | None"]
-"""Function that returns the samples and the refused values for a frame and the time; None if the
-frame does not match."""
+"""Function that takes a frame and the time. It returns the samples and the refused values, or None
+if the frame does not match."""
 
 _BEGIN: Final = (
     "    payload = frame.payload",
@@ -39,11 +39,11 @@ class Value(NamedTuple):
 
     signal: Signal
     convert: str
-    """Expression over the raw text; "": no conversion."""
+    """Expression using the raw text; "" means no conversion."""
     checks: tuple[str, ...]
-    """Conditions for a valid value, over the value ``{v}``."""
+    """Conditions for a valid value, using the value ``{v}``."""
     raw_checks: tuple[str, ...] = ()
-    """Conditions for a valid value, over the raw text ``{r}``."""
+    """Conditions for a valid value, using the raw text ``{r}``."""
     is_finite: bool = True
     """Whether the value is always finite, or `checks` reject infinity and not-a-number."""
 
@@ -94,7 +94,7 @@ def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
 
 
 def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
-    """Return the source of a scale and offset, with the arithmetic of `values.convert`."""
+    """Return source text for a scale and offset, with the same arithmetic as `values.convert`."""
     if len(coefficients) != 2:
         return None
     offset, scale = coefficients
@@ -103,7 +103,7 @@ def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
         return f"{number} * {scale!r} + {offset!r}" if offset else f"{number} * {scale!r}"
     shift = offset * divisor
     if shift != round(shift):
-        return None  # the closures know whether this is only a rounding error
+        return None  # the closures check whether this is only a rounding error
     return f"({number} + {round(shift)}) / {divisor}" if shift else f"{number} / {divisor}"
 
 

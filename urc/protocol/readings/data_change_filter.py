@@ -1,7 +1,7 @@
-"""Dead band and debounce of samples.
+"""Dead band and debounce filters for samples.
 
-Callers pass the time, because the module reads no clock. The keys ``deadband`` and ``debounce`` of
-a signal declare both filters.
+Callers pass the time, because the module reads no clock. A signal's keys ``deadband`` and
+``debounce`` declare the filters.
 """
 
 from urc.model.values import Reading, Sample, Signal
@@ -42,7 +42,7 @@ class DataChangeFilter:
         return self.tick(now)
 
     def tick(self, now: float) -> Sample | None:
-        """Return the pending sample if the value is stable long enough at `now`, else None."""
+        """Return the pending sample if its value has been stable long enough by `now`, or None."""
         due = self.deadline
         if self._pending is None or due is None or now < due:
             return None

@@ -1,7 +1,8 @@
 """Samples of one engine: conversion of fields, alarms, and computed signals.
 
-Pure: callers pass the time. Each engine has exactly one `Readings` object. A signal has one alarm
-state, even if several frames set the signal. A computed signal uses the newest value of each input.
+The module is pure: callers pass the time. Each engine has exactly one `Readings` object. A signal
+has one alarm state, even if several frames set the signal. A computed signal uses the newest value
+of each input.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +18,7 @@ from urc.protocol.values.decode import Convert, build_converter
 __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
-"""Function that returns, for the fields of a frame and the time, the samples and a message for each
+"""Function that takes a frame's fields and the time. It returns the samples and a message for each
 refused value."""
 
 
@@ -58,7 +59,7 @@ class Readings:
         }
         self._timed = tuple(name for name in self._alarm_monitors if signals[name].limits.is_timed)
         self._last: dict[str, Sample] = {}
-        """Newest samples of formula inputs and of signals in `_timed`, by signal."""
+        """Newest samples of formula inputs and of signals in `_timed`, keyed by signal."""
         self._namespace: dict[str, object] = dict(names)
         self._computed = tuple(self._in_order())
         inputs = (name for one in self._computed for name in one.inputs)
@@ -67,7 +68,7 @@ class Readings:
     def decoder(self, fields: Iterable[str]) -> Decode:
         """Return a function that converts the given fields of a frame to samples.
 
-        Fields with a leading ``_`` in the name are private to the document, and are not converted.
+        Fields whose names start with ``_`` are private to the document and are not converted.
         """
         converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
 
@@ -96,7 +97,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values from another source than a frame, in the same way as fields."""
+        """Convert values that do not come from a frame, in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -109,7 +110,7 @@ class Readings:
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal, so `follow` is needed."""
+        """Return whether a formula or a timed alarm uses the signal, so that `follow` is needed."""
         return name in self._kept
 
     @property
@@ -127,7 +128,7 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return samples that changed by the passage of time until `now`, with their arrival times.
+        """Return samples that time alone has changed by `now`, with their arrival times.
 
         The result contains the newest samples of signals with a new alarm, and debounced samples.
         """

@@ -1,7 +1,7 @@
 """Limits of a command: maximum duration, and transports in use.
 
-Pure. Every wait of an engine has a timeout. The maximum duration of a command is the sum of all
-timeouts in the command.
+Pure. Every wait of an engine has a timeout. The maximum duration of a command is the sum of all its
+timeouts.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
 
     Args:
         spec: transport of the request.
-        reply_s: timeout of the first reply in seconds; None: the default timeout of the transport.
+        reply_s: timeout of the first reply in seconds; None means the transport's default timeout.
     """
     answer_s = spec.timeouts.reply_s if reply_s is None else reply_s
     steps_s = _steps_s(spec.on_connect, lambda step: _step_s(step, spec))
@@ -51,7 +51,7 @@ def longest_s(driver: Driver, name: str) -> float:
 def calm_s(driver: Driver) -> float:
     """Return the minimum delay in seconds from any frame or command to a new deadline, or 0.
 
-    Deadlines come from replies, polls and stale connections. Deadlines of sequences and framing
+    Deadlines result from replies, polls and stale connections. Deadlines of sequences and framing
     timeouts are not considered. The result is 0 if the minimum is unknown.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):

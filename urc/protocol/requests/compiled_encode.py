@@ -2,8 +2,8 @@
 
 A generated encoder handles only the common case, in which every argument is a number of the
 declared type. The closures of `urc.protocol.requests.encode` handle all other cases. Tests compare
-the generated encoders with the closures. Templates of generated encoders may contain only sums,
-products and the filter ``fixed`` over numbers.
+the generated encoders with the closures. Templates of generated encoders may contain only sums and
+products of numbers, and the filter ``fixed``.
 """
 
 import ast
@@ -46,7 +46,7 @@ def build_fast_encode(
     encoding: str,
     slow: Encode,
 ) -> Encode | None:
-    """Return a function from a namespace to bytes; None for an unsupported template."""
+    """Return a function that encodes a namespace to bytes; None for an unsupported template."""
     if type(framing) is not DelimiterFraming or framing.codec is not None:
         return None
     names = sorted(template.names)

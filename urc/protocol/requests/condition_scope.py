@@ -1,6 +1,6 @@
-"""State of the robot as the namespace of conditions.
+"""The robot's state as a namespace for conditions.
 
-Pure. A condition over a signal that is stale or was never received is false.
+Pure. A condition is false if it uses a signal that is stale or was never received.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,7 +21,7 @@ class SignalState:
         self.latched = ""
         """Reason for refusing autonomous motion; "" if motion is allowed."""
         self.stops = 0
-        """Number of stops. A motion request that is older than the last stop is not sent."""
+        """Number of stops. A motion request made before the last stop is not sent."""
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:

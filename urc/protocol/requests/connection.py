@@ -38,33 +38,33 @@ class Connection:
         self.framing: Framing = build_framing(spec.framing)
         self.state: Literal["closed", "opening", "open"] = "closed"
         self.is_ready = False
-        """Whether all requests may be sent; otherwise, only requests of the login and the close may
-        be sent."""
+        """Whether all requests may be sent; otherwise, only login and close requests may be
+        sent."""
         self.last_sent = float("-inf")
         """Time of the last sent frame that resets the robot's watchdog, in seconds."""
         self.counting: frozenset[str] | None = None
-        """Labels of requests that reset the robot's watchdog; None: all requests."""
+        """Labels of requests that reset the robot's watchdog; None means all requests."""
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
-        """Values of private fields that the login has received, by name."""
+        """Values of private fields that the login has received, keyed by name."""
         self.codec: TopicCodec | None = None
-        """Converter of ROS messages in bytes; None on connections without such messages."""
+        """Converter for binary ROS messages; None on connections without binary ROS messages."""
         self.has_motion = False
         """Whether the connection has held commands, which bypass the queue."""
         self._pending_replies = PendingReplies()
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)
         self.held = HoldReplies()
-        """Handler of the replies to held commands."""
+        """Handler for replies to held commands."""
         self.is_behind = False
-        """Whether buffered frames wait for a call of `process_frames`."""
+        """Whether buffered frames are waiting for `process_frames`."""
         self._askers: dict[object, object] = {}
-        """Sequences that made numbered requests, by request number."""
+        """Sequences that made numbered requests, keyed by request number."""
         self._is_leaving = False
         self._misses = 0
         """Number of consecutive missing replies."""
         self._silent_at: float | None = None
-        """Time at which the connection becomes stale; None: not watched, or already stale."""
+        """Time at which the connection becomes stale; None if not watched or already stale."""
 
     @property
     def is_open(self) -> bool:
@@ -189,7 +189,7 @@ class Connection:
         return data
 
     def _unpacked(self, envelope: Envelope, now: float) -> list[LineEvent]:
-        """Process an envelope whose body may be bytes of a ROS message."""
+        """Process an envelope whose body may be a binary ROS message."""
         if self.codec is None:
             return self._envelope(envelope, now)
         found = self.codec.received(envelope)
@@ -204,7 +204,7 @@ class Connection:
         raise NotImplementedError
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send queued requests, if allowed in the current state of the connection."""
+        """Send queued requests if the connection's current state allows it."""
         raise NotImplementedError
 
 

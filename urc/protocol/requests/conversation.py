@@ -1,18 +1,18 @@
 """The conversation on one transport: queued requests, requests in flight, and received frames.
 
-Theory of operation. A connection is closed, opening or open. An open connection is *ready* after
-the steps of ``on_connect`` and until the steps of ``on_close``. A connection that is not ready
-sends only the privileged exchanges of ``on_connect`` and ``on_close``. The session opens persistent
-connections. A per-request conversation requests a connection (`Open`) for each request, and closes
-the connection afterwards (`Close`). The module is pure: callers pass the time.
+Theory of operation. A connection is closed, opening or open. An open connection is *ready* from the
+end of ``on_connect`` until the start of ``on_close``. A connection that is not ready sends only the
+privileged exchanges of ``on_connect`` and ``on_close``. The session opens persistent connections. A
+per-request conversation requests a connection (`Open`) for each request, and closes the connection
+afterwards (`Close`). The module is pure: callers pass the time.
 
-Requests in flight are kept in the order of sending. A received frame is offered to all requests in
-flight, oldest first. A request with a correlation accepts only its own reply. Of the requests
-without a correlation, only the oldest accepts the frame, because replies arrive in order. Real-time
-requests have a separate order of replies. After its timeout, a request is *late*, and stays in
-flight for another reply timeout. A late reply is dropped, because the next request must not accept
-a late reply. Until the late reply arrives or times out, requests with similar replies wait. After
-`MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
+Requests in flight are kept in sending order. A received frame is offered to all requests in flight,
+oldest first. A request with a correlation accepts only its own reply. Of the requests without a
+correlation, only the oldest accepts the frame, because replies arrive in order. Real-time requests
+have a separate reply order. After its timeout, a request is *late*, and stays in flight for another
+reply timeout. A late reply is dropped, because the next request must not accept it. Until the late
+reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
+consecutive missing replies, the connection is closed and reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -64,7 +64,7 @@ class Conversation(Connection):
         self.is_scripted = False
         """Whether a sequence is running that may wait for the next frame."""
         self._free_at = float("-inf")
-        """Earliest time of the next request after the reply to motion."""
+        """Earliest time of the next request after a reply to a motion frame."""
         self._may_recut = False
         """Whether the framing may differ for a pending reply or step."""
         self._number = 0
@@ -100,14 +100,14 @@ class Conversation(Connection):
     # -- motion, whose frames bypass the queue
 
     def motion_must_wait(self, now: float) -> bool:
-        """Return whether a frame of motion must wait for a pending reply."""
+        """Return whether a motion frame must wait for a pending reply."""
         if not self.spec.is_half_duplex:
             return False
         is_owed = any(not one.is_late for one in self._pending_replies)
         return self.held.must_wait(now, is_owed=is_owed)
 
     def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record that a frame of motion was sent with the values `names`."""
+        """Record that a motion frame was sent with the values `names`."""
         self.held.gave(command, names, now)
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
@@ -236,9 +236,9 @@ class Conversation(Connection):
     # -- receiving
 
     def listen(self, expectation: Expectation, now: float) -> list[LineEvent]:
-        """Add an expectation, which may have a separate framing, for frames other than replies.
+        """Add an expectation, which may have its own framing, for frames other than replies.
 
-        Remaining bytes of the connection may be complete frames in the framing of the expectation.
+        The connection's remaining bytes may be complete frames in the expectation's framing.
         """
         self.receiver.listen(expectation)
         if expectation.answer.framing is None:
@@ -440,14 +440,14 @@ class Conversation(Connection):
     def _motion_response(
         self, frame: Frame, attributes: Mapping[str, object], now: float
     ) -> list[LineEvent]:
-        """Return the events of a response envelope to a frame of motion."""
+        """Return the events of a response envelope that answers a motion frame."""
         if attributes.get("ok", True):
             return self._of_motion(frame, now) or []
         reason = str(attributes.get("reason") or "the robot refused")
         return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
 
     def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of a reply to motion; None for other frames."""
+        """Return the events of a reply to a motion frame; None for other frames."""
         owed_until_s = self.held.owed_until_s
         told = self._told_of_motion(frame, now)
         if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
@@ -486,7 +486,7 @@ class Conversation(Connection):
     def _answer(
         self, pending: PendingReply, offer: MatchResult, frame: Frame | None, now: float
     ) -> list[LineEvent]:
-        """Return the events of a frame with the match result `offer` for a request.
+        """Return the events of a frame whose match result for a request is `offer`.
 
         A provisional reply may also be a message. Without `frame`, the frame has already been
         reported as a message.
@@ -558,7 +558,7 @@ class Conversation(Connection):
         return None
 
     def _silent(self, pending: PendingReply, now: float) -> list[LineEvent]:
-        """Treat silence of the robot as a successful reply."""
+        """Treat the robot's silence as a successful reply."""
         if pending.next_stage(now):
             return []
         self._pending_replies.remove(pending)

@@ -1,4 +1,4 @@
-"""Check of command arguments, and their encoding as a frame.
+"""Validation of command arguments, and their encoding as a frame.
 
 Pure. This module checks the arguments from browsers, scripts and tests.
 """
@@ -18,8 +18,7 @@ from urc.protocol.values.payload import CodecContext, NotWritable
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
 Encode = Callable[[Mapping[str, object]], Payload]
-"""Function that encodes a namespace to bytes including framing, or to an envelope, or raises
-`BadArgument`."""
+"""Function that encodes a namespace to framed bytes or an envelope, or raises `BadArgument`."""
 
 _LARGEST = 1e308
 """Maximum finite value. A comparison with this value also rejects infinity and not-a-number."""
@@ -37,7 +36,7 @@ def build_encode(
 ) -> Encode:
     """Return a function that encodes and frames `send`; constant frames are encoded once.
 
-    The frames of a group are joined, so all frames of the group are sent together.
+    A group's frames are joined, so that they are sent together.
     """
     if send.form == "frames":
         return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])

@@ -1,8 +1,8 @@
-"""Requests and their execution, from submission to outcome.
+"""Requests, and their execution from submission to outcome.
 
 Pure. A `CompiledRequest` is a declared request in compiled form. An `Exchange` is one execution of
-a request, from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply`
-describes the expected reply.
+a request, from queue to outcome. `urc.protocol.requests.reply_match.CompiledReply` describes the
+expected reply.
 """
 
 import re
@@ -64,10 +64,10 @@ class CompiledRequest(NamedTuple):
     """Label of the request in messages: the name of the command, or ``polls.0``."""
     encode: Encode
     answers: tuple[CompiledReply, ...] = ()
-    """Expected replies, one for each stage; (): no reply."""
+    """Expected replies, one for each stage; () means no reply."""
     match: Template | None = None
     framing: Framing | None = None
-    """Framing of the replies; None: the framing of the connection."""
+    """Framing of the replies; None means the connection's framing."""
     rank: int = 2
     is_latest_only: bool = False
     bucket: GcraLimiter | None = None
@@ -100,7 +100,7 @@ class CompiledRequest(NamedTuple):
     """Whether the request is an envelope with a number that the reply repeats."""
 
     def render(self, names: Mapping[str, object]) -> Payload | None:
-        """Return the payload; None if the payload must be rendered at the time of sending.
+        """Return the payload; None if it must be rendered when it is sent.
 
         Raises:
             BadArgument: the payload cannot be encoded with `names`.
@@ -132,7 +132,7 @@ class Exchange:
 
     # Rarely set attributes are class attributes, because every command makes an instance.
     numbers: Mapping[str, int] = NOTHING
-    """Numbers in the last rendered frame, by counter."""
+    """Numbers in the last rendered frame, keyed by counter."""
     is_privileged = False
     """Whether the request belongs to the login or the close, and may be sent before the connection
     is ready."""
@@ -159,9 +159,9 @@ class Exchange:
         self.ask = ask
         self.owner = owner
         self.namespace = namespace
-        """Values for the templates by name, without counters."""
+        """Values for the templates, keyed by name, without counters."""
         self.data = data
-        """Rendered payload; None: the payload is rendered at the time of sending
+        """Rendered payload; None means that the payload is rendered when it is sent
         (`CompiledRequest.render`)."""
         self.gives_up_at = gives_up_at
         """Time at which a queued request fails, in seconds."""
@@ -187,7 +187,7 @@ class Exchange:
         return self
 
     def why_not(self, now: float) -> str:
-        """Return the reason why the request must not be sent, or ""."""
+        """Return the reason not to send the request, or ""."""
         unwanted = self.unless() if self.unless is not None else ""
         return unwanted or (self.condition(now) if self.condition is not None else "")
 
@@ -198,7 +198,7 @@ class Exchange:
 
     @property
     def latest_key(self) -> str:
-        """Label of requests that replace each other in the queue; "": no replacement."""
+        """Label of requests that replace each other in the queue; "" means no replacement."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
@@ -249,5 +249,5 @@ class ReplySink:
 
 
 def expires_at(ask: CompiledRequest, now: float) -> float:
-    """Return the time at which a new request fails if the request is still queued."""
+    """Return the time at which a new request fails if it is still queued."""
     return now + ask.queue_s

@@ -1,4 +1,4 @@
-"""Received frames of one connection, except for replies to requests.
+"""Received frames of one connection, except replies to requests.
 
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
@@ -40,7 +40,7 @@ so the whole message is hidden."""
 
 
 class SentSecrets:
-    """Secrets that were sent on a connection, for redaction if the robot echoes a secret."""
+    """Secrets sent on a connection, for redaction if the robot echoes them."""
 
     __slots__ = ("_texts",)
 
@@ -54,7 +54,7 @@ class SentSecrets:
             self._texts.append(text)
 
     def hide(self, text: str) -> str:
-        """Return a message with redacted secrets."""
+        """Return a message with secrets redacted."""
         for secret in self._texts:
             if secret in text:
                 text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN
@@ -64,7 +64,7 @@ class SentSecrets:
 new = tuple.__new__
 """Fast constructor of named tuples, used for every frame."""
 _SHOWN_BYTES = 20
-"""Number of bytes of an unknown frame in a message."""
+"""Number of bytes of an unknown frame to include in a message."""
 _NO_MATCH = "nothing declared matches "
 
 
@@ -86,14 +86,13 @@ class FrameReceiver:
         self._expectations: list[Expectation] = []
         self._prompt: tuple[Pattern, Expectation] | None = None
         self.is_listening = False
-        """Whether an expectation waits for a frame or a prompt."""
+        """Whether an expectation is waiting for a frame or a prompt."""
         self._stray: tuple[float, str] = (float("-inf"), "")
 
     def reset(self, *, is_new: bool) -> None:
         """Clear the received data and all expectations of a connection.
 
-        Secrets are kept until the next connection, because late messages may still contain a
-        secret.
+        Secrets are kept until the next connection, because late messages may still contain them.
         """
         self._stream = ReceiveBuffer()
         self._cut(self._framing)
@@ -137,7 +136,7 @@ class FrameReceiver:
 
         Args:
             since: start time of the wait, in seconds.
-            instead: explanation why the frame is unexpected, such as "no answer to home".
+            instead: reason why the frame is unexpected, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -152,7 +151,7 @@ class FrameReceiver:
 
     @property
     def framing(self) -> Framing | None:
-        """Framing of the expectations; None: the framing of the connection."""
+        """Framing of the expectations; None means the connection's framing."""
         return next(
             (
                 expectation.answer.framing
@@ -177,7 +176,7 @@ class FrameReceiver:
 
     @property
     def is_prompted(self) -> bool:
-        """Whether an expectation waits for a prompt."""
+        """Whether an expectation is waiting for a prompt."""
         return self._prompt is not None
 
     def find_prompt(self) -> list[LineEvent]:
@@ -225,7 +224,7 @@ class FrameReceiver:
         Args:
             asker: the sequence that made the request; only this sequence receives the reply.
             frame: the reply.
-            refusal: the robot's refusal as text; "": no refusal.
+            refusal: the robot's refusal as text; "" means no refusal.
             now: current time, in seconds.
         """
         expectation = next((one for one in self._expectations if one.owner is asker), None)
@@ -270,8 +269,7 @@ class FrameReceiver:
     def events_of(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
         """Return the events for samples and refused values.
 
-        A valid frame without values also causes an event, because the frame shows that the robot is
-        alive.
+        A valid frame without values also causes an event, because it shows that the robot is alive.
         """
         if not refused and not self.replies:
             return [new(Samples, (self._name, tuple(samples)))]

@@ -1,12 +1,12 @@
-"""Replies to frames of motion: acknowledgements and refusals.
+"""Replies to motion frames: acknowledgements and refusals.
 
-Pure. Frames of motion bypass the queue of the connection, and have no `PendingReply`. This module
-handles robots that reply to each frame: an acknowledgement is expected, and a refusal ends the
-motion. An unsolicited refusal, for example because of an open safety guard, also ends the motion.
+Pure. Motion frames bypass the connection's queue and have no `PendingReply`. This module handles
+robots that reply to each frame. An acknowledgement is expected, and a refusal ends the motion. An
+unsolicited refusal, for example because of an open safety guard, also ends the motion.
 
-In half duplex, frames of motion wait for a pending reply, and queued requests wait for replies to
-motion. The wait for a reply to motion is short, because a lost reply must not prevent motion. A
-stop never waits for replies.
+In half-duplex mode, motion frames wait for a pending reply, and queued requests wait for replies to
+motion frames. The wait for a reply to a motion frame is short, because a lost reply must not
+prevent motion. A stop never waits for replies.
 
 A held command expects replies from its first frame until the reply timeout of the newest frame.
 """
@@ -22,7 +22,7 @@ from urc.protocol.values.wire_text import WireText
 __all__ = ["LONGEST_WAIT_S", "HoldReplies", "HoldRejected"]
 
 LONGEST_WAIT_S: Final = 0.1
-"""Maximum wait for a pending reply in half duplex, in seconds."""
+"""Maximum wait for a pending reply in half-duplex mode, in seconds."""
 _NOTHING: Mapping[str, object] = {}
 
 
@@ -40,7 +40,7 @@ class _Listening:
 
     def __init__(self, answer: CompiledReply, match: Template | None) -> None:
         self.expectation = Expectation(answer)
-        # Many frames are pending, so a number cannot be assigned to one of them: any number
+        # Many frames are pending, so a number cannot be assigned to a specific frame. Any number
         # matches.
         self._match = None if match is None or "seq" in match.names else match
         self.names = _NOTHING
@@ -67,7 +67,7 @@ class HoldReplies:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """Time until which a reply to motion is pending, in seconds."""
+        """Time until which a reply to a motion frame is pending, in seconds."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:
@@ -91,7 +91,7 @@ class HoldReplies:
             one.until_s = float("-inf")
 
     def must_wait(self, now: float, *, is_owed: bool) -> bool:
-        """Return whether a frame of motion must wait in half duplex.
+        """Return whether a motion frame must wait in half-duplex mode.
 
         Args:
             now: current time, in seconds.
@@ -108,7 +108,7 @@ class HoldReplies:
         return False
 
     def is_listening(self, now: float) -> bool:
-        """Return whether a reply to a frame of motion may still arrive."""
+        """Return whether a reply to a motion frame may still arrive."""
         return now < self._until_s
 
     def refusals(self, frame: Frame, now: float) -> list[HoldRejected]:
@@ -130,7 +130,7 @@ class HoldReplies:
         return self.refusals(frame, now) or plain
 
     def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
-        """Return the match result of an acknowledgement of motion; None for other frames."""
+        """Return the match result of a motion acknowledgement; None for other frames."""
         for _, one in self._listening(now):
             offer = one.expectation.offer(frame, one.is_mine)
             if offer is not None:

@@ -1,4 +1,4 @@
-"""Additional effects of messages: collecting values from several frames, and acknowledgements.
+"""Additional effects of messages: collecting values from several frames, and acknowledging frames.
 
 Pure. Collecting and acknowledging are part of the conversion from fields to samples, so both occur
 exactly once per message. Incomplete collected values are discarded when the connection is lost.
@@ -115,7 +115,7 @@ def answering(
         names: function that returns the namespace for a time and fields.
         counters: function that returns the connection's counters; None for a frame without
             counters.
-        replies: pending acknowledgements; the new acknowledgement is added to this list.
+        replies: list of pending acknowledgements, to which the new acknowledgement is added.
         decode: function that converts the fields to samples.
     """
 

@@ -1,6 +1,6 @@
 """Declared messages of one connection. Pure.
 
-A frame belongs to the first declared message that matches the frame.
+A frame belongs to the first declared message that matches it.
 """
 
 from collections.abc import Sequence

@@ -51,17 +51,17 @@ class PendingReply:
         another request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
-        """Number of the request that the reply repeats; None: the reply has no number."""
+        """Number of the request that the reply repeats; None means that the reply has no number."""
 
     @property
     def expectation(self) -> Expectation:
-        """Expectation of the current reply, created on demand."""
+        """Expectation for the current reply, created on demand."""
         if self._expectation is None:
             self._expectation = Expectation(self.exchange.ask.answers[self.stage])
         return self._expectation
 
     def answer(self, frame: Frame) -> MatchResult:
-        """Return the match result of a frame with the number of this request."""
+        """Return the match result of a frame that has this request's number."""
         offer = self.expectation.offer(frame)
         if offer is None:
             return MatchResult(refusal=f"the reply does not match the declaration: {shown(frame)}")
@@ -73,7 +73,7 @@ class PendingReply:
         return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
-        """Return the match result of a frame; None for a frame of another request.
+        """Return the match result of a frame; None if the frame answers another request.
 
         With `is_message`, only provisional and error replies can match.
         """
@@ -134,7 +134,7 @@ class PendingReply:
 
 
 class PendingReplies(list[PendingReply]):
-    """Pending transmissions in the order of sending.
+    """Pending transmissions, in sending order.
 
     Late transmissions stay until their deadline.
     """
@@ -149,7 +149,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def waiting(self) -> int:
-        """Number of pending replies, without real-time requests."""
+        """Number of pending replies, excluding real-time requests."""
         return sum(
             1 for pending in self if not pending.is_late and not pending.exchange.is_realtime
         )
@@ -161,13 +161,13 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the first timeout of all pending replies; None without a pending reply."""
+        """Time of the earliest timeout of all pending replies; None without a pending reply."""
         if len(self) == 1:
             return self[0].due
         return min((pending.due for pending in self), default=None)
 
     def may_confuse(self, exchange: Exchange) -> bool:
-        """Return whether a late reply could be mistaken for the reply to this request.
+        """Return whether a late reply could be mistaken for this request's reply.
 
         A late reply to an earlier transmission of the same request is acceptable.
         """
@@ -182,19 +182,19 @@ class PendingReplies(list[PendingReply]):
         )
 
     def again(self, exchange: Exchange) -> PendingReply | None:
-        """Return the pending transmission of `exchange`; None if there is no such transmission."""
+        """Return the pending transmission of `exchange`, or None."""
         return next((one for one in self if one.exchange is exchange and not one.is_late), None)
 
     def has(self, label: str) -> bool:
-        """Return whether a request with this label waits for a reply."""
+        """Return whether a request with this label is waiting for a reply."""
         return any(pending.exchange.ask.label == label and not pending.is_late for pending in self)
 
     def overdue(self, now: float) -> list[PendingReply]:
-        """Return the transmissions with an expired timeout."""
+        """Return the transmissions whose timeout has expired."""
         return [pending for pending in self if pending.due <= now] if self else []
 
     def framing(self) -> Framing | None:
-        """Return the framing that a pending reply declares; None without such a reply."""
+        """Return the framing declared by a pending reply, or None."""
         for pending in self:
             if pending.exchange.ask.framing is not None:
                 return pending.exchange.ask.framing

@@ -43,7 +43,7 @@ class GcraLimiter:
 
 
 Stand = tuple[tuple[str, int], ...]
-"""Last numbers of all counters, as pairs of name and number, sorted by name."""
+"""Last number of each counter, as pairs of name and number, sorted by name."""
 Made = dict[Stand, Numbered]
 
 
@@ -55,7 +55,7 @@ class FrameCounters:
     def __init__(self, last: Mapping[str, int]) -> None:
         self._last = last
         self.values: dict[str, int] = {}
-        """Numbers in the frame, by counter."""
+        """Numbers in the frame, keyed by counter."""
 
     def __call__(self, name: str, low: int, high: int) -> int:
         """Return the next number of a counter, which restarts at `low` after `high`."""
@@ -66,7 +66,7 @@ class FrameCounters:
 
     @property
     def count(self) -> Count:
-        """Effect of the frame on the counters of the connection."""
+        """The frame's effect on the connection's counters."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 
@@ -83,15 +83,15 @@ class Counters:
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """Last numbers after the transmission of all pending frames, by counter."""
+        """Last numbers after the transmission of all pending frames, keyed by counter."""
         self._known: Mapping[str, int] = {}
-        """Last confirmed numbers of the counters, by counter."""
+        """Last confirmed number of each counter."""
         self.ahead = 0
         """Number of frames counted since the last confirmation."""
         self.is_shared = False
 
     def draw(self) -> FrameCounters:
-        """Return the numbers of the next frame, without counting the frame."""
+        """Return the next frame's numbers without counting the frame."""
         return FrameCounters(self._last)
 
     def draw_urgent(self) -> FrameCounters:
@@ -112,7 +112,7 @@ class Counters:
         """Update shared counters with confirmed values.
 
         Args:
-            stand: last transmitted number, by counter.
+            stand: last transmitted number of each counter.
             is_settled: whether all counted frames have been transmitted.
         """
         self._known = dict(stand)
@@ -127,7 +127,7 @@ class Counters:
         Args:
             encode: function that renders a frame with the given numbers.
             length: number of frames to render.
-            made: cache of rendered frames; the frames of this series are added to the cache.
+            made: cache of rendered frames, to which the frames of this series are added.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):
@@ -168,7 +168,7 @@ class Prioritized(Protocol):
 
     @property
     def latest_key(self) -> str:
-        """Key of requests that replace each other; "": no replacement."""
+        """Key of requests that replace each other; "" means no replacement."""
 
 
 Item = TypeVar("Item", bound=Prioritized)
@@ -199,7 +199,7 @@ class PriorityQueue(list[Item]):
         return crowded_out
 
     def put_back(self, item: Item) -> None:
-        """Add a request for a retry, before other requests of equal rank."""
+        """Add a request to retry, ahead of other requests of equal rank."""
         insort_left(self, item, key=_rank)
 
     def drain(self) -> list[Item]:

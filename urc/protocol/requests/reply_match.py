@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 Fields = Mapping[str, object]
-"""Raw values of a frame's fields, by name."""
+"""Raw values of a frame's fields, keyed by name."""
 
 _MOST_COLLECTED: Final = 1 << 20
 """Maximum size of a multi-frame reply, in bytes."""
@@ -57,15 +57,15 @@ class Matcher:
         self.reader = reader
         self.decode = decode
         self.take: Compiled = compiled or self._take
-        """Function that returns the samples and refused values of a frame; None for a frame that
-        does not match."""
+        """Function that returns the samples and refused values of a frame; None if the frame does
+        not match."""
 
     def _take(self, frame: Frame, now: float) -> Taken | None:
         found = self.read(frame)
         return None if found is None else self.decode(found, now)
 
     def read(self, frame: Frame) -> Fields | None:
-        """Return the fields; None for a frame that does not match, or undecodable text."""
+        """Return the fields; None if the frame does not match or has undecodable text."""
         try:
             return self.reader.read(frame)
         except BadItem as error:
@@ -84,7 +84,7 @@ class CompiledReply(NamedTuple):
     faults: tuple[tuple[Matcher, Template | None], ...] = ()
     lines: int | Pattern | None = None
     framing: Framing | None = None
-    """Framing of the stream while a step waits; None: the framing of the connection or the
+    """Framing of the stream while a step waits; None means the framing of the connection or the
     request."""
     asides: tuple[tuple[Aside, Matcher], ...] = ()
     """Provisional replies, as pairs of kind and matcher."""
@@ -93,7 +93,7 @@ class CompiledReply(NamedTuple):
     is_silence: bool = False
     """Whether silence until the reply timeout counts as success."""
     takes_redirects: bool = False
-    """Whether the reply declares the target of a redirect as a field, so a redirect is not a
+    """Whether the reply declares the redirect target as a field, so that a redirect is not a
     failure."""
 
 
@@ -103,13 +103,13 @@ class MatchResult(NamedTuple):
     fields: Fields | None = None
     """Fields of a complete reply; None for an incomplete reply or a refusal."""
     refusal: str = ""
-    """The robot's refusal, as a message for people; "": no refusal."""
+    """The robot's refusal, as a human-readable message; "" means no refusal."""
     told: tuple[Matcher, Fields] | None = None
-    """Matcher and fields of a provisional or error reply, to update signals."""
+    """Matcher and fields of a provisional or error reply, for updating signals."""
     aside: Aside | None = None
     """Kind of the provisional reply; None for other frames."""
     dropped: str = ""
-    """Report of dropped lines, as a message for people; "": no dropped lines."""
+    """Report of dropped lines, as a human-readable message; "" means no dropped lines."""
 
 
 _MORE: Final = MatchResult()
@@ -226,7 +226,7 @@ def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:
 
 
 def _lacks(text: Template | None, fields: Fields) -> bool:
-    """Return whether the error text needs fields that the frame lacks."""
+    """Return whether the error text requires fields that the frame lacks."""
     return text is not None and not text.names <= {*fields, "settings"}
 
 
@@ -240,7 +240,7 @@ def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
 
 
 def shown(frame: Frame) -> str:
-    """Return the text or the first bytes of a frame, for messages to people."""
+    """Return the text or the first bytes of a frame, for human-readable messages."""
     try:
         return quoted(frame.text, most=80)
     except BadText:

@@ -65,7 +65,7 @@ class RequestCompiler:
             self.lines[name].codec = self._codec(spec)
 
     def _codec(self, spec: TransportSpec) -> TopicCodec | None:
-        """Return the codec of a connection that may carry ROS messages in bytes."""
+        """Return the codec for a connection that may carry binary ROS messages."""
         if spec.type != "ros" or spec.options.get("via", "rosbridge") == "rosbridge":
             return None
         paths = paths_by_topic(self._driver, spec.name, self._readings.settings)
@@ -78,7 +78,7 @@ class RequestCompiler:
         matchers: list[Matcher],
         context: CodecContext,
     ) -> None:
-        """Wrap the matchers of messages with acknowledgements or collected values."""
+        """Wrap the matchers of messages that have acknowledgements or collected values."""
         replies, kept = Acknowledgements(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
@@ -98,7 +98,7 @@ class RequestCompiler:
         line.receiver.replies, line.receiver.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the namespace of an acknowledgement: fields, signals and fields from the login."""
+        """Return the namespace of an acknowledgement: fields, signals and login fields."""
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> CompiledRequest:
@@ -128,7 +128,7 @@ class RequestCompiler:
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
         """Return the compiled request of a step.
 
-        Requests of steps have normal rank, and therefore keep the order of the steps.
+        Step requests have normal rank and therefore keep the order of the steps.
         """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 

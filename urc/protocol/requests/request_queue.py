@@ -18,7 +18,7 @@ __all__ = ["RequestQueue", "render_retry", "rendered_size", "written"]
 
 
 class RequestQueue(PriorityQueue[Exchange]):
-    """The request queue of one connection, with a minimum gap and a limit of requests in flight."""
+    """The request queue of one connection, with a minimum gap and a limit on requests in flight."""
 
     __slots__ = ("_limit", "_pending_replies", "_spec", "next_send", "size_of")
 
@@ -89,7 +89,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
-        """Return whether a queued request waits only for a connection."""
+        """Return whether a queued request is waiting only for a connection."""
         return any(_free_at(exchange) <= now for exchange in self)
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
@@ -114,7 +114,7 @@ class RequestQueue(PriorityQueue[Exchange]):
 
 
 def _free_at(exchange: Exchange) -> float:
-    """Return the earliest time for sending, according to the rate limit and the retry delay."""
+    """Return the earliest send time that the rate limit and the retry delay allow."""
     bucket = exchange.ask.bucket
     return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
@@ -123,13 +123,12 @@ def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]
     """Render a frame with the next counter numbers; a retry keeps the numbers.
 
     Args:
-        exchange: request that must be rendered at the time of sending.
+        exchange: request that must be rendered when it is sent.
         counters: counters of the connection.
-        learnt: values that the login has read, by name.
+        learnt: values that the login has read, keyed by name.
 
     Raises:
-        BadArgument: the frame cannot be encoded; the counter numbers of the frame are not used
-            again.
+        BadArgument: the frame cannot be encoded; its counter numbers are not used again.
     """
     draw = counters.draw()
     count = Count({}, {})

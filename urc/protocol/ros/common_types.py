@@ -1,6 +1,6 @@
-"""Types of the ROS common interfaces that drivers publish most.
+"""Types from the ROS common interfaces that drivers publish most often.
 
-A robot sends the definitions of the types that it publishes, but not of the types that it only
+A robot sends the definitions of the types that it publishes, but not of types that it only
 receives. Messages of other types are sent as JSON (`urc.protocol.ros.topic_codec`).
 
 Sources: common_interfaces, rcl_interfaces, unique_identifier_msgs and common_msgs, as of ROS 2
@@ -104,7 +104,7 @@ _ROS1: Final[Mapping[str, tuple[MessageField, ...]]] = {
         MessageField("time_from_start", "duration"),
     ),
 }
-"""Types with other fields in ROS 1."""
+"""Types whose fields differ in ROS 1."""
 
 
 @cache

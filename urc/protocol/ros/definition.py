@@ -2,7 +2,7 @@
 
 Pure. A robot sends the definition of each type as text (`urc.protocol.ros.msg_text`,
 `urc.protocol.ros.idl_text`). `layout_of` expands a definition to a tree of layouts, without type
-names. Definitions are data from outside, so size and depth are limited.
+names. Definitions are untrusted input, so their size and depth are limited.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ MAX_FIXED: Final = 1_000_000
 
 
 class BadDefinition(UrcError):
-    """A definition that cannot be read; the message names the line or the type."""
+    """An unreadable definition; the error message names the line or the type."""
 
 
 class MessageField(NamedTuple):
@@ -56,7 +56,7 @@ class MessageField(NamedTuple):
     default: object = None
     """Default value; None for zero or empty."""
     bound: int | None = None
-    """Maximum length of a sequence; None: unlimited."""
+    """Maximum length of a sequence; None means unlimited."""
 
 
 class Definition(NamedTuple):
@@ -76,26 +76,26 @@ CODES: Final[Mapping[str, str]] = {
     "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
     "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
-"""Code of the module `struct`, by primitive type."""
+"""Format code of the module `struct`, keyed by primitive type."""
 SIZES: Final[Mapping[str, int]] = {
     "?": 1, "b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8,
 }  # fmt: skip
-"""Size in bytes, by code."""
+"""Size in bytes, keyed by format code."""
 BYTE_CODES: Final = "B"
-"""Code of numbers whose arrays are bytes, as in images."""
+"""Format code of numbers whose arrays are bytes, as in images."""
 TIME_TYPES: Final = frozenset(("builtin_interfaces/Time", "time"))
-"""Types of a point in time, in which a message may contain the text ``now``."""
+"""Types of a point in time, for which a message may contain the text ``now``."""
 
 
 class Primitive(NamedTuple):
-    """A number or a truth value, with its code of the module `struct`."""
+    """A number or a boolean, with its format code of the module `struct`."""
 
     code: str
     default: object = None
 
 
 class Text(NamedTuple):
-    """A string; `is_wide` for UTF-16."""
+    """A string, in UTF-16 if `is_wide` is true."""
 
     is_wide: bool = False
     default: object = None
@@ -128,7 +128,7 @@ _STANDARD: Final = {
     "time": (MessageField("secs", "uint32"), MessageField("nsecs", "uint32")),
     "duration": (MessageField("secs", "int32"), MessageField("nsecs", "int32")),
 }
-"""Types that a text may use without their definition: the times of ROS 2 and of ROS 1."""
+"""Types that a text can use without a definition: the time types of ROS 2 and ROS 1."""
 _PADDING: Final = (("structure_needs_at_least_one_member", Primitive("B")),)
 """The only field of an empty type in ROS 2, according to rosidl."""
 
@@ -144,7 +144,7 @@ def layout_of(name: str, definitions: Definitions, *, is_ros1: bool = False) -> 
 
     Args:
         name: type name in any form.
-        definitions: definitions of the type and of all types inside.
+        definitions: definitions of the type and of all nested types.
         is_ros1: whether empty types take no space.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Definitions in the text of ``.idl`` files, as robots send them (``ros2idl``).
+"""Definitions in ``.idl`` text, as sent by robots (``ros2idl``).
 
 Pure. The module reads the subset of OMG IDL 4.2 that rosidl uses: modules, structures, typedefs,
 constants, enumerations and annotations.
@@ -40,7 +40,7 @@ _PRIMITIVES: Final = {
 
 
 def parse_idl(name: str, text: str) -> Definitions:
-    """Return the definitions in a text of ``.idl`` files.
+    """Return the definitions in ``.idl`` text.
 
     Args:
         name: name of the main type, in any form.
@@ -57,7 +57,7 @@ def parse_idl(name: str, text: str) -> Definitions:
 
 
 class _Type:
-    """A type reference before its use in a field."""
+    """A parsed type reference that no field uses yet."""
 
     __slots__ = ("bound", "length", "name")
 
@@ -110,7 +110,7 @@ class _Parser:
         return word
 
     def _skip(self, *ends: str) -> list[str]:
-        """Return the tokens up to one of the signs `ends`, outside brackets."""
+        """Return the tokens up to the first of the signs `ends` outside brackets."""
         depth, start = 0, self._at
         while depth or self._peek() not in ends:
             word = self._take()

@@ -1,8 +1,8 @@
-"""Definitions in the text of ``.msg`` files, as robots send them (``ros2msg``, ``ros1msg``).
+"""Definitions in ``.msg`` text, as sent by robots (``ros2msg``, ``ros1msg``).
 
-Pure. The text has one definition per type. The first definition has no name; a line of ``=`` and
-a line ``MSG: pkg/Type`` precede each further definition. The grammar is that of the ROS 2 page
-“Interfaces” and of the ROS 1 page “msg”.
+Pure. The text contains one definition per type. The first definition has no name. Each further
+definition follows a line of ``=`` and a line ``MSG: pkg/Type``. The grammar follows the ROS 2 page
+“Interfaces” and the ROS 1 page “msg”.
 """
 
 import re
@@ -34,10 +34,10 @@ def split_types(name: str, text: str, mark: str) -> list[tuple[str, str]]:
     Args:
         name: name of the first type.
         text: text of all types.
-        mark: word before the name of a further type, such as ``MSG:``.
+        mark: word before the name of each further type, such as ``MSG:``.
 
     Raises:
-        BadDefinition: the text is too long, or has too many types.
+        BadDefinition: the text is too long or contains too many types.
     """
     if len(text) > MAX_TEXT:
         raise BadDefinition(f"the definition of {name} has more than {MAX_TEXT} characters")
@@ -62,7 +62,7 @@ def split_types(name: str, text: str, mark: str) -> list[tuple[str, str]]:
 
 
 def parse_msg(name: str, text: str) -> Definitions:
-    """Return the definitions in a text of ``.msg`` files.
+    """Return the definitions in ``.msg`` text.
 
     Args:
         name: name of the first type, in any form.
@@ -123,7 +123,7 @@ def _default(word: str, text: str, length: int | None, owner: str) -> object:
 
 
 def _value(word: str, text: str, owner: str) -> object:
-    """Return a literal of the primitive type `word`."""
+    """Return the value of a literal of the primitive type `word`."""
     if word in ("string", "wstring"):
         quote = text[:1]
         end = text.find(quote, 1) if quote in ("'", '"') else -1

@@ -1,16 +1,16 @@
-"""Generated functions that read messages in CDR (ROS 2) and in the format of ROS 1.
+"""Generated functions that read messages in CDR (ROS 2) and in the ROS 1 format.
 
-Theory of operation. The source is generated once for a layout, a byte order and the wanted parts.
-Consecutive fields of fixed size become one *run*, which a single `struct.Struct` unpacks or skips.
-CDR aligns each number to its size, relative to the end of the four-byte header. The generator
-therefore tracks the offset modulo a power of two. After a string, the offset is unknown, and the
-next number is aligned at run time. Numbers that are not finite become None, as in JSON from
-rosbridge. Data comes from outside: every length is compared with the remaining bytes before use,
-and the number of elements is limited.
+Theory of operation. The source is generated once for each combination of layout, byte order and
+wanted parts. Consecutive fields of fixed size become one *run*, which a single `struct.Struct`
+unpacks or skips. CDR aligns each number to its size, relative to the end of the four-byte header.
+The generator therefore tracks the offset modulo a power of two. After a string, the offset is
+unknown, and the next number is aligned at run time. Non-finite numbers become None, as in JSON from
+rosbridge. The data is untrusted. Every length is compared with the remaining bytes before use, and
+the number of elements is limited.
 
 Sources: OMG CDR (formal/02-06-51); DDS-XTypes 1.3, section 7.4 (encapsulation identifiers).
-Wide strings are those of rosidl_typesupport_fastrtps_cpp: a count, and four bytes for each unit of
-UTF-16.
+Wide strings follow rosidl_typesupport_fastrtps_cpp: a count, then four bytes for each UTF-16 code
+unit.
 """
 
 import struct
@@ -27,7 +27,7 @@ __all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
 MAX_ELEMENTS: Final = 200_000
 """Maximum number of texts and nested messages in the arrays of one message. An element takes a few
-bytes in a message, but some hundred in memory."""
+bytes in a message, but a hundred or more in memory."""
 MAX_NUMBERS: Final = 4_000_000
 """Maximum number of numbers in one array."""
 _HEADER: Final = 4
@@ -37,7 +37,7 @@ Read = Callable[[bytes], dict[str, Any]]
 
 
 class BadRosMessage(ValueError):
-    """A message that does not fit its definition."""
+    """A message that does not match its definition."""
 
 
 def build_read(
@@ -45,14 +45,14 @@ def build_read(
 ) -> Read:
     """Return a function that reads the wanted parts of a message.
 
-    The function may raise any error for an invalid message; call it by `read_safely`.
+    The function may raise any error for an invalid message; call it through `read_safely`.
 
     Args:
         layout: layout of the message.
         wanted: parts to read.
-        order: byte order, as in the module `struct`.
-        is_ros1: whether the message is in the format of ROS 1: without header and alignment.
-        widest: largest alignment in bytes: 8 in XCDR1, 4 in XCDR2.
+        order: byte order in the notation of the module `struct`.
+        is_ros1: whether the message is in the ROS 1 format, without header and alignment.
+        widest: largest alignment, in bytes (8 in XCDR1, 4 in XCDR2).
 
     Raises:
         BadDefinition: the layout is nested too deeply for a generated function.
@@ -82,7 +82,7 @@ def _finite(value: float) -> float | None:
 
 
 def _all_finite(values: list[Any]) -> list[Any]:
-    """Replace numbers that are not finite by None."""
+    """Replace non-finite numbers with None."""
     total = sum(values)
     if total - total == 0:
         return values
@@ -97,7 +97,7 @@ def _numbers(code: str, data: bytes, is_swapped: bool) -> list[Any]:
 
 
 def _wide(data: bytes, order: str) -> str:
-    """Return the text of a wide string, with four bytes for each unit of UTF-16."""
+    """Return the text of a wide string, which has four bytes for each UTF-16 code unit."""
     units = struct.unpack(f"{order}{len(data) // 4}I", data)
     return b"".join(struct.pack("<H", unit & 0xFFFF) for unit in units).decode(
         "utf-16-le", "replace"
@@ -112,7 +112,7 @@ _SCOPE: Final[dict[str, Any]] = {
 
 
 class _Generator:
-    """A generator of source text; one instance makes one function."""
+    """A generator of source text; each instance creates one function."""
 
     def __init__(self, order: str, is_ros1: bool, widest: int) -> None:
         self._order = order
@@ -131,7 +131,7 @@ class _Generator:
         self._size = 0
         """Size of the current run in bytes."""
         self._modulus, self._rest = 8, 0
-        """The offset at the end of the run has the remainder `_rest` modulo `_modulus`."""
+        """The offset at the end of the run, modulo `_modulus`, equals `_rest`."""
         self._has_room = False
 
     def function(self, layout: Record, wanted: Wanted) -> Read:
@@ -339,7 +339,7 @@ class _Generator:
         self._emit(f"{name} = all_finite({taken})" if code in "fd" else f"{name} = {taken}")
 
     def _stride(self, element: Record, wanted: Wanted) -> int | None:
-        """Return the constant distance of two elements of an array; None if it varies."""
+        """Return the constant distance between consecutive array elements; None if it varies."""
         sizes = list(_sizes(element))
         if not sizes or any(one is None or (wanted and one[1] > 1) for one in sizes):
             return None
@@ -377,7 +377,7 @@ class _Generator:
         return name
 
     def _records(self, element: Layout, stride: int, count: str, wanted: Wanted, name: str) -> None:
-        """Read consecutive elements of constant size with one generator of `struct`."""
+        """Read consecutive elements of constant size with one `struct` iterator."""
         with self._block(f"if {count} > (end - p) // {stride}:"):
             self._emit("bad('an array is longer than its message')")
         if wanted:
@@ -427,13 +427,13 @@ class _Generator:
 
 
 def _with_check(value: str, name: str) -> str:
-    """Return the expression of a record in which the number `name` becomes None if not finite."""
+    """Return a record expression in which the number `name` becomes None if it is not finite."""
     checked = f"({name} if {name} - {name} == 0 else None)"
     return value.replace(f": {name},", f": {checked},").replace(f": {name}}}", f": {checked}}}")
 
 
 def _sizes(layout: Layout) -> Iterator[tuple[int, int] | None]:
-    """Yield size and count of the numbers in a layout; None for a part of variable size."""
+    """Yield size and count of the numbers in a layout; None for a variable-size part."""
     match layout:
         case Primitive():
             yield SIZES[layout.code], 1

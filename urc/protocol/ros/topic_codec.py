@@ -1,17 +1,17 @@
 """Conversion of ROS messages between their binary forms and plain data, for one connection.
 
-Pure. Over the Foxglove protocol, the transport carries messages as bytes. Before the messages of a
-topic, the transport delivers the definition of their type: an envelope with the verb `DEFINITION`.
-The codec then reads the parts of each message that the driver uses. The transport never reads a
-message: for moving robots, the transport runs in the guard, which must not be delayed.
+Pure. With the Foxglove protocol, the transport carries messages as bytes. Before a topic's
+messages, the transport delivers their type's definition, in an envelope with the verb `DEFINITION`.
+The codec then reads the parts of each message that the driver uses. The transport never decodes
+messages. For moving robots, the transport runs in the guard, which must not be delayed.
 
-In the other direction, the codec adds the bytes of a message to its envelope. The definition of a
-published type is one of `urc.protocol.ros.common_types`, or comes from a topic of the same type.
-Without a definition, the envelope has no bytes, and the transport sends JSON. An envelope always
-keeps its plain body, so the same envelope also fits rosbridge.
+For sent messages, the codec adds the message's bytes to its envelope. The definition of a published
+type is in `urc.protocol.ros.common_types`, or is taken from a topic of the same type. Without a
+definition, the envelope has no bytes, and the transport sends JSON. An envelope always keeps its
+plain body, so that it also works with rosbridge.
 
 Services have their own definitions, which the transport delivers with the first call. The transport
-returns the call with the verb `UNENCODED`; the codec then sends the call again, in bytes.
+returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
 """
 
 from collections.abc import Iterable, Mapping
@@ -30,31 +30,32 @@ from urc.protocol.ros.write_source import Unwritable, Writer
 __all__ = ["DEFINITION", "UNENCODED", "Received", "TopicCodec"]
 
 DEFINITION: Final = "definition"
-"""Verb of a definition: attributes `topic`, `type`, `encoding` and `notation`; the body is text."""
+"""Verb of a definition, with attributes `topic`, `type`, `encoding` and `notation`, and a text
+body."""
 UNENCODED: Final = "unencoded"
-"""Verb of a returned call: attributes as of the call, and `request` and `response`, each a list of
-type, encoding, notation and text."""
+"""Verb of a returned call. Its attributes are those of the call, plus `request` and `response`,
+each a list of type, encoding, notation and text."""
 MAX_COMPILED: Final = 256
-"""Maximum number of compiled types of one connection. A hostile robot could otherwise announce new
-types without end."""
+"""Maximum number of compiled types of one connection. Otherwise, a hostile robot could announce an
+unlimited number of new types."""
 _SHOWN: Final = 60
 _ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
-"""Byte order and largest alignment, by encapsulation identifier: CDR and plain CDR2."""
+"""Byte order and largest alignment, keyed by encapsulation identifier: CDR and plain CDR2."""
 
 
 class Received(NamedTuple):
-    """The result of a received envelope."""
+    """The result of decoding a received envelope."""
 
     envelope: Envelope | None = None
     """Envelope with plain data; None if there is nothing to deliver."""
     reply: Envelope | None = None
     """Envelope to send."""
     fault: str = ""
-    """Reason why the envelope was dropped; ""."""
+    """Reason why the envelope was dropped, or ""."""
 
 
 class _Schema(NamedTuple):
-    """A type as a robot describes it."""
+    """A type as described by a robot."""
 
     type: str
     encoding: str
@@ -63,7 +64,7 @@ class _Schema(NamedTuple):
 
 
 class _Source:
-    """The readers of one type, generated when a byte order is first seen."""
+    """The readers for one type, each generated when its byte order first occurs."""
 
     def __init__(self, layout: Record, wanted: Wanted, *, is_ros1: bool) -> None:
         self._layout = layout
@@ -89,7 +90,7 @@ class _Source:
 
 
 class TopicCodec:
-    """The codec of one connection; definitions are forgotten when the connection is opened."""
+    """The codec of one connection; its definitions are discarded when the connection is opened."""
 
     def __init__(
         self, paths: Mapping[str, Iterable[Path]] | None = None, *, is_ros1: bool = False
@@ -97,8 +98,9 @@ class TopicCodec:
         """Initialise without definitions.
 
         Args:
-            paths: paths that the driver reads, by topic; of other topics, messages are read whole.
-            is_ros1: whether to write in the format of ROS 1 until a definition tells.
+            paths: paths that the driver reads, keyed by topic; messages of other topics are read
+                whole.
+            is_ros1: whether to write in the ROS 1 format until a definition determines the format.
         """
         self._wanted = {topic: wanted_of(set(each)) for topic, each in (paths or {}).items()}
         self._is_ros1 = is_ros1
@@ -106,11 +108,11 @@ class TopicCodec:
         self._services: dict[str, tuple[Writer | None, _Source | None, str]] = {}
         self._compiled: dict[tuple[object, ...], _Source | Writer] = {}
         self._known: dict[str, Definitions] = {}
-        """Definitions from the robot, by plain name of the type."""
+        """Definitions from the robot, keyed by the type's plain name."""
         self._writers: dict[tuple[str, bool], Writer | None] = {}
 
     def reset(self) -> None:
-        """Forget the definitions of the last connection."""
+        """Discard the definitions of the previous connection."""
         self._sources.clear()
         self._services.clear()
         self._compiled.clear()
@@ -189,7 +191,7 @@ class TopicCodec:
     # -- calls
 
     def _encode_call(self, envelope: Envelope) -> Received:
-        """Compile the types of a service, and return the call in bytes."""
+        """Compile the types of a service, and return the call in binary form."""
         said = dict(envelope.attributes)
         parts = [cast("list[str]", said.pop(part)) for part in ("request", "response")]
         request, response = (_Schema(*part) for part in parts)
@@ -224,7 +226,7 @@ class TopicCodec:
     # -- sent envelopes
 
     def sent(self, payload: Payload) -> Payload:
-        """Return an envelope with the bytes of its message, if the definition is known.
+        """Return the envelope, with its message's bytes if the definition is known.
 
         Raises:
             Unwritable: the message does not fit its type.

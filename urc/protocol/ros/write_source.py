@@ -1,9 +1,9 @@
-"""Generated functions that write messages in CDR (ROS 2) and in the format of ROS 1.
+"""Generated functions that write messages in CDR (ROS 2) and in the ROS 1 format.
 
-Theory of operation. The source is generated once for a layout. Consecutive numbers become one
-format of `struct.Struct`. Alignment works as in `urc.protocol.ros.read_source`. A message is a
-mapping of fields, as in a document; missing fields have their default values or zero. The generated
-function is fast, and fails without a reason; `Writer` then searches the message for the reason.
+Theory of operation. The source is generated once per layout. Consecutive numbers become one
+`struct.Struct` format. Alignment works as in `urc.protocol.ros.read_source`. A message is a mapping
+of fields, as in a document; missing fields have their default values or zero. The generated
+function is fast but fails without a reason. `Writer` then searches the message for the reason.
 """
 
 import base64
@@ -29,7 +29,7 @@ from urc.protocol.ros.definition import (
 __all__ = ["NOW", "Unwritable", "Writer", "Written"]
 
 NOW: Final = "now"
-"""Text in place of a point in time: the sender writes the time at which the message leaves."""
+"""Text in place of a point in time; the sender replaces it with the time of sending."""
 _HEADER: Final = b"\0\1\0\0"
 """Encapsulation identifier of CDR with little-endian numbers."""
 _SHOWN: Final = 40
@@ -39,11 +39,11 @@ _FAULTS: Final = (struct.error, TypeError, ValueError, KeyError, OverflowError, 
 
 
 class Unwritable(UrcError):
-    """A message that does not fit its type; the message names the field."""
+    """A message that does not fit its type; the error names the field."""
 
 
 class Written(NamedTuple):
-    """A message in bytes."""
+    """A message in binary form."""
 
     data: bytes
     stamps: tuple[int, ...]
@@ -76,7 +76,7 @@ class Writer:
 
 
 def _binary(value: Any, length: int) -> bytes:
-    """Return bytes for an array of ``uint8``: bytes, base64 text or a list of numbers."""
+    """Convert a ``uint8`` array from bytes, base64 text or a list of numbers to bytes."""
     if isinstance(value, str):
         value = base64.b64decode(value, validate=True)
     data = bytes(value) if not isinstance(value, int) else b"\0"[:-value]
@@ -102,7 +102,7 @@ def _wide(value: str) -> bytes:
 
 
 def _known(value: Any, names: frozenset[str]) -> Any:
-    """Return a mapping of fields; raise `TypeError` for another value or an unknown field."""
+    """Return a mapping of fields; raise `TypeError` for any other value or an unknown field."""
     if not isinstance(value, Mapping) or not value.keys() <= names:
         raise TypeError("not the fields of this message")
     return value
@@ -116,7 +116,7 @@ _SCOPE: Final[dict[str, Any]] = {
 
 
 class _Generator:
-    """A generator of source text; one instance makes one function."""
+    """A generator of source text; each instance creates one function."""
 
     def __init__(self, is_ros1: bool) -> None:
         self._is_ros1 = is_ros1
@@ -219,7 +219,7 @@ class _Generator:
             self._write(inner, self._field(name, field, inner))
 
     def _field(self, owner: str, name: str, layout: Layout) -> str:
-        """Return the expression of a field, with the default value of the field."""
+        """Return the source expression for a field, including its default value."""
         match layout:
             case Primitive(code=code, default=default):
                 if code in "fd":

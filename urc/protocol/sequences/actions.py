@@ -214,7 +214,7 @@ def _prompted(step: sequence.PromptStep, builder: RequestCompiler) -> CompiledRe
 
 
 class _Nothing:
-    """A placeholder reader for a prompt, which is text outside of frames. It reads nothing."""
+    """A placeholder reader for a prompt, which is text outside frames. It reads nothing."""
 
     def read(self, frame: Frame) -> None:
         return None

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _MOST: Final = 256
-"""Maximum number of commands that wait for verification."""
+"""Maximum number of commands waiting for verification."""
 _BOTH: Final = 2
 """Required number of people under the two-person rule."""
 
@@ -70,7 +70,7 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
     Args:
         command: the declared command.
-        values: arguments including defaults, by name; each element of an array may cause a
+        values: arguments including defaults, by name; each element of an array may require a
             question.
     """
     asked = [] if command.confirm is None else [command.confirm]
@@ -119,7 +119,7 @@ def exchange_of(
     known: SignalState,
     verifications: "Verifications",
 ) -> Exchange:
-    """Return an exchange that runs a command, for the queue of the transport.
+    """Return an exchange that runs a command, for the transport's queue.
 
     Args:
         command: the command, which must not be a sequence.
@@ -128,8 +128,8 @@ def exchange_of(
         sink: function that receives the outcome.
         now: current time, in seconds.
         known: state of the robot, for conditions.
-        verifications: runs that wait for verification; receives the run of a command with
-            verification.
+        verifications: runs waiting for verification; a command that requires verification is added
+            to them.
 
     Raises:
         BadArgument: the frame cannot be encoded with these arguments.
@@ -166,7 +166,7 @@ class _PendingVerification(NamedTuple):
 
 
 class Verifications:
-    """Commands that have received their reply and wait for verification."""
+    """Commands that have received their reply and are waiting for verification."""
 
     def __init__(self, known: SignalState) -> None:
         self._known = known
@@ -176,7 +176,7 @@ class Verifications:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether any command waits for verification."""
+        """Whether any command is waiting for verification."""
         return bool(self._waiting)
 
     @property
@@ -186,7 +186,7 @@ class Verifications:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the first verification timeout; None if no command waits."""
+        """Time of the first verification timeout; None if no command is waiting."""
         return min((one.due for one in self._waiting), default=None)
 
     def add(self, run: "VerifiedRun", outcome: ExchangeOutcome, since: float, now: float) -> None:

@@ -1,7 +1,7 @@
 """Control of a running sequence: pause, single step, resume and abort.
 
-Pure. Control requests may arrive at any time. Control requests take effect between two steps, so no
-step is interrupted.
+Pure. Control requests may arrive at any time. They take effect between two steps, so no step is
+interrupted.
 """
 
 from typing import Final, Literal
@@ -9,10 +9,11 @@ from typing import Final, Literal
 __all__ = ["PAUSE_S", "Pull", "SequenceControl"]
 
 PAUSE_S: Final = 600.0
-"""Maximum duration of a pause, in seconds, because a paused sequence blocks other sequences."""
+"""Maximum duration of a pause, in seconds. The limit exists because a paused sequence blocks other
+sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
-"""A control request of the operator. ``step`` runs one outermost step and then pauses. With
+"""A control request from the operator. ``step`` runs one outermost step and then pauses. With
 ``step`` before the start, the sequence pauses before the first step."""
 
 
@@ -30,15 +31,15 @@ class SequenceControl:
         self.is_paused = False
         self.is_aborted = False
         self.reason = ""
-        """Reason for the failure of the last run; "" without a failure."""
+        """Reason why the last run failed; "" without a failure."""
         self.count = 0
         """Number of changes to the public attributes."""
         self._halt: Literal["", "now", "next", "outer"] = ""
         """Position of the next pause: before any step (``now``), before the next outermost step
-        (``outer``), after one more outermost step (``next``), or none ("")."""
+        (``outer``), after one more outermost step (``next``), or no pause ("")."""
 
     def pull(self, what: Pull) -> None:
-        """Apply a control request of the operator."""
+        """Apply a control request from the operator."""
         match what:
             case "pause":
                 self._halt = "now" if self.is_running else ""

@@ -23,7 +23,7 @@ __all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink
 Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
 """Function that receives an outcome and the time, and returns the resulting events."""
 Unless = Callable[[], str]
-"""Function that returns why a request is obsolete; "": the request is still valid."""
+"""Function that returns why a request is obsolete; "" means that the request is still valid."""
 
 
 class SequenceHost(Protocol):
@@ -84,16 +84,16 @@ class SequenceRunner:
                 sequences.
             confirmed_by: names of the people who have confirmed the sequence, including its
                 commands.
-            ends_at: deadline of the whole run, in seconds; None: no deadline.
+            ends_at: deadline of the whole run, in seconds; None means no deadline.
         """
         self.host = host
         self.program = program
         self.privileged_on = privileged_on
         self.confirmed_by = confirmed_by
         self.variables: dict[str, object] = {}
-        """Values of private fields and of replies, by ``_name``."""
+        """Values of private fields and of replies, keyed by ``_name``."""
         self.due: float | None = None
-        """End time of the current wait, in seconds; None: no time limit."""
+        """End time of the current wait, in seconds; None means no time limit."""
         self.ends_at = ends_at
         self.is_waiting = False
         self._sink: Sink | None = sink
@@ -122,7 +122,7 @@ class SequenceRunner:
 
     @property
     def deadline(self) -> float | None:
-        """Time for the next call of `expire`; None without a timeout."""
+        """Time at which to call `expire` next; None without a timeout."""
         if self.due is None or self.ends_at is None:
             return self.ends_at if self.due is None else self.due
         return min(self.due, self.ends_at)
@@ -155,7 +155,7 @@ class SequenceRunner:
         return events
 
     def wait_for_logins(self, now: float) -> None:
-        """Wait for the logins of all open connections, at most for the queue limit of a command."""
+        """Wait for the logins of all open connections, for at most a command's queue limit."""
         lines = (self.host.lines[name] for name in self.program.transports)
         self._logins = [
             line
@@ -169,7 +169,7 @@ class SequenceRunner:
             self.sleep(now + limit_s)
 
     def _obey(self) -> None:
-        """Apply the control requests of the operator."""
+        """Apply the operator's control requests."""
         sequence_control = self.program.sequence_control
         if sequence_control.is_aborted:
             self.stop("aborted", "somebody ended it")
@@ -210,13 +210,13 @@ class SequenceRunner:
             self._outcome = ExchangeOutcome(code, reason)
 
     def why_over(self) -> str:
-        """Return the reason why further frames of the run are obsolete; "": the run continues."""
+        """Return the reason why the run's further frames are obsolete; "" if the run continues."""
         return self._outcome.message if self._outcome is not None else ""
 
     # -- called by the engine
 
     def check_conditions(self, now: float) -> None:
-        """Check the awaited condition, after new samples or at the start of the wait."""
+        """Check the awaited condition after new samples or at the start of the wait."""
         if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
             self._awaited = None
             self._resume()
@@ -226,7 +226,7 @@ class SequenceRunner:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the outcome of a command that a step has run."""
+        """Record the outcome of a command run by a step."""
         if outcome.code:
             self.stop(outcome.code, outcome.message)
         self.variables |= {f"_{name}": value for name, value in outcome.values.items()}
@@ -246,7 +246,7 @@ class SequenceRunner:
     # -- for the actions
 
     def names(self, now: float) -> Mapping[str, object]:
-        """Return the namespace for the expressions of the steps."""
+        """Return the namespace for the steps' expressions."""
         return self.host.known.view(now, self.variables)
 
     def push(self, actions: Iterator[Action]) -> None:

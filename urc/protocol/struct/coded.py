@@ -2,7 +2,7 @@
 
 Pure. ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has
 two decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits
-per byte. A packed array contains consecutive numbers of any width, without alignment to bytes. No
+per byte. A packed array contains consecutive numbers of any width, without byte alignment. No
 number has more than 64 bits.
 """
 

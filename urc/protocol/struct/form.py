@@ -23,10 +23,10 @@ class StructReader:
         self._names = frozenset(names_of(self._items))
         self._encoding = context.encoding
         self.read = generate_read(self._items, context.encoding)
-        """Generated function that returns the fields, or None for another frame, or raises
+        """Generated function that returns the fields, or None without a match, or raises
         `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
-        # A reply carries the number of its request, which `match` supplies.
+        # A reply contains the number of its request, which `match` supplies.
         self._outer = {"settings": context.settings, COUNTERS: lambda name, low, high: low}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
@@ -54,9 +54,9 @@ class StructWriter:
         self._read = generate_read(named, context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the arguments in a frame; None for a frame that does not match.
+        """Return the arguments in a frame; None if the frame does not match.
 
-        The number of a counter has the key ``seq.NAME``.
+        A counter's number has the key ``seq.NAME``.
         """
         try:
             found = self._read(frame)

@@ -12,7 +12,7 @@ __all__ = ["GAP", "LARGEST_FRAME", "Backpatch", "FrameBuilder", "Scope", "evalua
 
 Scope = dict[str, Any]
 LARGEST_FRAME = 1 << 20
-"""Maximum size of a frame in bytes, equal to the limit of the framings."""
+"""Maximum size of a frame in bytes, equal to the framings' limit."""
 
 
 GAP = "gap of "
@@ -70,7 +70,7 @@ def _moved(gap: Backpatch, at: int, by: int) -> Backpatch:
 
 
 def evaluate(template: Template, scope: Scope) -> Any:
-    """Evaluate an expression over a scope; raise `NotWritable` on an error."""
+    """Evaluate an expression in a scope; raise `NotWritable` on an error."""
     try:
         return template.evaluate(scope)
     except ExpressionError as error:

@@ -4,9 +4,9 @@ Pure. The closures are a readable version of the code that `urc.protocol.struct.
 generates. Generated functions are faster for runs of fixed items. Tests compare the results of the
 closures and the generated functions. Theory of operation: every item becomes a step ``(data, at,
 end, out) -> after``. A step reads bytes from `at` to at most `end`, and stores the value in `out`.
-A step raises `OtherFrame` for a frame that does not match. After the first invalid value, an error
-is recorded under the key `FAULT`, and reading continues. The error is reported only if the frame
-matches to its end.
+A step raises `OtherFrame` if the frame does not match. After the first invalid value, an error is
+recorded under the key `FAULT`, and reading continues. The error is reported only if the whole frame
+matches.
 """
 
 from collections.abc import Callable, Mapping
@@ -53,7 +53,7 @@ BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
-    """Return the fields of `data`; None for a frame that does not match.
+    """Return the fields of `data`; None if the frame does not match.
 
     Raises:
         BadItem: the frame matches, but contains an invalid value.

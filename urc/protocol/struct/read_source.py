@@ -22,7 +22,7 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 
 
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
-    """Return a function that reads the fields of a frame, or returns None for another frame.
+    """Return a function that reads a frame's fields, or returns None if the frame does not match.
 
     The returned function raises `BadItem` if a matching frame contains an invalid value.
     """
@@ -55,14 +55,14 @@ def add_fixed(
     """Add source for unpacking a frame of items with fixed positions, or return None.
 
     Args:
-        source: builder of a function that returns None for a frame that does not match.
+        source: builder of a function that returns None for a non-matching frame.
         items: items of the frame.
-        encoding: default encoding of texts.
+        encoding: default text encoding.
         data: name of the variable that contains the frame.
 
     Returns:
-        The source lines for decoding, and for each field an expression that is valid after the
-        source lines.
+        The source lines for decoding, and an expression for each field that is valid after those
+        lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))

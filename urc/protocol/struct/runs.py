@@ -23,11 +23,11 @@ class FixedField(NamedTuple):
 
     item: Item
     name: str
-    """Name of the field, including the names of outer structs; "": no field."""
+    """Name of the field, including the names of outer structs; "" means no field."""
     outer: str
     """Joined name of the outer structs."""
     code: str
-    """Format characters for `struct`; "x": the item has no value."""
+    """Format characters for `struct`; "x" means that the item has no value."""
     endian: Literal["", "big", "little"] = ""
     values: int = 1
 

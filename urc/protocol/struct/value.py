@@ -2,7 +2,7 @@
 
 Pure. The closures and the slow paths of generated functions share the conversions in this module.
 The raw form of an item is the number or the bytes in the frame. The value of an item is a field or
-argument, such as a scaled number, a word of an enum, or a text.
+argument, such as a scaled number, an enum word, or text.
 """
 
 import struct
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def meaning_of(item: Item) -> Callable[[Any], Any]:
-    """Return a function from raw form to value; the function raises `BadItem` if invalid."""
+    """Return a function that converts the raw form to a value, or raises `BadItem`."""
     words, scale, offset, valid = dict(item.enum), item.scale, item.offset, item.valid
     divisor = divisor_of(scale)
 
@@ -56,7 +56,7 @@ def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
 def raw_of(item: Item) -> Callable[[Any], Any]:
     """Return a function that converts the value to the raw form, or raises `NotWritable`.
 
-    Numbers are rounded to the nearest whole number, and halves to the even number.
+    Numbers are rounded to the nearest whole number, and halves to the nearest even number.
     """
     numbers = {word: number for number, word in item.enum}
     number, valid, scale, offset = item.number, item.valid, item.scale, item.offset
@@ -88,7 +88,7 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
 
 
 def fitting(number: Number, value: int | float, name: str) -> int | float | bool:
-    """Return `value` in the type `number`; raise `NotWritable` for a value outside the range."""
+    """Return `value` in the type `number`; raise `NotWritable` if it is out of range."""
     if number.kind == "float":
         try:
             return float(value)
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function from a value to the raw number and the value of the raw number."""
+    """Return a function that converts a value to a raw number and that number's value."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
@@ -208,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes that a text of hex digits represents."""
+    """Return the bytes represented by a text of hex digits."""
     try:
         return bytes.fromhex(text)
     except ValueError:

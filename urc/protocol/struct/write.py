@@ -1,9 +1,9 @@
 """Closures that write struct items from values to bytes.
 
-Pure. The closures reverse the closures of `urc.protocol.struct.read`. Theory of operation: every
-item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap in the
-frame until the missing number can be computed. The `Backpatch` for the size of a later item is
-stored in the scope. Values that depend on the size of the whole frame are stored in
+Pure. These closures are the inverse of the closures in `urc.protocol.struct.read`. Theory of
+operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values
+leave a gap in the frame until the missing number can be computed. The `Backpatch` for the size of a
+later item is stored in the scope. Values that depend on the size of the whole frame are stored in
 `FrameBuilder.late`.
 """
 
@@ -58,7 +58,7 @@ class StructWriteScope(NamedTuple):
 
     encoding: str
     derived: Mapping[str, Template]
-    """Formulas for sizes and counts, by the name of the item that contains the number."""
+    """Formulas for sizes and counts, keyed by the name of the item that contains the number."""
     is_lenient: bool
     """Whether missing values are zero, for an emulated robot that sets only some values."""
 
@@ -357,12 +357,12 @@ def _struct_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _outer(scope: Scope) -> Scope:
-    """Return the values of an outer scope that a struct may use, by name."""
+    """Return the outer scope's values that a struct may use, keyed by name."""
     return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope) -> WriteStep:
-    """Return the step that writes a struct with its size field, and without its trimmed bytes."""
+    """Return the step that writes a struct with its size field and without its trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""

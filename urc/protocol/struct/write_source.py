@@ -1,7 +1,8 @@
 """Generated functions that write struct items, one per declaration.
 
-Pure. Generated writers reverse the generated readers of `urc.protocol.struct.read_source`.
-Generated writers support only fixed items. Closures handle all other items and all invalid values.
+Pure. Generated writers are the inverse of the generated readers in
+`urc.protocol.struct.read_source`. Generated writers support only fixed items. Closures handle all
+other items and all invalid values.
 """
 
 import struct
@@ -70,7 +71,7 @@ def _is_quick(leaf: FixedField) -> bool:
 
 
 def _written(source: SourceBuilder, leaf: FixedField, encoding: str) -> list[str]:
-    """Return the source of the arguments of ``pack`` for one item."""
+    """Return the source of one item's ``pack`` arguments."""
     item = leaf.item
     if item.kind == "padding":
         return []

@@ -34,7 +34,7 @@ _ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
 
 
 class BadValue(ValueError):
-    """An invalid raw value, with the found and the expected value in the message."""
+    """An invalid raw value; the message contains the found and the expected value."""
 
 
 class Unusable:
@@ -133,7 +133,7 @@ def spelt(raw: object) -> str:
 
 
 def _is_plain(text: str) -> bool:
-    """Return whether a number is plain ASCII, because Python accepts '1_0' and non-ASCII digits."""
+    """Return whether a number is plain ASCII; Python also accepts '1_0' and non-ASCII digits."""
     return text.isascii() and "_" not in text
 
 
@@ -251,7 +251,7 @@ def _line(offset: float, scale: float) -> Step:
 def divisor_of(scale: float) -> int:
     """Return n if `scale` is 1/n, else 0.
 
-    Division is more exact than multiplication: 3 / 10 is 0.3, but 3 * 0.1 is not.
+    Division is more accurate than multiplication: 3 / 10 is 0.3, but 3 * 0.1 is not.
     """
     if not 1e-15 < abs(scale) < 1:
         return 0

@@ -1,8 +1,8 @@
 """Decoding of raw fields into typed values.
 
-Pure. Each engine builds the converters once per signal. A value of the wrong type or range is
-counted as a violation, and never becomes a sample. On a screen, a wrong number would be worse than
-an old number.
+Pure. Each engine builds the converters once per signal. A value with the wrong type or range is
+counted as a violation and never becomes a sample. On a screen, a wrong number would be worse than
+an old one.
 """
 
 import math

@@ -93,7 +93,7 @@ class PayloadReader(Protocol):
     """A reader for the fields of a frame."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields; None for a frame that does not match. May raise `BadText`."""
+        """Return the fields; None if the frame does not match. May raise `BadText`."""
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return a frame with `fields`; raise `NotWritable` if impossible."""
@@ -106,4 +106,4 @@ class PayloadWriter(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return values of the root names for which `write` returns this frame, or None."""
+        """Return values of the top-level names for which `write` returns this frame, or None."""

@@ -36,7 +36,7 @@ def encoded(text: str, encoding: str) -> bytes:
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
-    """Return the first field with a different value after reading back a frame, or ""."""
+    """Return the first field whose value differs after reading back a frame, or ""."""
     for name, value in fields.items():
         if found is None or field_text(found.get(name)) != field_text(value):
             return name

@@ -1,7 +1,7 @@
 """Times and nonces for sent frames.
 
 Pure. Times and nonces have injected sources: a clock and a random generator for a robot, fixed
-sources for tests. With fixed sources, URC always encodes the same frames for a document.
+sources for tests. With fixed sources, URC always encodes a document's frames identically.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ FIXED_UNIX_S: Final = 946684800.0
 
 
 class TimeAndNonce(NamedTuple):
-    """The sources of times and nonces."""
+    """Sources of times and nonces."""
 
     unix_s: Callable[[], float]
     """Function that returns the Unix time, in seconds."""

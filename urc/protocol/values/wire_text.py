@@ -1,4 +1,4 @@
-"""Received text for comparisons in a correlation. Pure."""
+"""Received text, for comparison in a correlation. Pure."""
 
 __all__ = ["WireText"]
 

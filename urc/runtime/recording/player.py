@@ -1,7 +1,7 @@
-"""Playback of a recording, which passes readings to a hub as if the robot sent them now.
+"""Play a recording: pass its readings to a hub as if the robot were sending them now.
 
 Layer 4. `Player` keeps its position and state while no page is open. A dashboard opens the player's
-`session` in place of a robot. The player plays decoded values, not bytes. Decoding a reply requires
+`session` instead of a robot. The player plays decoded values, not bytes. Decoding a reply requires
 the matching request, but a new session would send its requests at different times.
 """
 
@@ -179,7 +179,7 @@ class Player:
             try:
                 await self._follow(hub, stream, number)
             finally:
-                with suppress(ValueError):  # its thread still runs it; it closes later
+                with suppress(ValueError):  # its thread is still running; it closes later
                     await asyncio.to_thread(stream.close)
             if number == self._number:
                 await self._at_end(number)
@@ -203,7 +203,7 @@ class Player:
                 await self._until(waiting[0].time_ns, number)
 
     def _due_ns(self) -> float:
-        """Return the recorded time of the last due message; infinity at the recording's end."""
+        """Return the recorded time of the last due message, or infinity at the recording's end."""
         position_s = self.position_s
         if position_s >= self.length_s:
             return math.inf

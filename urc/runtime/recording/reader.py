@@ -1,7 +1,7 @@
 """A reader of recordings, including incomplete files of killed processes.
 
 Layer 4. The reader provides the recorded document, the time range, and the messages in order from
-any start time. Files of any length are processed piece by piece.
+any start time. Files of any length are processed in sections.
 """
 
 import json
@@ -47,7 +47,7 @@ class Recording(NamedTuple):
     topics: Mapping[Any, str] = NOTHING
     """Topic of each channel, by channel number, from the summary at the end of the file."""
     unread_bytes: int = 0
-    """Number of unreadable bytes at the end; -1 for a readable file without a proper end."""
+    """Number of unreadable bytes at the end; -1 for a readable file that lacks its end records."""
 
     @property
     def length_s(self) -> float:
@@ -55,9 +55,9 @@ class Recording(NamedTuple):
         return (self.end_ns - self.start_ns) / 1e9
 
     def messages(self, from_ns: int) -> Generator[RecordedMessage, None, None]:
-        """Yield the messages from a start time on, in order; stop at a damaged end of the file.
+        """Yield the messages in order from a start time; stop at a damaged end of the file.
 
-        An unreadable piece in the middle of the file is reported as a log message.
+        An unreadable section in the middle of the file is reported as a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 
@@ -75,7 +75,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
 
     Args:
         file: path of the recording.
-        has_profile: whether the recording is shown with a profile other than the recorded profile.
+        has_profile: whether the recording is shown with a profile other than the recorded one.
 
     Raises:
         UrcError: the file is unreadable, empty, or not a URC recording.
@@ -141,7 +141,7 @@ def _unpacked(chunk: Any) -> Iterable[object]:
     if chunk.compression == "zstd":
         from zstandard import ZstdDecompressor
 
-        # The library's one-shot call allocates whatever size the data claims.
+        # The library's one-shot call allocates the size that the data declares.
         with ZstdDecompressor().stream_reader(data) as reader:
             data = reader.read(_RECORD_BYTES + 1)
     elif chunk.compression == "lz4":

@@ -34,7 +34,7 @@ from urc.runtime.widget_registry import widget_folder_of
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
 RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
-"""Callback with a step of a recording, the name of its file, and the result as text."""
+"""Callback with a recording's step, its file name, and the result as text."""
 _SUFFIX: Final = ".mcap"
 MOST_WAITING: Final = 50_000
 """Maximum number of queued events."""
@@ -149,7 +149,7 @@ class Recorder:
             self._fail(str(error))
         except OSError as error:
             self._fail(f"{self.file} cannot be written: {error.strerror or error}")
-        except Exception as error:  # supervisor: the session must go on without the recording
+        except Exception as error:  # supervisor: the session must continue without the recording
             log.exception("a recording failed")
             self._fail(f"{self.file}: the recording failed: {error!r}")
         finally:
@@ -289,13 +289,13 @@ async def recorded(
     The hub's log shows the name of the file, or the reason for a failure.
 
     Args:
-        hub: hub of the session, which redacts secrets; preferably the hub of a session that is not
-            open yet.
+        hub: hub of the session, which redacts secrets; the session should not be open yet.
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
         on_step: callback for the creation of the file, and for its end.
-        document: the whole profile as one document, "" for none; None to read the profile's file.
+        document: the whole profile as one document; "" for no document; None to read the profile's
+        file.
     """
     recorder = Recorder(place, profile, is_folder=is_folder, document=document)
     steps = _Steps(recorder, on_step)

@@ -33,10 +33,10 @@ class Endpoint(NamedTuple):
     port: int
     """TCP or UDP port; 0 for a server without a port."""
     text: str
-    """Text for people, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
+    """Human-readable text, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
     options: Mapping[str, object] = NOTHING
-    """Options for connecting the driver's transport to this server. Options in this mapping
-    override the options in the driver.
+    """Options for connecting the driver's transport to this server. These options override the
+    driver's options.
     """
     path: str = ""
     """Path of the device file of a serial port."""
@@ -66,14 +66,14 @@ class ServerContext(NamedTuple):
     """Function that returns the current time, in seconds since the epoch; templates read the time
     as ``now``."""
     topics: Mapping[str, Mapping[str, Value]] = NOTHING
-    """Options of the driver's subscriptions by topic, on a message transport."""
+    """Options of the driver's subscriptions on a message transport, keyed by topic."""
     is_anywhere: bool = False
     """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
     """Function that returns the current world image for the given topic names; None without an
     image."""
     last_peer: LastPeer | None = None
-    """Host that last sent data, shared by all servers of the robot; None: the host is not
+    """Host that last sent data, shared by all servers of the robot; None means that the host is not
     recorded."""
     carried: Mapping[tuple[str, int], Endpoint] = MappingProxyType({})
     """Targets that clients can reach through this server. The keys are hosts and ports in the
@@ -84,7 +84,7 @@ class SimulatedServer(Protocol):
     """One transport of the emulated robot."""
 
     async def open(self) -> Endpoint:
-        """Start to accept clients.
+        """Start accepting clients.
 
         Raises:
             UrcError: the address is not available. The error message starts with

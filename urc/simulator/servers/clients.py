@@ -1,8 +1,8 @@
 """The clients of a simulated server, and their conversations with the robot.
 
 Each client has a separate `EmulatedConnection`. The number of clients, the size of input buffers
-and the write timeout are limited. A new client above the limit replaces the client with the longest
-silence, so half-open connections cannot block the server.
+and the write timeout are limited. A new client above the limit replaces the client that has been
+silent longest, so that half-open connections cannot block the server.
 """
 
 import asyncio
@@ -57,7 +57,7 @@ class Clients:
     ) -> None:
         """Run `talk` for a new client. When the client is replaced or `talk` ends, call `abort`.
 
-        `talk` may raise OSError or TimeoutError for a lost client.
+        `talk` may raise OSError or TimeoutError if the client is lost.
         """
         if len(self._talks) >= self._limit:
             silent = min(self._talks, key=lambda client: client.active_s)
@@ -106,9 +106,9 @@ async def converse(
     Args:
         context: context of the server.
         client: client with the robot's side of its connection.
-        take: function that returns the client's next payload; None or b"" at the end of input.
-            Calls of `take` may be cancelled and repeated without data loss.
-        put: function that sends payloads of the robot, and waits while the client's buffer is full.
+        take: function that returns the client's next payload, or None or b"" at the end of input.
+            Calls to `take` can be cancelled and repeated without data loss.
+        put: function that sends the robot's payloads, and waits while the client's buffer is full.
 
     Raises:
         TimeoutError: the client does not read its data.

@@ -1,8 +1,8 @@
 """An emulated robot behind a web server: requests, and streams of pictures, events and lines.
 
-Requests are passed to the robot's rules as envelopes. Each subscription of the driver is a stream
-at the topic's path. Streams contain the robot's messages or, for a camera, images of its world.
-Without a world, each image is filled with one slowly changing colour.
+Requests are passed to the robot's rules as envelopes. Each of the driver's subscriptions is a
+stream at the topic's path. Streams contain the robot's messages or, for a camera, images of its
+world. Without a world, each image is filled with one slowly changing colour.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ def picture(now_s: float) -> bytes:
 
 
 def _mean(difference: int) -> str:
-    """Return the JPEG code of a difference of means: number of bits (four bits) and value."""
+    """Return the JPEG code of a difference between block means: bit count (four bits) and value."""
     if difference == 0:
         return "0000"
     length = abs(difference).bit_length()
@@ -235,7 +235,7 @@ class _HttpConversation:
         return str(kinds[0]) if kinds else ""
 
     def _picture(self, asked: HttpRequest) -> bytes:
-        """Return the camera image of the robot's world; without a world, an image of one colour."""
+        """Return the camera image of the robot's world; without a world, a single-colour image."""
         context, target = self._context, asked.target.removeprefix(self._base)
         seen = context.picture((asked.path, target))
         return picture(context.now()) if seen is None else seen

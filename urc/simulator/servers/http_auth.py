@@ -14,10 +14,10 @@ _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]*))')
 
 
 class HttpAuth:
-    """A check of requests against the driver's option `auth`."""
+    """A check of requests against the driver's `auth` option."""
 
     def __init__(self, auth: object) -> None:
-        """Read the option `auth`. Without the option `auth`, every request is accepted."""
+        """Read the option `auth`. Without this option, every request is accepted."""
         self._auth: Mapping[str, object] = auth if isinstance(auth, Mapping) else {}
         self._nonce = secrets.token_hex(16)
 

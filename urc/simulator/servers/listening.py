@@ -72,7 +72,7 @@ class ListeningServer(ABC):
 
 
 class UrlServer(ListeningServer):
-    """A server with the address in the driver's option `url`."""
+    """A server whose address is in the driver's option `url`."""
 
     SCHEME: ClassVar[str]
     """URL scheme without TLS."""
@@ -103,7 +103,7 @@ class UrlServer(ListeningServer):
 
 
 class StreamServer(ListeningServer):
-    """A server for clients with plain byte streams."""
+    """A server for clients that use plain byte streams."""
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await asyncio.start_server(self._accept, host, port, limit=READ_BYTES)

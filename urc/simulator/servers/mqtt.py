@@ -23,7 +23,7 @@ OPEN_S = 5.0
 AGAIN_S = 1.0
 """Delay before reconnecting to the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options that apply only to the driver's connection to the broker. With a shared client
+"""Options that apply only to the driver's connection to the broker. If they shared a client
 identifier, the emulated robot and the driver would disconnect each other."""
 
 log = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ class MqttRobot:
         self._transport: Transport | None = None
 
     async def open(self) -> Endpoint:
-        """Connect to the broker that the options declare."""
+        """Connect to the broker declared in the options."""
         context = self._context
         options = {name: value for name, value in context.options.items() if name not in _NOT_OURS}
         try:

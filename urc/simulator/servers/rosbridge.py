@@ -26,8 +26,9 @@ _ENDS = {True: 4, False: 6}
 """Status codes of action results: succeeded or aborted."""
 
 EARLY = 0.1
-"""Share of a throttle's interval by which a message may come early. A robot often sends at the
-interval itself, and the delays of this machine would then drop every other message."""
+"""Fraction of the throttle interval by which a message may be early. A robot often sends at exactly
+the throttle interval. Without this tolerance, delays on this machine would cause every other
+message to be dropped."""
 
 _decode = msgspec.json.Decoder().decode
 _encode = msgspec.json.Encoder().encode
@@ -42,16 +43,16 @@ class _Wanted(NamedTuple):
 
 
 class Bridge:
-    """The state that all clients of one bridge share."""
+    """The state shared by all clients of one bridge."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Initialise the bridge with the types of the robot's topics, by name; "": unknown type."""
+        """Initialise the bridge with the types of the robot's topics by name; "" if unknown."""
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
-        """Client that offers each service, by service name."""
+        """Client that offers each service, keyed by service name."""
         self.asked: dict[str, tuple[BridgeClient, object]] = {}
-        """Caller and original identifier of each forwarded call, by new identifier."""
+        """Caller and original identifier of each forwarded call, keyed by new identifier."""
         self._count = 0
 
     def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
@@ -79,12 +80,12 @@ class BridgeClient:
         self._bridge = bridge
         self._send = send
         self.wanted: dict[str, _Wanted] = {}
-        """Subscriptions of the client, by topic."""
+        """Subscriptions of the client, keyed by topic."""
         self._shown_s: dict[str, float] = {}
         self._calls: dict[object, str] = {}
-        """Services of the unanswered calls, by identifier."""
+        """Services of the unanswered calls, keyed by identifier."""
         self._goals: dict[object, str] = {}
-        """Actions of the running goals, by identifier."""
+        """Actions of the running goals, keyed by identifier."""
         self._fragments = 0
         bridge.clients.append(self)
 
@@ -98,7 +99,7 @@ class BridgeClient:
         bridge.asked = {key: who for key, who in bridge.asked.items() if who[0] is not self}
 
     def hears(self, text: str | bytes, now_s: float) -> Envelope | None:
-        """Handle a frame of the client; return the message for the emulated robot, or None."""
+        """Handle a frame from the client; return the message for the emulated robot, or None."""
         try:
             operation = _decode(text)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -109,7 +110,7 @@ class BridgeClient:
         return None if work is None else work(self, operation, now_s)
 
     def says(self, payload: Payload, now_s: float) -> None:
-        """Send a message of the emulated robot to the client."""
+        """Send a message from the emulated robot to the client."""
         if not isinstance(payload, Envelope):
             return
         payload = payload._replace(body=_fields(payload.body))
@@ -179,7 +180,7 @@ class BridgeClient:
     # -- replies of the robot
 
     def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
-        """Reply to a call of this client."""
+        """Reply to a call from this client."""
         operation = {"op": "service_response", "service": service, "values": values}
         if number is not None:
             operation["id"] = number
@@ -244,7 +245,7 @@ class BridgeClient:
         return Envelope("publish", attributes, message)
 
     def call(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Reply to a call of rosapi.
+        """Reply to a call to rosapi.
 
         Forward other calls to the client or robot that offers the service.
         """
@@ -312,7 +313,7 @@ class BridgeClient:
         table[number] = name
 
     def _rosapi(self, service: str, args: object) -> dict[str, object] | None:
-        """Return the reply of the node rosapi; None for other services."""
+        """Return the reply of the rosapi node; None for other services."""
         folder, _, question = service.rpartition("/")
         if folder not in ("/rosapi", "rosapi"):
             return None
@@ -389,7 +390,8 @@ def _png(data: bytes) -> str:
 MAX_BYTES = 10_000_000
 """Maximum frame size in bytes, equal to the default of the real server."""
 MAX_UNSENT_BYTES = 4_194_304
-"""Maximum number of unsent bytes per client. A client above the limit misses messages."""
+"""Maximum number of unsent bytes per client. While a client is above the limit, messages to the
+client are dropped."""
 
 
 class RosbridgeServer(MessageServer):

@@ -1,7 +1,7 @@
 """An emulated robot behind a pseudo-terminal, which programs can open like a serial port.
 
-The system chooses the name of the pseudo-terminal. If the profile's port is a path outside ``/dev``
-that does not exist, the server creates a symbolic link at this path. With the symbolic link, the
+The system chooses the name of the pseudo-terminal. If the profile's port is a nonexistent path
+outside ``/dev``, the server creates a symbolic link at that path. With the symbolic link, the
 profile works without changes. For ``socket://HOST:PORT``, the server listens on a TCP port.
 """
 

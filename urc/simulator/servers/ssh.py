@@ -223,7 +223,7 @@ class _ShellConversation:
 def _own_key() -> asyncssh.SSHKey:
     """Return the current user's host key for emulated robots.
 
-    The key is stored, so clients need to trust the key only once.
+    The key is stored, so that clients need to trust it only once.
     """
     file = data_folder() / "simulator_host_key"
     try:

@@ -1,4 +1,4 @@
-"""The terminal of a simulated shell, with input echo and normalization of line ends.
+"""The terminal of a simulated shell, with input echo and normalization of line endings.
 
 A terminal program sends CR, while a driver may send LF. Real terminals accept both CR and LF.
 """
@@ -13,21 +13,21 @@ _LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
 
 
 class TerminalInput:
-    """The input of one client, converted to the line ends of the driver."""
+    """The input of one client, converted to the driver's line endings."""
 
     def __init__(self, spec: TransportSpec) -> None:
-        """Use the line ends in the framing of `spec`; without line ends, bytes stay unchanged."""
+        """Use the line endings of `spec`'s framing; without line endings, bytes stay unchanged."""
         framing = spec.framing.sent or spec.framing
         end = framing.options.get("tx") if framing.type == "delimiter" else None
         self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""
         self._was_cr = False
 
     def read(self, data: bytes) -> bytes:
-        """Return `data` with every CR, LF or CR LF replaced by the driver's line end."""
+        """Return `data` with every CR, LF or CR LF replaced by the driver's line ending."""
         if not self._end or not data:
             return data
         if self._was_cr and data[:1] == b"\n":
-            data = data[1:]  # the second half of a split line end
+            data = data[1:]  # the second half of a split line ending
             self._was_cr = False
             if not data:
                 return b""

@@ -38,7 +38,7 @@ class MessageServer(ListeningServer):
 
     @abstractmethod
     async def _serve(self, host: str, port: int) -> Server:
-        """Listen with the limits of the server class."""
+        """Start listening, with the limits of the server class."""
 
     @abstractmethod
     def _talk(

@@ -1,7 +1,7 @@
 """Motion models: one simulation step for each kind of body.
 
 Pure. Units are metres, seconds and radians. The axes are x forward, y left and z up (REP 103).
-Wheeled bodies follow exact arcs, so constant inputs give the same path for every step length.
+Wheeled bodies follow exact arcs, so that constant inputs produce the same path at any step length.
 """
 
 import math

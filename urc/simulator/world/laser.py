@@ -1,6 +1,6 @@
 """A laser scanner: rays from the centre of the robot, with noise.
 
-Pure. Because of the import of numpy, the module is loaded only on first use.
+Pure. The module imports numpy, so it is loaded only on first use.
 """
 
 import math

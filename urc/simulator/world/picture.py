@@ -1,8 +1,8 @@
 """The camera image of the emulated robot as JPEG, rendered by ray casting: walls, ground and sky.
 
-Pure. Because of the import of numpy and Pillow, the module is loaded only on first use. Each image
-column is one direction on the ground. The obstacles of each column are drawn from the farthest to
-the nearest.
+Pure. The module imports numpy and Pillow, so it is loaded only on first use. Each image column
+corresponds to one direction on the ground. The obstacles of each column are drawn from the farthest
+to the nearest.
 """
 
 import io
@@ -45,9 +45,9 @@ class CameraPose(NamedTuple):
     z: float
     yaw: float
     pitch: float = 0.0
-    """Pitch in radians; nose down is positive."""
+    """Pitch in radians, positive with the nose down."""
     roll: float = 0.0
-    """Roll in radians; right side down is positive."""
+    """Roll in radians, positive with the right side down."""
 
 
 def camera_picture(
@@ -72,7 +72,7 @@ def camera_picture(
 def panorama_picture(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """Return the panorama image: each column is a direction, and each row is a height."""
+    """Return the panorama image, with a direction for each column and a height for each row."""
     columns, rows = size
     azimuth = np.linspace(math.pi, -math.pi, columns, endpoint=False, dtype=np.float32)
     height = np.linspace(math.pi / 2 - 0.01, -math.pi / 2 + 0.01, rows, dtype=np.float32)

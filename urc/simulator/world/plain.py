@@ -1,7 +1,7 @@
 """The laser scanner and the level camera without numpy and Pillow, for browsers and small machines.
 
-Pure. `urc.simulator.world.laser` and `urc.simulator.world.picture` do the same work faster, and
-draw every camera. The noise of the scanner differs, because the generators of random numbers do.
+Pure. `urc.simulator.world.laser` and `urc.simulator.world.picture` do the same work faster and
+support every camera. The scanner noise differs, because the random number generators differ.
 """
 
 import math
@@ -31,9 +31,10 @@ _HOLE: Final = (40, 38, 36)
 _FAR_M: Final = 25.0
 """Distance in metres at which a colour is an equal blend of its own colour and the horizon."""
 _TILES_M: Final = 30.0
-"""Distance in metres beyond which the tiles of the ground are smaller than a pixel."""
+"""Distance in metres beyond which the ground tiles are smaller than a pixel."""
 STRIDE: Final = 2
-"""Number of neighbouring columns that show the same ray; a ray for each column takes too long."""
+"""Number of neighbouring columns that show the same ray; a ray for each column would take too
+long."""
 _SHADES: Final = 4096
 """Number of slopes in a table of colours."""
 _NEAREST: Final = 1e-6
@@ -77,7 +78,7 @@ class _Column(NamedTuple):
     scale: float
     """Slope of the ray per pixel from the horizon."""
     even: Channels
-    """Sky, and ground of even tiles."""
+    """Colours of the sky, and of the ground's even tiles."""
     odd: Channels
     hole: Channels
 
@@ -111,7 +112,7 @@ def sweep(plan: WorldMap, moment: SensorInput) -> Mapping[str, object]:
 def _echoes(
     edge: Edge, x: float, y: float, first: float, step: float, rays: int
 ) -> Iterator[tuple[int, float]]:
-    """Yield the number and the distance of each ray that meets an edge."""
+    """Yield the number and the distance of each ray that hits an edge."""
     start = math.atan2(edge.y1 - y, edge.x1 - x)
     swept = math.remainder(math.atan2(edge.y2 - y, edge.x2 - x) - start, math.tau)
     low, size = (start, swept) if swept >= 0 else (start + swept, -swept)
@@ -147,7 +148,7 @@ def level_picture(
 
     Args:
         plan: the obstacles.
-        pose: pose of the camera, which is neither pitched nor rolled.
+        pose: pose of the camera, without pitch and roll.
         size: columns and rows of the image.
         view: horizontal field of view in radians, below pi.
     """
@@ -235,7 +236,7 @@ def _blend(one: Colour, other: Colour, share: float) -> Colour:
 
 
 def _row(column: _Column, height: int, slope: float) -> int:
-    """Return the first row whose ray is not above `slope`, within the image."""
+    """Return the first row of the image whose ray is not above `slope`."""
     return min(height, max(0, math.ceil(height / 2 - 0.5 - slope / column.scale)))
 
 

@@ -53,8 +53,8 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The default room, 10 by 7 m. The room contains boxes, four coloured posts and stairs down; a wall
-with a door divides the room into two halves."""
+"""The default room, 10 by 7 m. The room contains boxes, four coloured posts and stairs down. A wall
+with a door divides it into two halves."""
 
 
 class WorldMap:

@@ -1,6 +1,6 @@
 """Vectorized intersection of rays with the edges of a world map.
 
-Pure. Because of the import of numpy, the module is loaded only on first use.
+Pure. The module imports numpy, so it is loaded only on first use.
 """
 
 from typing import Final
@@ -31,7 +31,7 @@ class EdgeArrays:
 
 
 def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
-    """Return the distance and the position along the edge, for each pair of ray and edge.
+    """Return the distance and the position along the edge for each pair of ray and edge.
 
     Args:
         faces: the edges.
@@ -40,7 +40,7 @@ def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Number
         angles: directions of the rays in radians, counter-clockwise from the x axis.
 
     Returns:
-        Two arrays of shape (rays, edges): distances in metres (``inf`` without intersection), and
+        Two arrays of shape (rays, edges): distances in metres (``inf`` without an intersection) and
         positions from 0 to 1.
     """
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]

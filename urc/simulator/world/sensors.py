@@ -1,7 +1,7 @@
 """The sensors of an emulated robot in its world.
 
-Pure. Readings are in metres, radians, seconds and volts. As exceptions, bearings, latitudes and
-longitudes are in degrees.
+Pure. Readings are in metres, radians, seconds and volts, but bearings, latitudes and longitudes are
+in degrees.
 """
 
 import math
@@ -39,7 +39,7 @@ class SensorInput(NamedTuple):
     time_s: float
     """Time, in seconds since the epoch."""
     noise: float = 1.0
-    """Factor on the declared noise."""
+    """Factor applied to the declared noise."""
 
     def gauss(self, name: str) -> float:
         """Return a random error with a standard deviation of 1 for the current time step."""
@@ -141,7 +141,7 @@ def imu(moment: SensorInput) -> Mapping[str, object]:
 def place_on_earth(spec: WorldSpec, x: float, y: float) -> tuple[float, float]:
     """Return the latitude and longitude of a point.
 
-    The point is in metres east (x) and north (y) of the datum.
+    The point is `x` metres east and `y` metres north of the datum.
     """
     latitude, longitude, _ = spec.datum
     sine = math.sin(math.radians(latitude))
@@ -183,7 +183,7 @@ def gps(moment: SensorInput) -> Mapping[str, object]:
 
 
 def _ddmm(degrees: float, width: int) -> str:
-    """Return degrees and minutes in the format of NMEA 0183, without the hemisphere."""
+    """Return degrees and minutes in NMEA 0183 format, without the hemisphere."""
     minutes = round(abs(degrees) * 60, 4)
     whole, rest = divmod(minutes, 60)
     return f"{int(whole):0{width}}{rest:07.4f}"
@@ -221,7 +221,7 @@ def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """The battery, with a level of at least 0. An empty battery is replaced after a standstill."""
+    """The battery; its level is at least 0. If empty, it is replaced after a standstill."""
 
     def __init__(self, spec: WorldSpec) -> None:
         """Initialise the battery with the declared level."""
@@ -231,7 +231,7 @@ class Battery:
         self.current = spec.battery.idle
         """Current drawn from the battery, in A."""
         self._stands_s = 0.0
-        """Time at standstill with an empty battery, in seconds."""
+        """Time spent at standstill with an empty battery, in seconds."""
 
     @property
     def level(self) -> float:

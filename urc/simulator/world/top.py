@@ -1,6 +1,6 @@
 """Top views of the world as JPEG, for cards and pages of an emulated robot.
 
-Pure. Because of the import of Pillow, the module is loaded only on first use.
+Pure. The module imports Pillow, so it is loaded only on first use.
 """
 
 import io

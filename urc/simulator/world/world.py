@@ -40,11 +40,11 @@ _ASKED_EVERY_S: Final = 0.1
 _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
-"""Battery level after the fault low-battery, in per cent."""
+"""Battery level after a low-battery fault, in per cent."""
 _RENDERED: Final = frozenset({"laser", "picture", "panorama", "top"})
 """Readings that need numpy or Pillow."""
 PLAIN: Final = frozenset({"laser", "picture"})
-"""Readings that `urc.simulator.world.plain` draws without them."""
+"""Readings that `urc.simulator.world.plain` draws without numpy and Pillow."""
 _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
@@ -59,10 +59,10 @@ class World:
         spec: the declaration.
         inputs: function that returns the inputs of the body at a given time. The function `inputs`
             may observe the world at the current step.
-        holds: function that evaluates a condition of the camera, which a document may give as a
+        holds: function that evaluates a camera condition, which a document may declare as a
             template.
         has_rendering: whether numpy and Pillow are installed.
-        is_plain: whether to draw level cameras and laser scanners without these packages, slowly.
+        is_plain: whether to draw level cameras and laser scanners slowly, without these packages.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class World:
         self.is_plain = is_plain and not has_rendering
         drawn = _RENDERED if has_rendering else PLAIN if is_plain else frozenset[str]()
         self.missing = _RENDERED - drawn
-        """Names of `READINGS` that need a package that is not installed."""
+        """Names of `READINGS` that require a missing package."""
         self.dropped = set(self.missing)
         """Names of failed `READINGS`. Failed readings have no value."""
         self._inputs = inputs
@@ -97,7 +97,7 @@ class World:
         self._is_busy = False
         self._trail: deque[tuple[float, float]] = deque([(x, y)], _TRAIL_MOST)
         self._kept: dict[object, tuple[float, bytes]] = {}
-        """Time and bytes of the last image, by kind of image."""
+        """Time and bytes of the last image, keyed by kind of image."""
         self._faces: EdgeArrays | None = None
 
     def advance(self, now_s: float) -> None:
@@ -160,7 +160,7 @@ class World:
     def panorama(self) -> bytes:
         """Return a panorama as JPEG, with the forward direction in the middle.
 
-        Each column of the image is a direction, and each row is a height.
+        Each image column corresponds to a direction, and each row to a height.
         """
 
         def draw() -> bytes:
@@ -228,7 +228,7 @@ class World:
             self._trail.append((motion.x, motion.y))
 
     def _collide(self) -> None:
-        """Move a body that overlaps an obstacle back to the edge of the obstacle."""
+        """Move a body that overlaps an obstacle back to the obstacle's edge."""
         motion, self.touch = self.motion, None
         for _ in range(3):  # a corner has two edges
             touch = self.plan.touch(motion.x, motion.y, motion.z, self.spec.body.radius)

@@ -1,9 +1,10 @@
-"""The kinds of bridges of ROS, and the choice among them.
+"""The kinds of ROS bridges, and the automatic choice of one kind.
 
 A WebSocket client offers subprotocols, and the server selects one. A server of the Foxglove
-protocol requires one of its own; a rosbridge selects none. With ``via: auto``, the transport
-therefore offers the subprotocols of Foxglove, and follows the selection of the server. Without a
-port, the transport tries the usual ports of both, first the port that worked last.
+protocol requires one of its own subprotocols. A rosbridge server selects no subprotocol. With
+``via: auto``, the transport therefore offers the subprotocols of Foxglove, and follows the
+selection of the server. If no port is given, the transport tries the usual ports of both kinds,
+beginning with the port that worked last.
 """
 
 from collections.abc import Mapping
@@ -58,7 +59,7 @@ class Candidate:
         self._rosbridge = other
 
     async def open(self, timeout_s: float) -> _Bridge:
-        """Connect, and return the transport for the kind of the server."""
+        """Connect, and return the transport for the server's kind of bridge."""
         await self._wire.open(timeout_s)
         is_foxglove = self._wire.subprotocol in SUBPROTOCOLS
         bridge: _Bridge = self._foxglove if is_foxglove else self._rosbridge
@@ -70,14 +71,14 @@ class AnyBridgeTransport:
     """A transport to the first bridge that answers; may be opened several times."""
 
     def __init__(self, candidates: list[Candidate], where: str) -> None:
-        """Initialise without connecting; `where` is the target as text to display."""
+        """Initialise without connecting; `where` is the target as display text."""
         self._candidates = candidates
         self._where = where
         self._bridge: _Bridge | None = None
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``ros 192.168.1.5``."""
+        """Target of the transport as display text, such as ``ros 192.168.1.5``."""
         return self._bridge.address if self._bridge is not None else f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -90,7 +91,7 @@ class AnyBridgeTransport:
             except ConnectFailed as fault:
                 faults.append(str(fault))
                 continue
-            # The next attempt begins with this one, because a stop may depend on it.
+            # The next attempt begins with this bridge, because a stop may depend on that attempt.
             self._candidates.remove(candidate)
             self._candidates.insert(0, candidate)
             return
@@ -117,7 +118,7 @@ class AnyBridgeTransport:
             await bridge.abort()
 
     async def settle(self) -> str:
-        """Wait until the first messages have arrived; return a line about lost ones, or ""."""
+        """Wait until the first messages have arrived; return a line about lost messages, or ""."""
         return "" if self._bridge is None else await self._bridge.settle()
 
     async def probe(self) -> None:
@@ -135,7 +136,7 @@ class AnyBridgeTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport of ROS for the options of a document.
+    """Return a ROS transport for the options of a document.
 
     See docs/transports/rosbridge.md and docs/transports/foxglove.md.
 

@@ -1,13 +1,13 @@
 """A transport for ROS robots behind a server of the Foxglove protocol, such as foxglove_bridge.
 
-Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
-protocol is `FoxgloveSession`, whose objects are discarded with the connection, so no data can be
-sent late. A task reads continuously, even if messages are consumed slowly: the bridge drops the
-oldest data of a slow client. Channels come and go; changes are collected for `_SETTLE_S`, because a
-broken robot may announce thousands of channels a second.
+Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings.
+`FoxgloveSession` implements the protocol. Its objects are discarded with the connection, so no data
+can be sent late. A task reads continuously, even if messages are consumed slowly, because the
+bridge drops the oldest data of a slow client. Channels can appear and disappear. Changes are
+collected for `_SETTLE_S`, because a broken robot may announce thousands of channels per second.
 
-A bridge creates a publisher of ROS when the client announces a topic, and ROS connects publishers
-and subscribers later. Stops are therefore repeated, and topics of earlier connections are announced
+A bridge creates a ROS publisher when the client announces a topic, and ROS connects publishers and
+subscribers later. Stops are therefore repeated, and topics of earlier connections are announced
 again as soon as a connection opens.
 """
 
@@ -26,12 +26,12 @@ __all__ = ["DEFAULT_PORT", "FoxgloveTransport"]
 
 DEFAULT_PORT: Final = 8765
 _GREETS_S: Final = 3.0
-"""Maximum wait for the description of the server, in seconds."""
+"""Maximum wait for the server's description, in seconds."""
 _SETTLE_S: Final = 0.1
 _CHECK_S: Final = 2.0
-"""Delay until missing topics are reported, in seconds."""
+"""Delay before missing topics are reported, in seconds."""
 _CONNECTS_S: Final = 1.0
-"""Time in which ROS connects a new publisher, in seconds."""
+"""Time that ROS needs to connect a new publisher, in seconds."""
 _TURN_S: Final = 0.005
 """Maximum time for reading frames in one turn of the event loop, in seconds."""
 
@@ -50,8 +50,8 @@ class FoxgloveTransport:
 
         Args:
             wire: WebSocket transport that offers the subprotocols, owned by this transport.
-            where: target as text to display, such as ``192.168.1.5:8765``.
-            wishes: topics to subscribe to, each once.
+            where: target as display text, such as ``192.168.1.5:8765``.
+            wishes: topics to subscribe to, without duplicates.
             ros: ROS version declared in the document; None if undeclared.
         """
         self._wire = wire
@@ -63,14 +63,14 @@ class FoxgloveTransport:
         self._tasks: list[asyncio.Task[None]] = []
         self._greeted = asyncio.Event()
         self._news = asyncio.Event()
-        """Event that is set after the robot has announced something."""
+        """Event that is set after an announcement from the robot."""
         self._check: asyncio.TimerHandle | None = None
         self._fresh: dict[str, None] = {}
         """Topics whose first message may not have arrived yet."""
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``ros 192.168.1.5:8765``."""
+        """Target of the transport as display text, such as ``ros 192.168.1.5:8765``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -118,7 +118,7 @@ class FoxgloveTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish or call a service; return when the kernel has the data.
+        """Publish or call a service; return when the kernel has accepted the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -208,7 +208,7 @@ class FoxgloveTransport:
             self._greeted.set()
 
     async def _settle(self, session: FoxgloveSession) -> None:
-        """Subscribe to topics after the robot has announced something, until cancelled."""
+        """Subscribe to topics after each announcement from the robot, until cancelled."""
         with suppress(TransportError):  # the reader reports the end of the connection
             while True:
                 await self._news.wait()

@@ -1,8 +1,8 @@
 """Frames of the Foxglove WebSocket protocol. Pure.
 
-A text frame is a JSON object with the key ``op``. A binary frame begins with one byte for its kind;
-all numbers are little-endian. The specification is that of foxglove/ws-protocol, version 1. The
-subprotocol ``foxglove.sdk.v1`` has the same frames.
+A text frame is a JSON object with the key ``op``. The first byte of a binary frame is its kind, and
+all numbers are little-endian. The specification is foxglove/ws-protocol, version 1. The subprotocol
+``foxglove.sdk.v1`` uses the same frames.
 """
 
 import struct
@@ -46,7 +46,7 @@ class MessageData(NamedTuple):
 
 
 class TimeTold(NamedTuple):
-    """The time of the robot, such as the time of a simulation."""
+    """The robot's time, for example simulation time."""
 
     time_ns: int
 
@@ -71,7 +71,7 @@ class AdvertisedChannel(NamedTuple):
 
 
 class ServiceType(NamedTuple):
-    """A service of the robot; `request` and `response` are type, encoding, notation and text."""
+    """A service; `request` and `response` each contain type, encoding, notation and text."""
 
     id: int
     name: str
@@ -112,7 +112,7 @@ class FrameReader:
 
 
 def channel_of(said: Mapping[str, Any]) -> AdvertisedChannel:
-    """Return an announced channel; raise `BadOperation` if it is invalid."""
+    """Return an announced channel; raise `BadOperation` for an invalid channel."""
     number, topic, encoding = _number(said), said.get("topic"), said.get("encoding")
     if number is None or not isinstance(topic, str) or not isinstance(encoding, str):
         raise BadOperation("a channel has no id, topic or encoding")
@@ -126,7 +126,7 @@ def channel_of(said: Mapping[str, Any]) -> AdvertisedChannel:
 
 
 def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceType:
-    """Return an announced service; raise `BadOperation` if it is invalid.
+    """Return an announced service; raise `BadOperation` for an invalid service.
 
     Older servers send only ``requestSchema`` and ``responseSchema``, in the encoding of the server.
     """

@@ -1,15 +1,15 @@
 """The state of one open connection of the Foxglove protocol: channels, subscriptions, calls.
 
-No I/O: the session writes frames into a list, which the transport sends. Objects serve only one
-connection, so no state is carried over to the next connection.
+The session does no I/O. It writes frames to a list, and the transport sends these frames. Objects
+serve only one connection, so no state is carried over to the next connection.
 
-The robot announces its topics as channels, which come and go. The session subscribes only to the
-topics of the driver. The bridge sends every message, so the session itself drops messages that come
-too soon; the last message of a burst is delivered later. Messages stay bytes: the definition of a
-topic's type precedes its messages (`urc.protocol.ros.topic_codec`).
+The robot announces its topics as channels, which can appear and disappear. The session subscribes
+only to the driver's topics. The bridge sends every message, so the session itself drops messages
+that arrive too soon. It delivers the last message of a burst later. The session passes messages on
+as bytes, preceded by the definition of the topic's type (`urc.protocol.ros.topic_codec`).
 
-The list of topics and the parameters have a counterpart in the protocol. The session therefore
-answers these services of rosapi itself, so the same document works with rosbridge.
+The protocol provides the list of topics and the parameters. The session uses them to answer the
+corresponding rosapi services itself, so the same document also works with rosbridge.
 """
 
 import json
@@ -45,10 +45,10 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
 
 MAX_CHANNELS: Final = 4096
-"""Maximum number of known services, and of known channels; further ones are ignored. Channels of
+"""Maximum number of known services, and of known channels; more are ignored. Channels of
 the driver's topics are accepted up to twice this number."""
 MAX_PENDING: Final = 256
-"""Maximum number of pending calls; beyond this limit, the oldest is dropped."""
+"""Maximum number of pending calls; above the limit, the oldest call is dropped."""
 KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
@@ -59,7 +59,7 @@ _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
 _ENCODINGS: Final = ("cdr", "ros1", "json")
 PARAMETER: Final = "parameter:"
-"""Beginning of a topic that is a parameter, such as ``parameter:/driver.rate``."""
+"""Prefix of a topic that stands for a parameter, such as ``parameter:/driver.rate``."""
 
 log = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ class _Subscription:
         self.due_s = float("-inf")
         self.is_heard = False
         self.late: Envelope | None = None
-        """Newest message that came too soon."""
+        """Newest message that arrived too soon."""
 
 
 class FoxgloveSession:
@@ -102,12 +102,12 @@ class FoxgloveSession:
 
         Args:
             queue: queue for messages and replies.
-            wishes: topics of the driver, each once.
+            wishes: topics of the driver, without duplicates.
             graph: checks of topics.
-            call_at: function that calls a function at a time of `clock`.
+            call_at: function that calls a function at a given time of `clock`.
             clock: monotonic clock, in seconds.
-            published: type of each published topic, by topic and encoding; kept over connections,
-                so that a new connection announces all of them at once.
+            published: type of each published topic, by topic and encoding. The mapping persists
+                across connections, so that a new connection announces all these topics immediately.
         """
         self.queue = queue
         self._wishes = {one.topic: one for one in wishes}
@@ -124,7 +124,7 @@ class FoxgloveSession:
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
         self._asked: dict[str, tuple[object, str]] = {}
-        """Request number and service of each pending question about parameters, by its id."""
+        """Request number and service of each pending parameter query, by query id."""
         self._listeners: dict[str, set[object]] = {}
         self._number = 0
         self._time = RobotTime()
@@ -134,11 +134,11 @@ class FoxgloveSession:
         self.capabilities: frozenset[str] = frozenset()
         self.encodings: tuple[str, ...] = ()
         self.is_greeted = False
-        """Whether the robot has described itself."""
+        """Whether the server's description has arrived."""
         self.has_graph = False
 
     def written(self) -> list[tuple[bytes, bool]]:
-        """Remove and return the frames to send, each with whether it is text."""
+        """Remove and return the frames to send, each with a flag for text."""
         frames, self._frames = self._frames, []
         return frames
 
@@ -218,7 +218,7 @@ class FoxgloveSession:
                 self._channels.pop(number, None)
 
     def reconcile(self) -> None:
-        """Subscribe to the topics of the driver, after channels have come or gone."""
+        """Subscribe to the driver's topics after a change of the channels."""
         found: dict[str, AdvertisedChannel] = {}
         for channel in self._channels.values():
             if channel.topic in self._wishes and channel.encoding in _ENCODINGS:
@@ -349,7 +349,7 @@ class FoxgloveSession:
             self._listeners.pop(str(name), None)
 
     def listeners(self, topic: str) -> list[object] | None:
-        """Return the nodes that subscribe to a topic; None if the robot does not tell."""
+        """Return the nodes that subscribe to a topic; None if unknown."""
         return list(self._listeners.get(topic, ())) if self.has_graph else None
 
     def _status(self, said: Mapping[str, Any]) -> None:
@@ -362,8 +362,9 @@ class FoxgloveSession:
     def _forget_refused(self, channels: set[int]) -> None:
         """Forget the subscriptions of refused channels, so that `reconcile` subscribes again.
 
-        The server of the Foxglove SDK announces a channel before it accepts subscriptions, so a
-        quick client is refused. The refusal is a text with the number of the channel.
+        The Foxglove SDK's server announces a channel before it accepts subscriptions, so it refuses
+        a client that subscribes immediately. The refusal is a text that contains the channel
+        number.
         """
         for one in list(self._topics.values()):
             topic, is_refused = one.wish.topic, one.channel.id in channels and not one.is_heard
@@ -379,7 +380,7 @@ class FoxgloveSession:
     # -- sending
 
     def perform(self, envelope: Envelope) -> None:
-        """Write the frames of an envelope.
+        """Write the frames for an envelope.
 
         Raises:
             TransportError: the robot does not support the operation.
@@ -471,7 +472,7 @@ class FoxgloveSession:
         self._frames.append((frame, False))
 
     def _answer_as_rosapi(self, name: str, number: object, body: object) -> bool:
-        """Answer a service of rosapi by the protocol; return False for all other services."""
+        """Answer a rosapi service through the protocol; return False for all other services."""
         fields = body if isinstance(body, Mapping) else {}
         if name == "/rosapi/topics":
             found = {one.topic: one.type for one in self._channels.values()}

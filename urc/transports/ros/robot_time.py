@@ -1,7 +1,7 @@
 """The clock of a robot, estimated from the times in its messages. No I/O.
 
-The clock of a robot may differ from the clock of this machine, and the clock of a simulation may
-stand still. Messages are delayed, so the largest difference of the last seconds is the best one.
+The clock of a robot may differ from the clock of this machine, and a simulation's clock may be
+paused. Messages are delayed, so the largest difference in the last seconds is the best estimate.
 """
 
 import struct
@@ -22,7 +22,7 @@ class RobotTime:
         self._taken_ns: int | None = None
 
     def told(self, robot_ns: int, here_ns: int) -> None:
-        """Record a time of the robot that arrived at `here_ns` of this machine."""
+        """Record a robot time that arrived at the time `here_ns` of this machine."""
         difference = robot_ns - here_ns
         is_old = self._taken_ns is None or here_ns - self._taken_ns > _KEPT_NS
         if is_old or difference >= self._difference_ns:

@@ -3,8 +3,8 @@
 Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
 protocol over the WebSocket is implemented by roslibpy (`urc.transports.ros.rosbridge_client`). The
 objects of roslibpy are discarded with the connection, so no data can be sent late. A task reads
-continuously, even if messages are consumed slowly: one stalled reader would freeze the topic for
-every client of the bridge.
+continuously, even if messages are consumed slowly, because one stalled reader would freeze the
+topic for every client of the bridge.
 
 A bridge delivers the first message of a topic only after its publisher has connected to the
 subscribers. If the client disconnects earlier, the message is dropped. Clients therefore call
@@ -12,10 +12,10 @@ subscribers. If the client disconnects earlier, the message is dropped. Clients 
 rosapi also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
-all result in missing messages. The transport therefore asks rosapi for the list of topics at the
-start, and for a topic's subscribers at its first message. `urc.transports.ros.graph` reports
-mistakes. With ``version: auto``, subscriptions wait for the list of topics, which determines the
-form of type names.
+all result in missing messages. The transport therefore requests the list of topics from rosapi at
+the start, and a topic's subscribers at the topic's first message. `urc.transports.ros.graph`
+reports mistakes. With ``version: auto``, subscriptions wait for the list of topics, which
+determines the form of type names.
 """
 
 import asyncio
@@ -45,9 +45,9 @@ __all__ = ["AUTO", "DEFAULT_PORT", "RosbridgeTransport", "merged", "subscription
 DEFAULT_PORT = 9090
 AUTO: Final = "auto"
 _ANSWER_S = 3.0
-"""Maximum wait for a reply of rosapi, in seconds; without a reply, rosapi counts as missing."""
+"""Maximum wait for a reply from rosapi, in seconds; afterwards, rosapi counts as missing."""
 _PART = 0.5
-"""Maximum part of the timeout of an opening that is spent on that wait."""
+"""Maximum fraction of the connection timeout that is spent on that wait."""
 _CONNECTS_S = 1.0
 """Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
@@ -72,7 +72,7 @@ class RosbridgeTransport:
 
         Args:
             wire: WebSocket transport to the bridge, owned by this transport.
-            where: target as text to display, such as ``192.168.1.5:9090``.
+            where: target as display text, such as ``192.168.1.5:9090``.
             subscriptions: subscriptions made at each opening, one per topic.
             ros: ROS version 1 or 2 that determines the form of type names; "auto": the bridge's
                 version; None: names stay as written.
@@ -86,7 +86,7 @@ class RosbridgeTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text to display, such as ``rosbridge 192.168.1.5:9090``."""
+        """Target of the transport as display text, such as ``ros 192.168.1.5:9090``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -118,7 +118,7 @@ class RosbridgeTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call a service, or start or cancel a goal; return when the kernel has the data.
+        """Publish, call a service, or start or cancel a goal; return after the kernel has the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -200,7 +200,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
 
 def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic, because a second one cancels the first one's throttle."""
+    """Return one subscription per topic, because a second would cancel the first one's throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)

@@ -36,7 +36,7 @@ KNOWN_TOPICS = 256
 
 
 class RosSubscription(NamedTuple):
-    """One subscription in the form that is sent to the bridge."""
+    """One subscription, as sent to the bridge."""
 
     topic: str
     type: str = ""
@@ -122,7 +122,7 @@ class RosClient:
 
     def _publish(self, attributes: Mapping[str, object], body: object) -> None:
         name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
-        if not kind:  # the bridge knows the type if any other client uses the topic
+        if not kind:  # the bridge can find the type if another client uses the topic
             operation = {"op": "publish", "topic": name, "msg": _fields(body)}
             self._protocol.send_ros_message(Message(operation))
             return
@@ -238,7 +238,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         return frames
 
     def arrived(self, operation: dict[str, Any]) -> None:
-        """Let roslibpy process an operation, or raise `BadOperation` for an invalid operation."""
+        """Pass an operation to roslibpy; raise `BadOperation` for an invalid operation."""
         handler: Callable[[Any], None] | None = self._message_handlers.get(operation["op"])
         if handler is None:
             unknown = one_line(repr(operation["op"]), _NAME_SHOWN)
@@ -283,7 +283,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """A version of roslibpy's connection factory that always counts as connected."""
+    """A version of roslibpy's connection factory that always appears connected."""
 
     is_connected = True
 

@@ -138,7 +138,7 @@ def _read_json(text: bytes | str) -> dict[str, Any]:
 
 
 def _read_cbor(data: bytes) -> object:
-    import cbor2  # only where a subscription asks for CBOR
+    import cbor2  # needed only for subscriptions with CBOR
 
     try:
         return _Plain(len(data)).of(cbor2.loads(data, tag_hook=_tagged))

@@ -1,4 +1,4 @@
-"""The number of a robot's alarms, for its card and for the overview of the API.
+"""The alarm counts of a robot, for its card and for the API's overview.
 
 Layer 5. Pure.
 """
@@ -14,11 +14,11 @@ __all__ = ["by_urgency", "count_of"]
 def count_of(
     robot: str, records: Iterable[AlarmRecord], *, is_monitored: bool = False
 ) -> AlarmCount:
-    """Return the number of the alarms that operators must see.
+    """Return the counts of a robot's annunciated alarms.
 
     Args:
-        robot: name of the robot in paths.
-        records: all alarms that are not normal.
+        robot: the robot's name in paths.
+        records: all alarms outside the normal state.
         is_monitored: whether the robot stays connected for its alarms.
     """
     shown = [one for one in records if one.is_annunciated]
@@ -35,7 +35,7 @@ def count_of(
 
 
 def by_urgency(record: AlarmRecord) -> tuple[object, ...]:
-    """Return the sort key of an alarm: annunciated, unacknowledged, priority, then first-out."""
+    """Return an alarm's sort key: annunciated, active, unacknowledged, severity, then first-out."""
     hidden = not record.is_annunciated
     order = severity(record.condition, record.priority)
     return (hidden, not record.is_active, record.is_acknowledged, order, record.number)

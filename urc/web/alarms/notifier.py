@@ -1,9 +1,9 @@
-"""Notifications of alarms by the maintainer's hook: a command, or a URL.
+"""Alarm notifications through the maintainer's hook: a command or a URL.
 
-Layer 5. `AlarmNotifier.queue` only queues; a thread of its own collects the alarms of one second,
-and calls the hook once for each robot. During a flood, a robot is notified at most once a minute.
-The queue is bounded, each attempt has a timeout, and failures are counted and logged. The hook
-never gets secrets of robots, because the hub has removed them from all values.
+Layer 5. `AlarmNotifier.queue` never blocks. A separate thread collects alarms for one second, then
+calls the hook once per robot. During a flood, the hook is called at most once a minute for the
+robot. The queue is bounded, each attempt has a timeout, and failures are counted and logged. The
+hook never receives robot secrets, because the hub removes them from all values.
 """
 
 import asyncio
@@ -30,32 +30,32 @@ from urc.web.show.cells import spoken
 __all__ = ["AlarmNotifier", "NotifyCount", "NotifyFailed"]
 
 GATHER_S: Final = 1.0
-"""Time for which the alarms of one notification are collected, in seconds."""
+"""Time spent collecting the alarms of one notification, in seconds."""
 FLOOD_GAP_S: Final = 60.0
-"""Shortest time between two notifications of a robot with a flood, in seconds."""
+"""Minimum time between two notifications about a robot with a flood, in seconds."""
 MOST_WAITING: Final = 1000
-"""Maximum number of alarms that wait for a notification."""
+"""Maximum number of queued alarms."""
 MOST_SHOWN: Final = 50
-"""Maximum number of alarms in one notification; the rest is counted."""
+"""Maximum number of alarms listed in one notification; further alarms are only counted."""
 _WAITS_S: Final = (2.0, 5.0, 10.0, 20.0)
-"""Delays before further attempts, in seconds."""
+"""Delays before each retry, in seconds."""
 _CLOSE_S: Final = 2.0
 
 log = logging.getLogger(__name__)
 
 
 class NotifyFailed(UrcError):
-    """A notification that did not arrive."""
+    """A failed call of the hook."""
 
 
 class NotifyCount(NamedTuple):
-    """The notifications since the start of the server."""
+    """Counts of notifications since the server started."""
 
     sent: int
     failed: int
-    """Number of notifications that failed in all attempts."""
+    """Number of notifications for which every attempt failed."""
     lost: int
-    """Number of alarms that were not notified, because too many waited."""
+    """Number of alarms dropped because the queue was full."""
 
 
 class _QueuedAlarm(NamedTuple):
@@ -66,15 +66,15 @@ class _QueuedAlarm(NamedTuple):
 
 
 class AlarmNotifier:
-    """The caller of the hook, for all robots of a server."""
+    """A queue of alarms of all robots, with a thread that calls the hook."""
 
     def __init__(self, options: NotifyOptions, now: Callable[[], float] = time.monotonic) -> None:
-        """Prepare; the thread starts with the first alarm."""
+        """Prepare the queue; the thread starts with the first alarm."""
         self._options = options
         self._now = now
         self._waiting: list[_QueuedAlarm] = []
         self._next_at: dict[str, float] = {}
-        """Earliest time of the next notification of each robot with a flood."""
+        """Earliest time of the next notification about each robot with a flood."""
         self._counts: Counter[str] = Counter()
         self._wakes = threading.Condition()
         self._is_closing = False
@@ -83,15 +83,15 @@ class AlarmNotifier:
 
     @property
     def count(self) -> NotifyCount:
-        """The numbers of notifications so far."""
+        """The counts of notifications so far."""
         return NotifyCount(*(self._counts[one] for one in NotifyCount._fields))
 
     def queue(
         self, robot: str, title: str, alarms: RobotAlarms, events: Sequence[AlarmEvent]
     ) -> None:
-        """Queue the alarms among some events, and return immediately.
+        """Queue the alarms that need a notification, and return immediately.
 
-        Shelved and suppressed alarms are not notified.
+        Shelved and suppressed alarms are skipped.
         """
         found = [
             _QueuedAlarm(robot, title, alarms.list.is_flooded, _alarm(one, alarms))
@@ -102,7 +102,7 @@ class AlarmNotifier:
             return
         with self._wakes:
             self._waiting += found
-            # The oldest are dropped: the newest alarms describe the present.
+            # Drop the oldest alarms: the newest ones describe the present.
             excess = len(self._waiting) - MOST_WAITING
             if excess > 0:
                 del self._waiting[:excess]
@@ -121,7 +121,7 @@ class AlarmNotifier:
         return event.kind == "returned" and self._options.has_returned and is_shown
 
     def settle(self, timeout_s: float) -> bool:
-        """Wait until nothing waits for a notification; return whether the wait succeeded."""
+        """Wait until the queue is empty and idle; return False after the timeout."""
         with self._wakes:
             return self._wakes.wait_for(lambda: not (self._waiting or self._is_busy), timeout_s)
 
@@ -141,7 +141,7 @@ class AlarmNotifier:
                 self._notify(robot, [one for one in batch if one.robot == robot])
 
     def _next_batch(self) -> list[_QueuedAlarm]:
-        """Wait for alarms that are due, and return them; return [] after `close`."""
+        """Wait for due alarms and return them; return [] after `close`."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()
@@ -149,7 +149,7 @@ class AlarmNotifier:
             self._pause(GATHER_S)
             while not self._is_closing:
                 now = self._now()
-                # By robot: the flood of one robot must not delay the alarms of another.
+                # Checked per robot: one robot's flood must not delay another robot's alarms.
                 due = [one for one in self._waiting if self._next_at.get(one.robot, 0.0) <= now]
                 if due:
                     self._waiting = [one for one in self._waiting if one not in due]
@@ -159,7 +159,7 @@ class AlarmNotifier:
             return []
 
     def _pause(self, seconds: float) -> None:
-        """Wait, but not for the end of the server."""
+        """Wait, but return early when the notifier closes."""
         self._wakes.wait_for(lambda: self._is_closing, seconds)
 
     def _notify(self, robot: str, batch: Sequence[_QueuedAlarm]) -> None:
@@ -193,7 +193,7 @@ class AlarmNotifier:
         self._counts["failed"] += 1
 
     def _call(self, data: bytes) -> None:
-        """Call the hook once; raise `NotifyFailed`."""
+        """Call the hook once; raise `NotifyFailed` if the call fails."""
         if self._options.command:
             _run(self._options, data)
         else:
@@ -202,7 +202,7 @@ class AlarmNotifier:
 
 def _run(options: NotifyOptions, data: bytes) -> None:
     try:
-        # A session of its own, so that its children end together with it.
+        # A new session, so that `killpg` also ends child processes.
         process = subprocess.Popen(  # noqa: S603 - the maintainer's own command, without a shell
             options.command,
             stdin=subprocess.PIPE,
@@ -239,7 +239,7 @@ async def _post(options: NotifyOptions, data: bytes) -> None:
     except TimeoutError:
         raise NotifyFailed(f"{options.place}: no reply within {options.timeout_s:g} s") from None
     except (httpx2.HTTPError, httpx2.InvalidURL, OSError) as error:
-        # The text of the error may contain the URL, and the URL a secret.
+        # The error text may contain the URL, and the URL may contain a secret.
         raise NotifyFailed(f"{options.place}: {type(error).__name__}") from None
     if not 200 <= status < 300:
         raise NotifyFailed(f"{options.place}: status {status}")

@@ -1,7 +1,7 @@
-"""The file with the maintainer's hook for notifications of alarms.
+"""The options file with the maintainer's hook for alarm notifications.
 
-Layer 5. A URL of a web hook is often a secret itself, so it can stand in another file, which only
-its owner may read.
+Layer 5. A web hook's URL is often a secret, so it can be stored in a separate file that only its
+owner can read.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ __all__ = ["KEYS", "NotifyOptions", "read_notify_options"]
 KEYS: Final = (
     "command", "url", "url_file", "secret_file", "priority", "returned", "timeout_s", "tries",
 )  # fmt: skip
-"""All keys of the file."""
+"""All permitted keys of the file."""
 _MOST_WORDS: Final = 50
 _LONGEST_S: Final = 60.0
 _MOST_TRIES: Final = 5
@@ -28,22 +28,22 @@ class NotifyOptions:
     """The hook: a command or a URL."""
 
     command: tuple[str, ...] = ()
-    """Program and arguments; the program reads the notification as JSON from its standard input."""
+    """Program and arguments; the program reads the notification as JSON from standard input."""
     url: str = field(default="", repr=False)
-    """URL that gets the notification as a POST with JSON."""
+    """URL to which notifications are posted as JSON."""
     secret: str = field(default="", repr=False)
-    """Secret that is sent as ``Authorization: Bearer``; "" for none."""
+    """Secret sent as ``Authorization: Bearer``; "" to send no such header."""
     priority: AlarmPriority = "medium"
-    """Lowest priority that is notified."""
+    """Lowest priority of alarms in notifications."""
     has_returned: bool = False
-    """Whether returns to normal are notified, too."""
+    """Whether to send notifications about returns to normal, too."""
     timeout_s: float = 10.0
     """Longest time of one attempt, in seconds."""
     tries: int = 3
 
     @property
     def place(self) -> str:
-        """The program, or scheme and host of the URL: what logs may show."""
+        """The program, or the URL's scheme and host; logs must not show more."""
         if self.command:
             return self.command[0]
         url = httpx2.URL(self.url)
@@ -51,10 +51,10 @@ class NotifyOptions:
 
 
 def read_notify_options(file: str) -> NotifyOptions:
-    """Return the options in a file.
+    """Return the options from a file.
 
     Raises:
-        ProblemsError: the file cannot be read, or has a mistake.
+        ProblemsError: the file cannot be read, or has an error.
     """
     given = OptionsFile(file, KEYS)
     ways = [key for key in ("command", "url", "url_file") if key in given.data]

@@ -1,7 +1,8 @@
-"""Endpoints of the HTTP API about alarms: list, history, acknowledge, shelve, unshelve.
+"""HTTP API endpoints for alarms: list, history, acknowledge, shelve, unshelve.
 
-Layer 5. Reading needs the role ``watch``, acting ``drive``; no call connects a robot. The answer to
-an action waits until the change is stored, so an acknowledgement survives a crash of the server.
+Layer 5. Reading requires the role ``watch``, and actions require ``drive``. No call connects a
+robot. The response to an action waits until the change is stored, so an acknowledgement survives a
+server crash.
 """
 
 import asyncio
@@ -44,20 +45,20 @@ from urc.web.show.cells import spoken
 __all__ = ["AlarmCalls", "alarm_key"]
 
 STORED_S: Final = 2.0
-"""Longest wait for the storing of an action, in seconds."""
+"""Longest wait until an action is stored, in seconds."""
 _SETTLE_S: Final = 0.5
 _SEARCHES: Final = 2
-"""Maximum number of searches at the same time, so that other work finds free threads."""
+"""Maximum number of concurrent searches; the limit leaves threads free for other work."""
 _KINDS: Final = get_args(AlarmEventKind)
 
 
 def alarm_key(name: str, *, is_emulated: bool) -> str:
-    """Return the name of a robot in the store; emulated robots share nothing with real ones."""
+    """Return a robot's name in the store; emulated and real robots have separate entries."""
     return f"emulated:{name}" if is_emulated else name
 
 
 class AlarmCalls:
-    """The endpoints about alarms."""
+    """The alarm endpoints."""
 
     def __init__(
         self,
@@ -69,10 +70,10 @@ class AlarmCalls:
         """Prepare.
 
         Args:
-            services: function that returns the robots, by their names in paths.
-            store: the store of alarms; None for a server without a data folder.
+            services: function that returns the robots, keyed by their names in paths.
+            store: the alarm store; None for a server without a data folder.
             recorder: receives an audit entry for each action.
-            notifier: the caller of the maintainer's hook; None for none.
+            notifier: sender of alarm notifications; None for a server without a hook.
         """
         self._services = services
         self._store = store
@@ -81,7 +82,7 @@ class AlarmCalls:
         self._searching = asyncio.Semaphore(_SEARCHES)
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "alarms_overview": self.overview,
             "alarms": self.alarms,
@@ -94,7 +95,7 @@ class AlarmCalls:
     # Reading
 
     async def overview(self, request: Request) -> Response:
-        """Return the numbers of alarms of all robots that the visitor may watch."""
+        """Return the alarm counts of all robots that the visitor may watch."""
         visitor = visitor_of(request)
         counts = (
             count_of(name, one.alarms.list.records.values(), is_monitored=one.is_monitored)
@@ -106,7 +107,7 @@ class AlarmCalls:
 
     @answers_errors
     async def alarms(self, request: Request) -> Response:
-        """Return all alarms of a robot that are not normal."""
+        """Return all alarms of a robot outside the normal state."""
         name, service = service_of(self._services(), request)
         alarms = service.alarms
         records = sorted(alarms.list.records.values(), key=by_urgency)
@@ -149,7 +150,7 @@ class AlarmCalls:
 
     @answers_errors
     async def shelve(self, request: Request) -> Response:
-        """Shelve alarms until an end."""
+        """Shelve alarms for a limited time."""
         name, service = self._acting(request)
         asked = await body_of(request, ShelveAsked)
         done = service.alarms.shelve(asked.signals, asked.for_s, self._actor(request))
@@ -157,7 +158,7 @@ class AlarmCalls:
 
     @answers_errors
     async def unshelve(self, request: Request) -> Response:
-        """End the shelves of alarms."""
+        """Unshelve alarms."""
         name, service = self._acting(request)
         asked = await body_of(request, UnshelveAsked)
         done = service.alarms.unshelve(asked.signals, self._actor(request))
@@ -188,7 +189,7 @@ class AlarmCalls:
         signals = tuple(one.signal for one in done)
         if signals:
             self._recorder.alarm(actor_of(request, name), name, step, signals, **about)
-        # The change is in force already; without a confirmation, a restart may forget it.
+        # The change is already in effect; if it is not stored, a restart may lose it.
         is_stored = self._store is not None and await asyncio.to_thread(
             self._store.settle, STORED_S
         )
@@ -196,7 +197,7 @@ class AlarmCalls:
 
 
 def _query(request: Request, service: RobotService, signals: Mapping[str, Signal]) -> AlarmQuery:
-    """Return the query of a request; raise `ApiError` 400 for an invalid value."""
+    """Return the alarm query of a request; raise `ApiError` 400 for an invalid value."""
     given = request.query_params
     try:
         asked = query_of({**given, "what": given.get("kinds", "")}, None)

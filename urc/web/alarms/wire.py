@@ -1,6 +1,6 @@
-"""JSON messages of the HTTP API about alarms, in snake case.
+"""JSON messages of the HTTP API for alarms, in snake case.
 
-Layer 5. Pure. Times are in UTC seconds since 1970; 0 stands for no time.
+Layer 5. Pure. Times are in UTC seconds since 1970; 0 means that no time is set.
 """
 
 from typing import Annotated, Final
@@ -32,21 +32,21 @@ _Number = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
 
 class AlarmMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The base class of all messages in this module."""
+    """Base class of all messages in this module."""
 
 
 class AlarmInfo(AlarmMessage, frozen=True):
-    """One alarm that is not normal."""
+    """One alarm outside the normal state."""
 
     signal: str
     title: str
     """Title of the signal."""
     condition: str
-    """Crossed limit (``lolo``, ``low``, ``high``, ``hihi``), or alarm state."""
+    """Exceeded limit (``lolo``, ``low``, ``high``, ``hihi``), or alarm state of the signal."""
     priority: AlarmPriority
     state: AlarmState
     active: bool
-    """Whether the value is abnormal; if it is unknown, whether it was abnormal at last."""
+    """Whether the value is abnormal, or the last known value was abnormal."""
     known: bool
     """Whether the present value is known."""
     value: str
@@ -56,11 +56,11 @@ class AlarmInfo(AlarmMessage, frozen=True):
     action: str
     """Operator action."""
     number: int
-    """Number of the activation; the order of the numbers is first-out."""
+    """Number of the activation; numbers increase in first-out order."""
     group: int
-    """Number of the burst of alarms."""
+    """Number of the alarm's burst."""
     raised: int
-    """Number that an acknowledgement must repeat."""
+    """Number of the alarm's last raise; an acknowledgement must repeat it."""
     times: int
     """Number of activations since the alarm was last normal."""
     began_at: float
@@ -72,52 +72,52 @@ class AlarmInfo(AlarmMessage, frozen=True):
 
 
 class AlarmCount(AlarmMessage, frozen=True):
-    """The number of a robot's alarms."""
+    """The alarm counts of a robot."""
 
     robot: str
     active: int
-    """Number of active alarms that are neither shelved nor suppressed."""
+    """Number of active alarms, without shelved and suppressed alarms."""
     unacknowledged: int
-    """Number of alarms that wait for an acknowledgement."""
+    """Number of unacknowledged alarms."""
     worst: str
     """Highest priority of these alarms; "" without alarms."""
     known: bool
-    """Whether the values of all these alarms are known."""
+    """Whether all these alarms have known values."""
     monitored: bool
     """Whether the robot stays connected for its alarms."""
 
 
 class NotificationCount(AlarmMessage, frozen=True):
-    """The numbers of notifications since the start of the server."""
+    """Counts of notifications since the server started."""
 
     sent: int
     failed: int
-    """Number of notifications that failed in all attempts."""
+    """Number of notifications for which every attempt failed."""
     lost: int
-    """Number of alarms that were not notified, because too many waited."""
+    """Number of alarms dropped because the queue was full."""
 
 
 class AlarmOverview(AlarmMessage, frozen=True):
-    """The numbers of alarms of all robots that the visitor may watch."""
+    """The alarm counts of all robots that the visitor may watch."""
 
     robots: tuple[AlarmCount, ...]
     notifications: NotificationCount | None
-    """Numbers of notifications; null for a server without notifications."""
+    """Counts of notifications; null for a server without notifications."""
 
 
 class RobotAlarmList(AlarmMessage, frozen=True):
-    """All alarms of a robot that are not normal, the most urgent first."""
+    """All alarms of a robot outside the normal state, most urgent first."""
 
     time: float
-    """Time of the server."""
+    """Current time on the server."""
     flood: bool
-    """Whether more than 10 alarms have come in 10 minutes."""
+    """Whether more than 10 alarms were raised within 10 minutes."""
     count: AlarmCount
     alarms: tuple[AlarmInfo, ...]
 
 
 class AlarmHistoryEvent(AlarmMessage, frozen=True):
-    """One event of the history."""
+    """One event of the alarm history."""
 
     id: int
     at: float
@@ -131,9 +131,9 @@ class AlarmHistoryEvent(AlarmMessage, frozen=True):
     state: str
     """State of the alarm after the event."""
     who: str
-    """Name of the person or program that acted; "" for an event of the robot."""
+    """Name of the person or program that acted; "" for events from the robot."""
     until: float
-    """End of a shelf."""
+    """Time at which shelving ends."""
     times: int
 
 
@@ -142,37 +142,37 @@ class AlarmHistory(AlarmMessage, frozen=True):
 
     events: tuple[AlarmHistoryEvent, ...]
     has_more: bool
-    """Whether older events may match, too."""
+    """Whether older events may also match."""
     fault: str
-    """Reason why events currently cannot be stored, or ""."""
+    """Reason why events currently cannot be stored; "" if they can."""
     lost: int
-    """Number of events since the start of the server that could not be stored."""
+    """Number of events that could not be stored since the server started."""
 
 
 class AcknowledgeAsked(AlarmMessage, frozen=True):
-    """Request to acknowledge alarms as the operator saw them."""
+    """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """Number `raised` of each alarm, by signal; alarms that were raised again are left out."""
+    """Number `raised` of each alarm, by signal; alarms raised again since then are skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):
-    """Request to shelve alarms until an end."""
+    """Request to shelve alarms for a limited time."""
 
     signals: _Signals
     for_s: Annotated[float, msgspec.Meta(ge=1, le=LONGEST_SHELF_S)]
 
 
 class UnshelveAsked(AlarmMessage, frozen=True):
-    """Request to end the shelves of alarms."""
+    """Request to unshelve alarms."""
 
     signals: _Signals
 
 
 class AlarmAction(AlarmMessage, frozen=True):
-    """Result of a request about alarms."""
+    """Result of an action on alarms."""
 
     signals: tuple[str, ...]
-    """Signals whose alarm has changed."""
+    """Signals with a changed alarm."""
     stored: bool
-    """Whether the change is stored, so that it survives a restart."""
+    """Whether the change is stored and survives a restart."""

@@ -1,7 +1,7 @@
-"""The table of all calls of the HTTP API: path, right, body, answer and errors.
+"""The table of all HTTP API calls: path, right, body, answer and errors.
 
-Layer 5. The table is the source of the routes and of the OpenAPI document, so the two can't differ.
-A route of the API is made only here, and each call names its right.
+Layer 5. Both the routes and the OpenAPI document are generated from this table, so they cannot
+differ. Only this module creates API routes, and each call states its right.
 """
 
 from collections.abc import Mapping
@@ -90,14 +90,14 @@ class Call(NamedTuple):
     right: Right
     summary: str
     answer: type | None
-    """Type of the JSON answer; None: the answer is a file or a stream."""
+    """Type of the JSON answer; None if the answer is a file or a stream."""
     body: type | None = None
-    """Type of the request body: bytes, or a type of JSON; None for a request without a body."""
+    """Type of the request body: bytes, or the type of a JSON body; None without a body."""
     method: Literal["GET", "POST"] = "GET"
     status: int = 200
     query: tuple[Query, ...] = ()
     errors: tuple[int, ...] = ()
-    """Statuses of failures, besides the failures of the right, path and body."""
+    """Additional failure statuses, besides those for the right, path and body."""
     media: tuple[str, ...] = (JSON,)
     """Media types of the answer."""
     is_body_needed: bool = True
@@ -115,7 +115,7 @@ _FILTERS: Final = (
     Query("last", "Largest number of entries, up to 1000.", "integer"),
 )
 _NO_ROBOT: Final = (409, 429)
-"""The robot cannot be connected, or too many clients use it."""
+"""URC cannot connect to the robot, or too many clients use it."""
 
 CALLS: Final[tuple[Call, ...]] = (
     Call("health", "/healthz", ANYONE, "The health of the server, and its version.", HealthStatus),
@@ -522,14 +522,13 @@ CALLS: Final[tuple[Call, ...]] = (
 
 
 def api_routes(endpoints: Mapping[str, Endpoint]) -> list[ProtectedRoute]:
-    """Return the routes of all calls with an endpoint.
+    """Return the routes of all calls that have an endpoint.
 
     Args:
-        endpoints: endpoints by the name of their call; a server without managers has none of their
-            calls.
+        endpoints: endpoints, keyed by call name; a server without managers has no manager calls.
 
     Raises:
-        ValueError: an endpoint belongs to no call of the table.
+        ValueError: an endpoint has no call in the table.
     """
     unknown = endpoints.keys() - {call.name for call in CALLS}
     if unknown:

@@ -1,4 +1,4 @@
-"""Descriptions of robots for programs, from their profiles and their present state.
+"""Descriptions of robots for programs, built from profiles and current states.
 
 Layer 5. Pure.
 """
@@ -36,13 +36,13 @@ _LIMITS: Final = ("lolo", "low", "high", "hihi")
 def summary(
     name: str, service: RobotService, role: Role, times: ContactTimes = NO_CONTACT
 ) -> RobotSummary:
-    """Return a robot as an entry of a list.
+    """Return the list entry of a robot.
 
     Args:
-        name: name of the robot in paths.
+        name: the robot's name in paths.
         service: the robot.
         role: role of the visitor at the robot.
-        times: the times of the robot's last use and last data.
+        times: times of the robot's last use and last data.
     """
     profile = service.robot.profile
     links = _links(service).values()
@@ -78,11 +78,11 @@ def robot_info(
     """Return a robot with its signals and commands.
 
     Args:
-        name: name of the robot in paths.
+        name: the robot's name in paths.
         service: the robot.
         role: role of the visitor at the robot.
-        may_give: whether the scope of the visitor's token contains a command.
-        times: the times of the robot's last use and last data.
+        may_give: function that returns whether the visitor's token permits a command.
+        times: times of the robot's last use and last data.
     """
     profile = service.robot.profile
     controller, links = service.controls.controller, _links(service)

@@ -1,7 +1,7 @@
-"""The document of a robot as one YAML text, without paths of this machine.
+"""A robot's document as one YAML text, without paths of this machine.
 
-Layer 5. A document contains no values of settings, so it contains no secrets of settings. Reading
-the sources blocks, so callers use a thread.
+Layer 5. A document contains no setting values, and therefore no secrets from settings. Reading the
+source files blocks, so call `document_of` in a thread.
 """
 
 from pathlib import PurePath
@@ -16,9 +16,9 @@ __all__ = ["document_of"]
 
 
 def document_of(profile: Profile) -> bytes:
-    """Return the profile, merged with all documents that it uses.
+    """Return the profile merged with all its documents.
 
-    The comments name the file and line of each key, without the folders.
+    The comments contain the file name and line of each key, without folders.
 
     Raises:
         ApiError: the document can no longer be read.
@@ -32,7 +32,7 @@ def document_of(profile: Profile) -> bytes:
 
 
 def _without_folder(line: str) -> str:
-    """Return a line of the resolved document whose comment names only a file."""
+    """Return a line of the resolved document with the folder removed from its comment."""
     before, mark, origin = line.rpartition("  # ")
     if not mark or not origin.rpartition(":")[2].isdecimal():
         return line

@@ -1,8 +1,8 @@
-"""Server-Sent Events of one robot: changed signals, newest wins.
+"""Server-Sent Events of one robot: the newest values of changed signals.
 
-Layer 5. A reader has no queue. When its connection is free, it gets the newest values that changed
-since its last event. A slow reader skips values, and delays only itself. Source of the format: HTML
-standard, section 9.2 “Server-sent events”.
+Layer 5. Readers have no queues. When a reader's connection is free, the reader gets the newest
+values that changed since its last event. A slow reader skips values, without delaying other
+readers. Source of the format: HTML standard, section 9.2 “Server-sent events”.
 """
 
 import asyncio
@@ -26,9 +26,9 @@ __all__ = ["BEAT_S", "EVENTS_PER_S", "STALL_S", "EventStream"]
 EVENTS_PER_S: Final = 30.0
 """Maximum rate of events."""
 BEAT_S: Final = 5.0
-"""Interval of comments on a quiet stream, in seconds; they show that the connection works."""
+"""Interval between keep-alive comments on a quiet stream, in seconds."""
 STALL_S: Final = 15.0
-"""Time after which a reader that reads nothing is disconnected, in seconds."""
+"""Time after which an unresponsive reader is disconnected, in seconds."""
 _HEADERS: Final = [
     (b"content-type", b"text/event-stream"),
     (b"cache-control", b"no-store"),
@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class EventStream:
-    """A response that ends with the reader, with its right, or with the robot's session."""
+    """A response that ends when the reader leaves, its right ends, or the robot's session ends."""
 
     def __init__(
         self,
@@ -58,10 +58,10 @@ class EventStream:
             live: the open session.
             signals: names of the signals to send.
             clock: clock of the readings.
-            may_read: function that returns whether the visitor still has the right to read.
-            followed: function that returns a context; in this context, its callback is called
-                after each change of rights.
-            visit: context that keeps the session open.
+            may_read: function that returns whether the visitor may still read.
+            followed: function that returns a context. While the context is open, the callback is
+                called after each change of rights.
+            visit: context that keeps the robot's session open.
         """
         self._live = live
         self._signals = frozenset(signals)
@@ -71,17 +71,17 @@ class EventStream:
         self._visit = visit
         self._news = asyncio.Event()
         self._reason = ""
-        """Reason for the end of the stream; "" while it goes on."""
+        """Reason for the end of the stream; "" while the stream is open."""
         self._revoked = asyncio.Event()
         self._seen = 0
-        """Hub revision of the last event."""
+        """Hub revision of the last sent event."""
         self._links = -1
-        """Number of the newest connection states in an event."""
+        """Number of the newest connection states that were sent."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send events until the end of the stream."""
+        """Send events until the stream ends."""
         await send({"type": "http.response.start", "status": 200, "headers": _HEADERS})
-        if scope["method"] == "HEAD":  # such a response ends with its headers
+        if scope["method"] == "HEAD":  # a HEAD response has no body
             await send({"type": "http.response.body", "body": b""})
             return
         with self._visit, self._followed(self._recheck):
@@ -102,7 +102,7 @@ class EventStream:
         if closing.done() and not closing.cancelled():
             self._reason = "the server ends"
         if not isinstance(outcome, TimeoutError):
-            # Nothing else is sent. A reader that reads nothing has time to notice the end.
+            # This is the last event. An unresponsive reader gets some time to receive it.
             body = _event("end", {"reason": self._reason})
             with suppress(TimeoutError):
                 async with asyncio.timeout(STALL_S):
@@ -111,7 +111,7 @@ class EventStream:
         log.warning("a stream was not read for %g s and was disconnected", STALL_S)
         abort: Callable[[], None] = scope["state"]["abort"]
         abort()
-        await asyncio.sleep(0)  # the server notices the end of the connection
+        await asyncio.sleep(0)  # lets the server notice the closed connection
 
     def _recheck(self) -> None:
         if not self._may_read():

@@ -1,6 +1,6 @@
-"""Limits on the commands of one visitor of the HTTP API.
+"""Limits on one visitor's commands over the HTTP API.
 
-Layer 5. Pure. STOP is never limited here.
+Layer 5. Pure. STOP is never limited.
 """
 
 from collections import Counter, OrderedDict
@@ -14,11 +14,11 @@ from urc.web.serve.replies import ApiError
 __all__ = ["AT_ONCE", "MOST_VISITORS", "REQUESTS_PER_S", "RequestLimits"]
 
 REQUESTS_PER_S: Final = 200
-"""Maximum rate of commands, lease requests and motion requests of one visitor, as a page's."""
+"""Maximum rate of one visitor's commands, lease requests and motion requests."""
 AT_ONCE: Final = 16
-"""Maximum number of running commands of one visitor."""
+"""Maximum number of one visitor's running commands."""
 MOST_VISITORS: Final = 1024
-"""Maximum number of visitors with a rate; the least recent one is forgotten."""
+"""Maximum number of stored visitor rates; above the limit, the least recent rate is dropped."""
 
 
 class RequestLimits:
@@ -29,9 +29,9 @@ class RequestLimits:
         self._running: Counter[str] = Counter()
 
     def count(self, who: str, now_s: float) -> None:
-        """Count a request of `who`; raise `ApiError` 429 above the rate."""
+        """Count a request from `who`; raise `ApiError` 429 above the maximum rate."""
         bucket = self._rates.pop(who, None) or TokenBucket(REQUESTS_PER_S, now_s)
-        self._rates[who] = bucket  # at the end: the first rate is the least recent one
+        self._rates[who] = bucket  # reinserted at the end: the first entry is the least recent
         while len(self._rates) > MOST_VISITORS:
             self._rates.popitem(last=False)
         if not bucket.allow(now_s):
@@ -39,7 +39,7 @@ class RequestLimits:
 
     @contextmanager
     def running(self, who: str) -> Iterator[None]:
-        """Count a running command in the context; raise `ApiError` 429 at the limit."""
+        """Count a running command while the context is open; raise `ApiError` 429 at the limit."""
         if self._running[who] >= AT_ONCE:
             raise ApiError(429, f"{AT_ONCE} commands are still running", "busy")
         self._running[who] += 1

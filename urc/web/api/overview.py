@@ -1,6 +1,6 @@
-"""The state of a robot in a few words, for the menu and for lists: battery, alarms and order.
+"""A robot's state for the menu and for lists: battery, alarms, and sort order.
 
-Layer 5. Pure. Nothing here connects a robot: without a session, the battery is unknown.
+Layer 5. Pure. The functions connect no robot, so the battery is unknown without a session.
 """
 
 from collections.abc import Iterable
@@ -16,16 +16,16 @@ from urc.web.fleet.robots import RobotService
 __all__ = ["active_alarms", "battery_of", "battery_signal", "in_order"]
 
 _NAMES: Final = ("battery", "battery_level", "battery_percentage", "state_of_charge", "charge")
-"""Names of a battery signal without a battery widget, in order of preference."""
+"""Usual names of battery signals, in order of preference."""
 _UNITS: Final = ("%", "V")
 _NUMBERS: Final = ("integer", "number")
 
 
 def battery_signal(profile: Profile) -> str:
-    """Return the signal with the robot's state of charge; "" without one.
+    """Return the signal with the robot's state of charge; "" without such a signal.
 
-    The signal is the level of a battery widget. Without such a widget, it is a number in percent or
-    volts with a usual name, such as ``battery``.
+    The function returns the signal that a battery widget shows as its level. Without such a widget,
+    it returns a number in percent or volts with a usual name, such as ``battery``.
     """
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
@@ -38,7 +38,7 @@ def battery_signal(profile: Profile) -> str:
 
 
 def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
-    """Return the present value of a battery signal; None if the value is unknown or stale.
+    """Return the current value of a battery signal; None if the value is unknown or stale.
 
     Args:
         service: the robot.
@@ -58,13 +58,13 @@ def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
 
 
 def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
-    """Return the number of alarms that operators must see, and their highest priority.
+    """Return the number and the highest priority of a robot's annunciated alarms.
 
-    Alarms that wait for an acknowledgement count, too; shelved and suppressed ones don't. The
-    server knows them without a session.
+    Alarms that returned to normal count until they are acknowledged. Shelved and suppressed alarms
+    are not counted. The result needs no session.
 
     Args:
-        name: name of the robot in paths.
+        name: the robot's name in paths.
         service: the robot.
     """
     records = service.alarms.list.records.values()
@@ -73,16 +73,16 @@ def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
 
 
 def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
-    """Return robots in the order of their importance to an operator.
+    """Return robots in order of importance to an operator.
 
-    Robots with an alarm come first, then connected robots, then robots by their last use. Equal
-    robots keep their order.
+    Robots with alarms are first, by priority, then connected robots, then robots by last use.
+    Robots of equal rank keep their order.
     """
     return tuple(sorted(robots, key=_rank))
 
 
 def _rank(robot: RobotSummary) -> tuple[int, int, float]:
-    """Return the rank of a robot; connected robots keep their places while they are used."""
+    """Return the rank of a robot; connected robots keep their positions during use."""
     severity = {"high": 0, "medium": 1, "low": 2}.get(robot.alarms.worst, 3)
     is_away = not robot.connected
     return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0

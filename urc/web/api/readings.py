@@ -1,4 +1,4 @@
-"""Latest values of signals in the form of the HTTP API.
+"""Latest signal values in the HTTP API's format.
 
 Layer 5. Pure.
 """
@@ -22,8 +22,8 @@ def value_of(signal: Signal, sample: Sample | None, now_s: float) -> SignalValue
 
     Args:
         signal: the signal.
-        sample: its newest reading; None without one.
-        now_s: present time on the clock of the readings, in seconds.
+        sample: the signal's newest sample; None if no sample has arrived.
+        now_s: current time on the clock of the readings, in seconds.
     """
     if sample is None:
         return SignalValue(None, None, stale=True)
@@ -38,7 +38,7 @@ def values_of(hub: Hub, names: Iterable[str], now_s: float) -> dict[str, SignalV
 
 
 def plain(value: object) -> object:
-    """Return a value as JSON can represent it, with the size in place of bytes."""
+    """Return a JSON-compatible value; bytes are replaced by their size."""
     if isinstance(value, (bytes, bytearray)):
         return {"bytes": len(value)}
     if isinstance(value, Mapping):

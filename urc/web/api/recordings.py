@@ -1,7 +1,8 @@
-"""Recordings over HTTP: the files of the server's folder, and recordings that programs start.
+"""Recordings over HTTP: files in the server's folder, and recordings started by programs.
 
-Layer 5. A program names a file of the folder, never a path. Reading the folder blocks, so it runs
-in a thread. A recording ends with the request, with the robot's session, or after `LONGEST_S`.
+Layer 5. Programs specify a file name in the folder, never a path. Reading the folder blocks, so the
+module reads it in a thread. A recording ends on request, when the robot's session ends, or after
+`LONGEST_S`.
 """
 
 import asyncio
@@ -32,12 +33,12 @@ if TYPE_CHECKING:
 __all__ = ["LONGEST_S", "MOST_LISTED", "RecordingCalls"]
 
 LONGEST_S: Final = 24 * 3600.0
-"""Longest recording that a program starts, in seconds."""
+"""Longest recording by a program, in seconds."""
 MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
 _FROM_START: Final = "bytes=0-"
-"""Begin of a range that starts with the first byte; further parts are no new download."""
+"""Start of a range header from the first byte; later ranges do not count as new downloads."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII
 )
@@ -65,7 +66,7 @@ class _Running:
 
 
 class RecordingCalls:
-    """The endpoints about recordings."""
+    """The recording endpoints."""
 
     def __init__(
         self,
@@ -76,18 +77,18 @@ class RecordingCalls:
         """Prepare.
 
         Args:
-            services: function that returns the robots, by their names in paths.
-            folder: folder of the recordings; None for a server without one.
+            services: function that returns the robots, keyed by their names in paths.
+            folder: recordings folder; None for a server without recordings.
             audit: receives an entry for each start, end and download.
         """
         self._services = services
         self._audit = audit
         self._folder = folder
         self._running: dict[str, _Running] = {}
-        """Recordings that programs started, by the name of the robot in paths."""
+        """Recordings started by programs, keyed by the robot's name in paths."""
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "recordings": self.recordings,
             "recording_file": self.file,
@@ -97,7 +98,7 @@ class RecordingCalls:
         }
 
     async def close(self) -> None:
-        """End all recordings, and write the ends of their files."""
+        """End all recordings, and finish their files."""
         running = list(self._running.values())
         for one in running:
             one.stop.set()
@@ -108,7 +109,7 @@ class RecordingCalls:
 
     @answers_errors
     async def recordings(self, request: Request) -> Response:
-        """Return the recordings of the robots that the visitor maintains."""
+        """Return the recordings of robots that the visitor may maintain."""
         found = await asyncio.to_thread(_files, self._folder) if self._folder else []
         active = {
             one.recorder.file.name
@@ -145,7 +146,7 @@ class RecordingCalls:
         )
 
     def _may_read(self, request: Request, robot: str) -> bool:
-        """Return whether the visitor maintains a recorded robot; `robot` is its document's name."""
+        """Return whether the visitor may maintain the robot whose document has the name `robot`."""
         visitor = visitor_of(request)
         served = [name for name, one in self._services().items() if one.robot.profile.name == robot]
         return visitor.may(MAINTAIN_SERVER) or any(visitor.may(MAINTAIN, one) for one in served)
@@ -154,14 +155,14 @@ class RecordingCalls:
 
     @answers_errors
     async def state(self, request: Request) -> Response:
-        """Return the state of the recording that a program has started."""
+        """Return the state of the robot's recording by a program."""
         name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         return answer(running.state if running is not None else _IDLE)
 
     @answers_errors
     async def start(self, request: Request) -> Response:
-        """Start a recording of a robot, and connect the robot."""
+        """Connect the robot and start a recording."""
         from urc.runtime.recording.recorder import check_installed  # an extra
 
         name, service = service_of(self._services(), request)
@@ -192,7 +193,7 @@ class RecordingCalls:
 
     @answers_errors
     async def stop(self, request: Request) -> Response:
-        """End the recording of a robot, and write the end of the file."""
+        """End a robot's recording, and finish the file."""
         name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         if running is None or running.task is None or not running.state.active:

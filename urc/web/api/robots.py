@@ -1,7 +1,7 @@
-"""The HTTP API of robots: descriptions, signals, commands, and motion under a lease.
+"""The HTTP API for robots: descriptions, signals, commands, and motion under a lease.
 
-Layer 5. The routes decode and answer; `sessions` drives, `command_runner` runs the commands, and
-`event_stream` sends the signals.
+Layer 5. The routes decode requests and encode answers. The module `sessions` drives,
+`command_runner` runs commands, and `event_stream` sends signals.
 """
 
 import asyncio
@@ -49,7 +49,7 @@ from urc.wire.client_messages import ApprovalRequest, CommandRequest
 __all__ = ["RobotCalls"]
 
 FIRST_VALUE_S: Final = 2.0
-"""Longest wait for the first value after a robot was connected, in seconds."""
+"""Longest wait for the first value after connecting to a robot, in seconds."""
 _STATUS: Final = {
     "bad-argument": 422,
     "unknown-command": 404,
@@ -59,14 +59,14 @@ _STATUS: Final = {
     "not-allowed": 409,
     "stopped": 409,
 }
-"""Status of a failed command, by its code; the robot caused all other failures."""
+"""HTTP status by failure code of a command; the robot caused all failures with other codes."""
 _BY_ROBOT: Final = 424
 _NO_STORE: Final = {"cache-control": "no-store"}
 _T = TypeVar("_T")
 
 
 class RobotCalls:
-    """The endpoints about robots."""
+    """The robot endpoints."""
 
     def __init__(
         self,
@@ -77,10 +77,10 @@ class RobotCalls:
         """Prepare.
 
         Args:
-            services: function that returns the robots, by their names in paths.
-            followed: function that returns a context; in this context, its callback is called
-                after each change of rights.
-            times: function that returns the times of a robot's last use and last data.
+            services: function that returns the robots, keyed by their names in paths.
+            followed: function that returns a context. While the context is open, the callback is
+                called after each change of rights.
+            times: function that returns when a robot was last used and last sent data.
         """
         self._services = services
         self._followed = followed
@@ -89,7 +89,7 @@ class RobotCalls:
         self._limits = RequestLimits()
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "robots": self.robots,
             "robot": self.robot,
@@ -110,7 +110,7 @@ class RobotCalls:
         return answer(self.listed(visitor_of(request)))
 
     def listed(self, visitor: Visitor) -> RobotList:
-        """Return the robots that a visitor may watch, with their present state."""
+        """Return the robots that a visitor may watch, with their current state."""
         found = []
         for name, service in self._services().items():
             role = visitor.role(name)
@@ -149,7 +149,7 @@ class RobotCalls:
 
     @answers_errors
     async def signal(self, request: Request) -> Response:
-        """Return the latest value of one signal; an image as a file."""
+        """Return the latest value of one signal; send an image as a file."""
         name, service = service_of(self._services(), request)
         wanted = request.path_params["signal"]
         signal = service.robot.profile.driver.signals.get(wanted)
@@ -170,7 +170,7 @@ class RobotCalls:
         return Response(sample.value, headers=headers, media_type=media_type(sample.value))
 
     async def stream(self, request: Request) -> ASGIApp:
-        """Send changed signals until the reader leaves."""
+        """Return a stream of changed signals."""
         return await self._stream(request)
 
     @answers_errors
@@ -221,7 +221,7 @@ class RobotCalls:
         return answer(CommandAnswer({key: plain(one) for key, one in outcome.values.items()}))
 
     def _confirmation(self, session: ProgramSession, asked: CommandAsked, wanted: str) -> str:
-        """Return a token for a confirmed command; "" without a question."""
+        """Return a token for a confirmed command; "" if the command asks no question."""
         known = session.service.robot.profile.driver.commands[wanted]
         questioned = questions(known, asked.arguments)
         if any(one.is_two_person for one in questioned):
@@ -236,7 +236,7 @@ class RobotCalls:
 
     @answers_errors
     async def lease(self, request: Request) -> Response:
-        """Handle a request about the controls."""
+        """Handle a request about the lease or a latched STOP."""
         name, service = service_of(self._services(), request)
         asked = await body_of(request, LeaseAsked)
         peer = self._moving_peer(request, name, service)
@@ -249,7 +249,7 @@ class RobotCalls:
         try:
             return answer(self._asked(session, asked))
         except ApiError:
-            self.sessions.end(session)  # the program does not know its secret
+            self.sessions.end(session)  # the program never received the session's secret
             raise
 
     def _asked(self, session: ProgramSession, asked: LeaseAsked) -> LeaseAnswer:
@@ -261,7 +261,7 @@ class RobotCalls:
 
     @answers_errors
     async def motion(self, request: Request) -> Response:
-        """Pass on an input of a held command."""
+        """Pass an input of a held command to the robot's controls."""
         name, service = service_of(self._services(), request)
         asked = await body_of(request, MotionAsked)
         self._moving_peer(request, name, service)
@@ -273,7 +273,7 @@ class RobotCalls:
         return peer_of(request, name)
 
     def _moving_peer(self, request: Request, name: str, service: RobotService) -> SocketPeer:
-        """Return the visitor; raise `ApiError` for a recording, or above the rate."""
+        """Return the visitor; raise `ApiError` for a playback, or above the maximum rate."""
         peer = self._peer(request, name)
         self._limits.count(peer.who, service.clock.now())
         if service.robot.playback is not None:
@@ -285,7 +285,7 @@ class RobotCalls:
 
 
 async def _first(service: RobotService, live: LiveSession, is_there: Callable[[], bool]) -> None:
-    """Wait for a first value until `FIRST_VALUE_S` after the robot was connected."""
+    """Wait for the first value, at most until `FIRST_VALUE_S` after the robot was connected."""
     hub = live.session.hub
     left_s = live.began_s + FIRST_VALUE_S - service.clock.now()
     if is_there() or left_s <= 0:
@@ -298,7 +298,7 @@ async def _first(service: RobotService, live: LiveSession, is_there: Callable[[]
 
 
 def _names(request: Request, service: RobotService) -> tuple[str, ...]:
-    """Return the names in the query parameter ``signals``, or all names."""
+    """Return the names from the query parameter ``signals``; by default, all signal names."""
     signals = service.robot.profile.driver.signals
     text = request.query_params.get("signals", "")
     names: Iterable[str] = dict.fromkeys(one.strip() for one in text.split(",") if one.strip())
@@ -309,7 +309,7 @@ def _names(request: Request, service: RobotService) -> tuple[str, ...]:
 
 
 async def _optional_body(request: Request, kind: type[_T], default: _T) -> _T:
-    """Return the body of a request, or `default` for an empty body."""
+    """Return the decoded body of a request, or `default` for an empty body."""
     return await body_of(request, kind) if await request.body() else default
 
 

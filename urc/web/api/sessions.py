@@ -1,8 +1,9 @@
 """Operator sessions of programs that drive over HTTP.
 
-Layer 5. A page has a socket, so its end is known at once. A program has only single requests. Its
-operator session therefore ends by itself when no request arrives for `IDLE_S` seconds, or when its
-right ends. The motion stops earlier: a held command has a lease of at most one second.
+Layer 5. A page has a socket, so the server notices immediately when the page leaves. A program
+sends only single requests. Its operator session therefore ends after `IDLE_S` seconds without a
+request, or when its right ends. Motion stops earlier, because the lease of a held command lasts at
+most one second.
 """
 
 import secrets
@@ -28,9 +29,9 @@ from urc.wire.client_messages import Drive, Release, Tick
 __all__ = ["IDLE_S", "MOST_SESSIONS", "ProgramSession", "ProgramSessions"]
 
 IDLE_S: Final = 10.0
-"""Time without a request after which a session ends, in seconds."""
+"""Time after the last request at which a session ends, in seconds."""
 MOST_SESSIONS: Final = 8
-"""Maximum number of open sessions of one visitor, at all robots together."""
+"""Maximum number of one visitor's open sessions, counted over all robots."""
 _Followed = Callable[[Callable[[], None]], AbstractContextManager[None]]
 
 
@@ -51,7 +52,7 @@ class ProgramSession:
 
     @property
     def epoch(self) -> int:
-        """Number of the present lease."""
+        """Number of the current lease."""
         return self._lease.epoch
 
     @property
@@ -65,16 +66,16 @@ class ProgramSession:
 
     @property
     def beat(self) -> int | None:
-        """Newest heartbeat number; None without the controls."""
+        """Newest heartbeat number; None if the program does not drive."""
         if not self._drives:
             return None
-        if self.operator.heartbeat is None:  # the next one is due within some milliseconds
+        if self.operator.heartbeat is None:  # the next heartbeat is due within a few milliseconds
             controller, now = self.service.controls.controller, self.service.clock.now()
             self.operator.heartbeat = controller.heartbeat(self.operator.client.id, now)
         return self.operator.heartbeat
 
     def ask(self, asked: LeaseAsked) -> LeaseAnswer:
-        """Handle a request about the controls, and return their state.
+        """Handle a request about the lease or a latched STOP; return the state of the controls.
 
         Raises:
             ApiError: the request was refused.
@@ -101,7 +102,7 @@ class ProgramSession:
         )
 
     def move(self, asked: MotionAsked) -> MotionAnswer:
-        """Pass on an input.
+        """Pass an input of a held command to the robot's controls.
 
         Raises:
             ApiError: the input was refused.
@@ -119,7 +120,7 @@ class ProgramSession:
         return MotionAnswer(self.epoch, self.beat, command in operator.pending, self.notices())
 
     def _refusal(self, asked: MotionAsked) -> str:
-        """Return why the last input was refused."""
+        """Return the reason why the last input was refused."""
         for notice in self.notices():
             if notice.kind == "refused":
                 return notice.message
@@ -141,8 +142,8 @@ class ProgramSessions:
         """Begin without sessions.
 
         Args:
-            followed: function that returns a context; in this context, its callback is called
-                after each change of rights.
+            followed: function that returns a context. While the context is open, the callback is
+                called after each change of rights.
         """
         self._followed = followed
         self._open: dict[str, _OpenSession] = {}
@@ -152,7 +153,7 @@ class ProgramSessions:
     def temporary(
         self, service: RobotService, live: LiveSession, peer: SocketPeer
     ) -> Iterator[ProgramSession]:
-        """Add an operator for one command while the context is open."""
+        """Add a temporary operator, for one command, while the context is open."""
         session = _entered(service, live, peer)
         try:
             yield session
@@ -160,10 +161,10 @@ class ProgramSessions:
             service.controls.remove_page(session.operator)
 
     async def begin(self, service: RobotService, peer: SocketPeer) -> ProgramSession:
-        """Open a session, which connects the robot.
+        """Open a session and connect the robot.
 
         Raises:
-            ApiError: the robot cannot be connected, or too many sessions are open.
+            ApiError: URC cannot connect to the robot, or too many sessions are open.
         """
         mine = [one for one in self._open.values() if one.session.peer.who == peer.who]
         if len(mine) >= MOST_SESSIONS:
@@ -178,10 +179,10 @@ class ProgramSessions:
         return session
 
     def find(self, secret: str, service: RobotService, who: Identity) -> ProgramSession:
-        """Return an open session, and keep it open for another `IDLE_S` seconds.
+        """Return an open session, and extend it by another `IDLE_S` seconds.
 
         Raises:
-            ApiError: no such session is open, or it belongs to another visitor or robot.
+            ApiError: the session is not open, or it belongs to another visitor or robot.
         """
         kept = next(
             (
@@ -191,7 +192,7 @@ class ProgramSessions:
             ),
             None,
         )
-        # The same answer for a session of another visitor, so that no secret is confirmed.
+        # A session of another visitor gets the same answer, so that the answer confirms no secret.
         is_ours = (
             kept is not None
             and kept.session.service is service
@@ -206,7 +207,7 @@ class ProgramSessions:
         return kept.session
 
     def end(self, session: ProgramSession) -> None:
-        """End a session: what it holds stops, and its controls are free."""
+        """End a session: stop its held commands, and release its lease."""
         kept = self._open.pop(session.secret, None)
         if kept is not None:
             if kept.alarm is not None:
@@ -238,10 +239,10 @@ class _OpenSession:
 
 
 async def opened(service: RobotService, peer: SocketPeer, stack: ExitStack) -> LiveSession:
-    """Visit a robot until `stack` closes, and return its open session.
+    """Keep a robot connected until `stack` closes, and return its open session.
 
     Raises:
-        ApiError: the robot cannot be connected, or too many clients use it.
+        ApiError: URC cannot connect to the robot, or too many clients use it.
     """
     missing = missing_settings(service.robot)
     if missing:
@@ -264,15 +265,15 @@ def _entered(service: RobotService, live: LiveSession, peer: SocketPeer) -> Prog
 
 
 def _notice(text: str) -> MotionNotice | None:
-    """Return a message to a page as a notice; None for a message of another kind."""
+    """Convert a page message to a notice; return None for messages of other kinds."""
     said = msgspec.json.decode(text, type=dict[str, object])
     if said.get("t") == "refused":
         about = said.get("command") or said.get("about")
         return MotionNotice("refused", str(about), str(said.get("message")))
     if said.get("t") == "stopped":
         return MotionNotice("stopped", str(said.get("command")), str(said.get("reason")))
-    return None  # a question for a second person, which only pages can answer
+    return None  # a question for a second person; only pages can answer it
 
 
 def _ignore() -> None:
-    """Do nothing: a program asks, and is not woken."""
+    """Do nothing, because programs poll for messages."""

@@ -1,4 +1,4 @@
-"""JSON messages of the HTTP API about robots, in snake case.
+"""JSON messages of the HTTP API for robots, in snake case.
 
 Layer 5. Pure. Times are in seconds.
 """
@@ -45,7 +45,7 @@ _Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
 
 class ApiMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The base class of all messages in this module."""
+    """Base class of all messages in this module."""
 
 
 class ConnectionInfo(ApiMessage, frozen=True):
@@ -53,23 +53,23 @@ class ConnectionInfo(ApiMessage, frozen=True):
 
     transport: str
     state: Literal["idle", "connecting", "live", "silent", "lost"]
-    """``idle``: URC is not connected, because no client needs the robot."""
+    """``idle`` means that no client needs the robot, so URC is not connected."""
     address: str = ""
     detail: str = ""
-    """Reason for an abnormal state, in one line."""
+    """Reason for an abnormal state, as one line of text."""
 
 
 class BatteryLevel(ApiMessage, frozen=True):
-    """The state of charge of a robot's battery, or its voltage."""
+    """The state of charge or the voltage of a robot's battery."""
 
     value: float
     unit: str
     alarm: Alarm = ""
-    """Exceeded limit of the signal."""
+    """Exceeded alarm limit of the signal."""
 
 
 class ActiveAlarms(ApiMessage, frozen=True):
-    """The alarms of a robot at this moment."""
+    """The current alarms of a robot."""
 
     count: int = 0
     worst: str = ""
@@ -77,34 +77,34 @@ class ActiveAlarms(ApiMessage, frozen=True):
 
 
 class RobotSummary(ApiMessage, frozen=True):
-    """A robot in a list."""
+    """A robot as a list entry."""
 
     name: str
-    """Name of the robot in paths."""
+    """Robot's name in paths."""
     title: str
     summary: str
     tags: tuple[str, ...]
     state: Literal["idle", "connecting", "live", "silent", "lost"]
-    """The worst state of all connections; ``idle`` without a session."""
+    """Worst state of all connections; ``idle`` without a session."""
     holder: str
     """Name of the operator who drives; "" if no operator drives."""
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     emulated: bool
-    """Whether the robot is emulated, or is the playback of a recording."""
+    """Whether the robot is emulated or a playback."""
     role: Role
-    """Role of the visitor at this robot."""
+    """Visitor's role at this robot."""
     connected: bool = False
-    """Whether URC connects to the robot, because a page or program needs it."""
+    """Whether a session is open, because a page or program needs the robot."""
     detail: str = ""
-    """Reason for an abnormal state, in one line."""
+    """Reason for an abnormal state, as one line of text."""
     battery: BatteryLevel | None = None
-    """null: the robot has no signal of this kind, or its value is unknown or stale."""
+    """Battery level; null if the robot has no battery signal, or its value is unknown or stale."""
     alarms: ActiveAlarms = ActiveAlarms()
     used_at: float | None = None
-    """Time at which a page or program last used the robot, in seconds since 1970 (UTC)."""
+    """Time of the last use by a page or program, in seconds since 1970 (UTC)."""
     seen_at: float | None = None
-    """Time at which a connection to the robot was last live, in seconds since 1970 (UTC)."""
+    """Last time with a live connection to the robot, in seconds since 1970 (UTC)."""
 
 
 class RobotList(ApiMessage, frozen=True):
@@ -112,16 +112,16 @@ class RobotList(ApiMessage, frozen=True):
 
     robots: tuple[RobotSummary, ...]
     time: float = 0.0
-    """Time of the server, in seconds since 1970 (UTC)."""
+    """Current time on the server, in seconds since 1970 (UTC)."""
 
 
 class ConfirmInfo(ApiMessage, frozen=True):
-    """A question that must be confirmed before a command is sent."""
+    """A question that a person must confirm before a command is sent."""
 
     text: str
     level: Literal["normal", "hazardous"]
     two_person: bool
-    """Whether a second person must agree; then the command needs a page."""
+    """Whether a second person must approve; only pages can send such a command."""
 
 
 class ArgumentInfo(ApiMessage, frozen=True):
@@ -140,18 +140,18 @@ class ArgumentInfo(ApiMessage, frozen=True):
     items: str
     """Type of the elements of an array; "" for other types."""
     size: int | None
-    """Number of elements of an array; None: any number."""
+    """Required number of elements of an array; null for any number."""
     confirm: dict[str, ConfirmInfo]
-    """Questions by argument value."""
+    """Confirmation questions by argument value."""
 
 
 class HoldInfo(ApiMessage, frozen=True):
     """Motion under a lease: the robot moves only while motion requests arrive."""
 
     period_s: float
-    """Period at which the server sends setpoints to the robot."""
+    """Period between setpoints from the server to the robot."""
     lease_s: float
-    """Time without a motion request after which the robot stops."""
+    """Time after the last motion request at which the robot stops."""
     release: dict[str, Any]
     """Arguments that stop the robot."""
 
@@ -163,16 +163,16 @@ class CommandInfo(ApiMessage, frozen=True):
     title: str
     description: str
     role: Role
-    """Role that the command needs."""
+    """Required role for the command."""
     allowed: bool
-    """Whether the visitor's role and the scope of its token permit the command."""
+    """Whether the visitor's role and token scope permit the command."""
     moves: bool
     """Whether the command starts autonomous motion."""
     stops: bool
     """Whether STOP sends the command."""
     sequence: bool
     hold: HoldInfo | None
-    """Terms of a held command, which needs motion requests; None for other commands."""
+    """Timing of a held command, which needs motion requests; null for other commands."""
     confirm: ConfirmInfo | None
     arguments: tuple[ArgumentInfo, ...]
 
@@ -189,7 +189,7 @@ class SignalInfo(ApiMessage, frozen=True):
     max: float | None
     precision: int | None
     states: dict[str, str]
-    """Displayed words by raw text, for enumerated signals."""
+    """Display texts by raw value, for enumerated signals."""
     limits: dict[str, float]
     """Alarm limits by name: ``lolo``, ``low``, ``high``, ``hihi``."""
     stale_after_s: float
@@ -203,12 +203,12 @@ class RobotInfo(ApiMessage, frozen=True):
 
     robot: RobotSummary
     missing: tuple[str, ...]
-    """Names of required settings without a value, which prevent a connection."""
+    """Names of required settings without a value; URC connects only if all have values."""
     connections: tuple[ConnectionInfo, ...]
     confirmed: bool
-    """Whether the last stop has reached the robot."""
+    """Whether the robot has received the last stop."""
     stops: int
-    """Number of STOPs since the server started."""
+    """Number of STOP presses since the server started."""
     signals: tuple[SignalInfo, ...]
     commands: tuple[CommandInfo, ...]
 
@@ -217,20 +217,20 @@ class SignalValue(ApiMessage, frozen=True):
     """The latest value of a signal."""
 
     value: Any
-    """Value; null: unknown, or “not available”. An image is an object with its number of bytes."""
+    """Value; null if unknown or “not available”; for an image, an object with its size in bytes."""
     age_s: float | None
-    """Age of the value; null: no value has arrived yet."""
+    """Age of the value; null if no value has arrived yet."""
     stale: bool
-    """Whether the value is missing, or older than the signal permits."""
+    """Whether the value is missing, or older than the signal's `stale_after`."""
     alarm: Alarm = ""
-    """Crossed limit, or severity of an alarm state; empty: no alarm."""
+    """Exceeded limit, or severity of an alarm state; "" without an alarm."""
 
 
 class SignalValues(ApiMessage, frozen=True):
     """Latest values of several signals."""
 
     time: float
-    """Time of the server, in seconds since 1970 (UTC)."""
+    """Current time on the server, in seconds since 1970 (UTC)."""
     values: dict[str, SignalValue]
     """Values by signal."""
 
@@ -240,13 +240,13 @@ class CommandAsked(ApiMessage, frozen=True):
 
     arguments: Arguments = {}
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
-    """Longest wait for the reply; null: 30 s for a command, 600 s for a sequence."""
+    """Longest wait for the reply; null means 30 s for a command and 600 s for a sequence."""
     confirmed: bool = False
-    """Whether a person has confirmed the question of the command."""
+    """Whether a person has confirmed the command's question."""
     stops: _Count | None = None
-    """Number of STOPs that the program knew; the command is refused after a newer STOP."""
+    """Program's last known number of STOP presses; the command is refused after a newer STOP."""
     session: _Word = ""
-    """Secret of the session from the lease; "" without a lease."""
+    """Session secret from the lease answer; "" without a lease."""
 
 
 class CommandAnswer(ApiMessage, frozen=True):
@@ -257,18 +257,18 @@ class CommandAnswer(ApiMessage, frozen=True):
 
 
 class LeaseAsked(ApiMessage, frozen=True):
-    """A request about the controls of a robot."""
+    """A request about a robot's lease or latched STOP."""
 
     verb: Verb | Literal["keep"]
-    """``keep`` changes nothing, and only keeps the session open."""
+    """Requested action; ``keep`` only keeps the session open."""
     for_s: Annotated[float, msgspec.Meta(ge=0, le=600)] = 10.0
-    """Time for the holder's answer to ``ask``, 3 to 60 s."""
+    """Time limit for the holder's answer to ``ask``, 3 to 60 s."""
     session: _Word = ""
-    """Secret of an open session; "" opens a session."""
+    """Secret of an open session; "" opens a new session."""
 
 
 class MotionNotice(ApiMessage, frozen=True):
-    """A report about the controls since the last answer."""
+    """A notice about the controls since the last answer."""
 
     kind: Literal["refused", "stopped"]
     about: str
@@ -277,55 +277,55 @@ class MotionNotice(ApiMessage, frozen=True):
 
 
 class LeaseAnswer(ApiMessage, frozen=True):
-    """State of the controls, for one session."""
+    """State of the controls, as one session sees it."""
 
     session: str
     """Secret of the session, for further requests; "" after its end."""
     name: str
-    """Name of the program, as operators see it."""
+    """Name of the program as shown to operators."""
     drives: bool
     """Whether this session has the controls."""
     epoch: int
-    """Number of the lease; motion requests repeat it."""
+    """Number of the lease; motion requests must repeat it."""
     holder: str
-    """Name of the operator who has the controls; "" without one."""
+    """Name of the operator in control; "" if no operator is in control."""
     asker: str
-    """Name of the operator who asks for the controls; "" without one."""
+    """Name of the operator who requests control; "" without a request."""
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     stops: int
-    """Number of STOPs since the server started."""
+    """Number of STOP presses since the server started."""
     beat: int | None
-    """Newest heartbeat number, which the next motion request repeats; null without controls."""
+    """Newest heartbeat number, for the next motion request; null if this session does not drive."""
     idle_s: float
-    """Time without a request after which the session ends."""
+    """Time after the last request at which the session ends."""
     notices: tuple[MotionNotice, ...] = ()
 
 
 class MotionAsked(ApiMessage, frozen=True):
-    """The newest input of a held command; silence longer than its lease stops the robot."""
+    """The newest input of a held command. A pause longer than the lease stops the robot."""
 
     session: _Word
     command: _Word
     epoch: _Count
     """Number of the lease, from the lease answer."""
     number: _Count
-    """Number of this input; it grows with every input of the command."""
+    """Number of this input; each input of the command needs a higher number."""
     beat: _Count
-    """Newest heartbeat number that the program has received, at most 0.4 s old."""
+    """Newest received heartbeat number, at most 0.4 s old."""
     arguments: Arguments = {}
     release: bool = False
-    """Whether the control is released; the robot stops at once."""
+    """Whether the control is released; a release stops the robot immediately."""
 
 
 class MotionAnswer(ApiMessage, frozen=True):
-    """State after an input."""
+    """State of the controls after an input."""
 
     epoch: int
     beat: int | None
     """Newest heartbeat number, for the next motion request."""
     queued: bool
-    """Whether the input waits a few milliseconds, because inputs arrive too fast."""
+    """Whether the input is delayed by a few milliseconds, because inputs arrive too fast."""
     notices: tuple[MotionNotice, ...] = ()
 
 
@@ -333,14 +333,14 @@ class RecordingInfo(ApiMessage, frozen=True):
     """A file with a recording."""
 
     file: str
-    """Name of the file in paths."""
+    """File name in paths."""
     robot: str
-    """Name of the recorded robot."""
+    """Recorded robot's name."""
     began: str
     """Start of the recording (UTC), in the form ``20261123T141502Z``."""
     bytes: int
     active: bool
-    """Whether this server writes the file at the request of a program."""
+    """Whether a program's recording is writing the file now."""
 
 
 class RecordingList(ApiMessage, frozen=True):
@@ -350,12 +350,12 @@ class RecordingList(ApiMessage, frozen=True):
 
 
 class RecordingState(ApiMessage, frozen=True):
-    """State of the recording that a program has started."""
+    """State of a recording by a program."""
 
     active: bool
     file: str
-    """Name of the file; "" before its creation."""
+    """File name; "" before the file is created."""
     messages: int
     """Number of messages written so far."""
     fault: str
-    """Reason why the recording has stopped; "" without a fault."""
+    """Reason why the recording failed; "" without a fault."""

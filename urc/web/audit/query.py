@@ -1,4 +1,4 @@
-"""Queries of pages and programs for entries of the audit log.
+"""Audit log queries from pages and programs.
 
 Layer 5. Pure.
 """
@@ -22,14 +22,14 @@ class BadQuery(UrcError):
 
 
 def query_of(given: Mapping[str, str], robots: frozenset[str] | None) -> AuditQuery:
-    """Return the query of a request.
+    """Return the audit query of a request.
 
     Args:
         given: the query parameters.
         robots: robots whose entries the visitor may see; None for all entries.
 
     Raises:
-        BadQuery: a value is too long, no number, or out of range.
+        BadQuery: a value is too long, not a number, or out of range.
     """
     for name in PARAMETERS:
         if len(given.get(name, "")) > _LONGEST:

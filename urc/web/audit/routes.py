@@ -1,7 +1,7 @@
 """Routes of the audit log: the page, the search, the export, and the timeline of a robot.
 
-Layer 5. Visitors with the role ``maintain`` for all robots see all entries; others see the entries
-of the robots that they may maintain. The log is read in threads.
+Layer 5. Visitors with the role ``maintain`` for all robots see all entries. Other visitors see the
+entries of robots that they may maintain. Threads read the log.
 """
 
 import asyncio
@@ -41,21 +41,21 @@ _NO_LOG: Final = "there is no audit log: this server has no folder for its data"
 _NO_STORE: Final = {"cache-control": "no-store"}
 _SETTLE_S: Final = 0.5
 _SEARCHES: Final = 2
-"""Maximum number of searches at the same time, so that other work finds free threads."""
+"""Maximum number of concurrent searches; the limit leaves threads free for other work."""
 _EXPORTS: Final = 4
-"""Maximum number of exports at the same time."""
+"""Maximum number of concurrent exports."""
 
 
 @dataclass(frozen=True, slots=True)
 class AuditPage:
-    """Context of ``audit.html.j2``: the filters; the entries are loaded by the page."""
+    """Context of ``audit.html.j2``: the filters. The page itself loads the entries."""
 
     head: PageHead
     nav: Nav
     robots: tuple[str, ...]
     """Names of the robots whose entries the visitor may see."""
     sees_all: bool
-    """Whether the visitor sees the entries of the server, too."""
+    """Whether the visitor also sees entries about the server."""
 
 
 class AuditRoutes:
@@ -84,11 +84,11 @@ class AuditRoutes:
         self._exports = 0
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the route of the page."""
+        """Return the route of the audit page."""
         return [ProtectedRoute("/audit", self.page, MAINTAIN_ANYWHERE)]
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints of the API requests, by the name of their call."""
+        """Return the API endpoints, keyed by call name."""
         return {"audit": self.entries, "audit_export": self.export, "timeline": self.timeline}
 
     async def page(self, request: Request) -> Response:
@@ -105,7 +105,7 @@ class AuditRoutes:
         return HTMLResponse(render("audit.html.j2", page), headers=_NO_STORE)
 
     async def entries(self, request: Request) -> Response:
-        """Return the newest entries of a query, newest first."""
+        """Return the newest entries that match the query, newest first."""
         robots = self._scope(request)
         return await self._answer(lambda: query_of(request.query_params, robots))
 
@@ -117,7 +117,7 @@ class AuditRoutes:
         return await self._answer(lambda: query_of({**request.query_params, "robot": name}, None))
 
     async def export(self, request: Request) -> Response:
-        """Return all visible entries as JSON lines, oldest first; see `urc audit --check`."""
+        """Return all visible entries as JSON lines, oldest first, for `urc audit --check`."""
         if self._log is None:
             return told(404, _NO_LOG)
         if self._exports >= _EXPORTS:

@@ -1,7 +1,7 @@
-"""The WebSocket of one developer page: sends the robot's traffic, and answers requests.
+"""The WebSocket of one developer page, which sends the robot's traffic and answers requests.
 
 Layer 5. Each page has its own backlog of traffic; the oldest rows are dropped and counted. A page
-that reads nothing for `STALL_S` seconds is disconnected. A thread handles the page's requests one
+that reads no data for `STALL_S` seconds is disconnected. A thread handles the page's requests one
 by one; the number of pending requests is limited.
 """
 
@@ -47,10 +47,9 @@ ROWS_KEPT = 1000
 BYTES_KEPT = 1 << 20
 ROWS_AT_ONCE = 200
 BEHIND_S = 0.05
-"""Interval between messages with rows, in seconds. A robot may produce a thousand rows per
-second."""
+"""Interval between messages with rows, in seconds; a robot may produce 1000 rows per second."""
 HELD_S = 0.5
-"""Maximum time to hold back text that may be the beginning of a secret, in seconds."""
+"""Maximum delay of text that may be the beginning of a secret, in seconds."""
 RETRY_S = 1.0
 
 log = logging.getLogger(__name__)
@@ -77,7 +76,7 @@ class Backlog:
             self._pop()
 
     def pop(self) -> list[TrafficRow]:
-        """Remove and return the oldest rows, as many as one message may contain."""
+        """Remove and return the oldest rows, at most `ROWS_AT_ONCE`."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
     def _pop(self) -> TrafficRow:
@@ -88,16 +87,15 @@ class Backlog:
 
 
 class _RunningProfile(NamedTuple):
-    """The running version of the robot, which answers the requests of the page."""
+    """The robot version used to answer the page's requests."""
 
     profile: Profile
     settings: dict[str, Value]
-    """Values of the settings, with placeholders for secrets and sample values for missing
-    settings."""
+    """Setting values, with placeholders for secrets and sample values for missing settings."""
 
 
 class DevClient:
-    """The server's side of one developer page, until either side closes."""
+    """The server side of a developer page's connection."""
 
     def __init__(self, line: ClientSocket, watch: ProfileWatch, flow: FlowControl) -> None:
         self._line = line
@@ -137,7 +135,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Append the robot's traffic to the backlog, one session after the other."""
+        """Append the robot's traffic to the backlog, session by session."""
         while True:
             if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)

@@ -1,7 +1,7 @@
 """Preview of a command: its exact bytes or messages, or the reason for its refusal. Sends nothing.
 
-Layer 5, pure. A command with several steps may wait for a reply between two steps. The preview
-shows each frame that can be built before the command runs.
+Layer 5, pure. A sequence may wait for a reply between two steps. The preview shows every frame that
+can be built in advance.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,25 +26,25 @@ MOST_WITHIN = 8
 
 
 class PreviewLine(NamedTuple):
-    """One line of a preview: a frame, or a step between two frames."""
+    """One line of a preview: a frame, or a step between frames."""
 
     transport: str
     """Name of the transport; "" for a line without a frame."""
     payload: Payload
     text: str
-    """Description of a step without a frame, or the reason why the frame is not shown."""
+    """Description of a step without a frame, or reason for a missing frame."""
 
 
 class Preview(NamedTuple):
-    """The preview of one command: its frames, questions and conditions, or its refusal."""
+    """A command's preview: its frames, questions and conditions, or its refusal."""
 
     refusal: str
-    """Reason for the refusal; "" if the command is allowed."""
+    """Reason for the refusal; "" for a permitted command."""
     frames: tuple[PreviewLine, ...] = ()
     questions: tuple[str, ...] = ()
-    """Confirmation questions that the operator answers before the command runs."""
+    """Confirmation questions to the operator before the command runs."""
     requires: tuple[str, ...] = ()
-    """Interlock conditions on signals of the robot, which a preview cannot check."""
+    """Interlock conditions on the robot's signals, which the preview cannot check."""
 
 
 def preview(
@@ -53,14 +53,13 @@ def preview(
     command: str,
     arguments: Mapping[str, object],
 ) -> Preview:
-    """Return the frames that `command` would send with `arguments`.
+    """Return a preview of the frames that `command` would send with `arguments`.
 
     Args:
         driver: the loaded driver.
         settings: value of every setting, with a placeholder for each secret.
         command: its name.
-        arguments: values for some arguments of the command; all other arguments take their
-            defaults.
+        arguments: values for some arguments of the command; all others have their defaults.
     """
     found = driver.commands.get(command)
     if found is None:

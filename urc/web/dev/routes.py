@@ -1,7 +1,7 @@
 """Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
 
-Layer 5. These routes exist only with ``--dev``, and only for holders of the start key, because the
-pages show all traffic of a robot. `urc.web.app` creates at most one `Dev`.
+Layer 5. These routes exist only with ``--dev``. They require the start key, because the pages show
+all traffic of a robot. `urc.web.app` creates at most one `Dev`.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ CLIENTS = 16
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """Context of ``dev.html.j2``. The page receives all other data over two sockets."""
+    """Context of ``dev.html.j2``. The page receives all other data through two sockets."""
 
     head: PageHead
     title: str
@@ -73,8 +73,9 @@ class Dev:
         """Prepare.
 
         Args:
-            services: the robots, by the name in their URL.
-            remake: functions that create a robot from a new version of its profile, by name.
+            services: the robots' services, keyed by the robots' names in URLs.
+            remake: functions that create a robot from a new version of its profile, keyed by robot
+                name.
             take: function that switches to a new version of a robot; may raise `UrcError`.
         """
         self._open = 0

@@ -24,10 +24,10 @@ __all__ = [
 SHOWN_BYTES = 4096
 """Maximum number of displayed bytes of one frame; further bytes are only counted."""
 THUMBNAIL_BYTES = 48 * 1024
-"""Maximum size of an image that is shown as an image, in bytes."""
+"""Maximum size of a displayed image, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")
 _NAMES = ("topic", "action", "service", "method", "path", "url")
-"""Attributes that name the source or target of a message, by priority."""
+"""Attributes with the source or target of a message, highest priority first."""
 
 
 class TrafficRow(msgspec.Struct, omit_defaults=True):
@@ -35,11 +35,11 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
     n: int
     time_s: float
-    """Monotonic time of the row, in seconds; the page receives the age of the row instead."""
+    """Monotonic time of the row, in seconds; the page receives the row's age instead."""
     kind: str
     """Kind of the row: ``sent``, ``received`` or ``note``."""
     line: str
-    """Name of the transport that carried the data."""
+    """Transport of the data."""
     size: int = 0
     data: bytes = b""
     verb: str = ""
@@ -58,7 +58,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
 
 def traffic_row(traffic: Traffic) -> TrafficRow:
-    """Return the row of the traffic log for sent or received data."""
+    """Return a traffic row for sent or received data."""
     row = TrafficRow(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
         fill(row, traffic.envelope)
@@ -68,7 +68,7 @@ def traffic_row(traffic: Traffic) -> TrafficRow:
 
 
 def note_row(note: LogEntry) -> TrafficRow:
-    """Return the row of the traffic log for a fault or a state change."""
+    """Return a traffic row for a fault or a state change."""
     return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 

@@ -1,8 +1,8 @@
-"""The developer start page: one robot with fixed values, and a button that reloads its documents.
+"""The developer start page: one robot with fixed values, and a button to reload its documents.
 
-Layer 5. These routes exist only with ``--dev``, and only for holders of the start key. The
-developer page loads a document as soon as the document is saved. The start page reloads all
-documents, even if the server has noticed no change.
+Layer 5. These routes exist only with ``--dev``, and require the start key. The developer page loads
+a document as soon as it is saved. The start page also reloads documents in which the server has
+noticed no change.
 """
 
 import asyncio
@@ -67,7 +67,8 @@ class DevStart:
 
         Args:
             fleet: the robots.
-            remake: functions that create a robot from a new version of its profile, by name.
+            remake: functions that create a robot from a new version of its profile, keyed by robot
+                name.
             take: function that switches to the new robot; may raise `UrcError`.
             ways: navigation links of this server.
         """
@@ -77,15 +78,15 @@ class DevStart:
         self._ways = ways
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the route of the start page."""
+        """Return the start page's route."""
         return [ProtectedRoute("/dev", self.page, LOCAL)]
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoint of the page's button, by the name of its call."""
+        """Return the endpoint of the page's button, keyed by call name."""
         return {"dev_start": self.start}
 
     async def page(self, request: Request) -> Response:
-        """Return the page that shows the fixed values."""
+        """Return the start page."""
         head = PageHead(request.state.nonce, t("Dev interface"))
         robots = tuple(
             _fixed(name, self._fleet.robots[name])
@@ -115,7 +116,7 @@ class DevStart:
 
 
 def no_dev_start() -> list[ProtectedRoute]:
-    """Return a route that explains how to enable the page, for a server without ``--dev``."""
+    """Return a route for servers without ``--dev``, which explains how to enable the page."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))

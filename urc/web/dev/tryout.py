@@ -1,8 +1,8 @@
-"""Try-out of the parser: the frames in pasted bytes, and the consumers of each frame.
+"""Try-out of the parser: the frames in pasted bytes, and each frame's consumers.
 
-Layer 5, pure. The module builds separate readers and never uses a live robot. As in the engine, an
-unsolicited frame goes to the first message that matches. The result also lists matching replies,
-because the try-out has no pending request.
+Layer 5, pure. The module builds separate readers and never uses a live robot. As in the engine, the
+first matching message consumes an unsolicited frame. The try-out has no pending request, so the
+result also lists matching replies.
 """
 
 import json
@@ -45,7 +45,7 @@ class FrameConsumer(NamedTuple):
     samples: tuple[tuple[str, object, str], ...]
     """Signal, value, alarm."""
     refused: tuple[str, ...]
-    """Invalid values with the reasons why they are invalid; for an error reply, the error text."""
+    """Invalid values with the reasons; for an error reply, the error text."""
 
 
 class ParsedPiece(NamedTuple):
@@ -60,7 +60,7 @@ class ParsedPiece(NamedTuple):
     """Reason why the bytes are not a frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
-    """Reason why each candidate does not match; empty if a candidate matches."""
+    """Reason why each candidate does not match; empty if any candidate matches."""
 
 
 class ParseResult(NamedTuple):
@@ -71,11 +71,11 @@ class ParseResult(NamedTuple):
     left: int
     """Number of bytes in an incomplete frame at the end."""
     more: int
-    """Number of frames beyond `MOST_PIECES`; these frames are not parsed."""
+    """Number of unparsed frames above the limit `MOST_PIECES`."""
 
 
 class _Candidate(NamedTuple):
-    """A message or reply that may match a frame."""
+    """A message or reply that can match a frame."""
 
     kind: str
     name: str
@@ -85,17 +85,17 @@ class _Candidate(NamedTuple):
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
-    r"""Return the bytes that a pasted text represents.
+    r"""Return the bytes represented by a pasted text.
 
     Args:
         text: the input.
         is_hex: whether the text consists of pairs of hex digits; blanks, commas, colons and ``0x``
             between the pairs are ignored. Other text may contain the escapes ``\n \r \t \0 \e \\``
             and ``\xHH``.
-        encoding: character encoding of the text, if not hex.
+        encoding: character encoding of non-hex text.
 
     Raises:
-        UrcError: the text is invalid or too long; the message gives the position.
+        UrcError: the text is invalid or too long; the message contains the position.
     """
     data = _from_hex(text) if is_hex else _from_text(text, encoding)
     if len(data) > MOST_BYTES:
@@ -115,7 +115,7 @@ def try_out(
     Args:
         driver: the loaded driver.
         settings: value of every setting.
-        transport: name of the transport that receives the data.
+        transport: name of the receiving transport.
         data: bytes from the robot; on a message transport, the body of one message.
         topic: topic of the message; "" for a reply to a request.
 
@@ -148,7 +148,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Cut `data` into frames and faults with their positions; also count the remaining bytes."""
+    """Split `data` into frames and faults with their positions; also count the remaining bytes."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []
@@ -226,7 +226,7 @@ def _taken(frame: Frame, one: _Candidate) -> FrameConsumer | None:
 def _why_not(
     frame: Frame, one: _Candidate, spec: TransportSpec, settings: Mapping[str, object]
 ) -> str:
-    """Return the reason why a frame does not match, for people."""
+    """Return a readable reason why a frame does not match."""
     read = one.read
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
         came = "a reply" if frame.topic is None else repr(frame.topic)

@@ -1,7 +1,7 @@
-"""Watching of one robot's documents, with a switch to the new version when a document is saved.
+"""A watcher of one robot's documents, which switches to the new version when a document is saved.
 
-Layer 5. A version with errors changes nothing: the previous version keeps running, and the problems
-are reported. A valid version waits until no operator drives the robot, because the switch briefly
+Layer 5. If the new version has errors, the previous version keeps running, and the problems are
+reported. A valid version waits until no operator drives the robot, because the switch briefly
 disconnects it.
 """
 
@@ -36,11 +36,11 @@ class CheckedProfile(NamedTuple):
     """The loaded profile; None if the file has errors."""
     problems: tuple[Problem, ...]
     files: tuple[str, ...]
-    """Paths of all documents that the profile uses."""
+    """Paths of all documents of the profile."""
 
 
 def examine(file: str) -> CheckedProfile:
-    """Check a document, and run the tests that it contains."""
+    """Check a document, and run its tests."""
     checked = check(file, built_in_catalog(), widget_folder_of(file))
     problems = checked.problems
     if checked.profile is not None:
@@ -58,7 +58,7 @@ class ProfileWatch:
     """Function that switches all users of the robot to another version; may raise `UrcError`."""
     state: State = "running"
     told: str = ""
-    """Description of the last event, for people."""
+    """Readable description of the last event."""
     problems: tuple[Problem, ...] = ()
     edition: int = 0
     """Number of changes to the published state."""
@@ -89,7 +89,7 @@ class ProfileWatch:
                 self._try_switch()
                 await sleep(PERIOD_S)
             await self._settled(watched)
-            # Taken before the file is read, so that no change is missed.
+            # Created before the files are read, so that no change is missed.
             watched = FileWatcher((self.file, *found.files))
             try:
                 found = await asyncio.to_thread(examine, self.file)
@@ -99,7 +99,7 @@ class ProfileWatch:
                 self._report("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: FileWatcher) -> None:
-        """Wait until the files are stable: a program may write a file in several steps."""
+        """Wait until the files are stable; some programs write a file in several steps."""
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now
@@ -125,7 +125,7 @@ class ProfileWatch:
                 self._report("waiting", text)
 
     def _try_switch(self) -> bool:
-        """Switch to a pending version if the robot is at rest; return whether this was tried."""
+        """Switch to a pending version if the robot is at rest; return False without an attempt."""
         if self._next is None or not self.service.is_at_rest:
             return False
         profile, self._next = self._next, None

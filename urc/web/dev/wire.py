@@ -1,4 +1,4 @@
-"""Message types of the developer page's WebSocket, without any logic.
+"""Message types of the developer page's WebSocket.
 
 Layer 5. Messages are JSON text in both directions; bytes are encoded as base64. Messages from the
 server to the page, listed by their tag ``t``::
@@ -218,7 +218,7 @@ def encode_profile(
         state: ``running``, ``waiting`` (a valid new version is pending) or ``broken`` (the file has
             errors).
         file: path of the robot's document.
-        told: description of the last event, for people.
+        told: readable description of the last event.
         problems: all problems of the document.
     """
     kinds = frozenset(messaging)

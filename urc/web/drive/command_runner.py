@@ -1,7 +1,7 @@
-"""The path of a command from a page or a program: rights, interlock, confirmation, reply, audit.
+"""The execution of a command from a page or program: rights, interlock, confirmation, reply, audit.
 
-Layer 5. Pages and the HTTP API share this path, so both check the same. Each command gets exactly
-one outcome and one entry in the audit log.
+Layer 5. Pages and the HTTP API share this code, so both perform the same checks. Each command has
+exactly one outcome and one audit log entry.
 """
 
 import asyncio
@@ -45,15 +45,15 @@ class CommandTarget(Protocol):
 
 
 class CommandOutcome(NamedTuple):
-    """The end of a command."""
+    """The outcome of a command."""
 
     values: Mapping[str, Reading] = NOTHING
-    """Values of the reply."""
+    """Values from the reply."""
     code: str = ""
     """Code of the failure; "" after success."""
     message: str = ""
     is_ours: bool = False
-    """Whether the server refused the command before it sent anything."""
+    """Whether the server refused the command before sending anything."""
 
 
 class CommandRunner:
@@ -72,16 +72,16 @@ class CommandRunner:
         *,
         timeout_s: float | None = None,
     ) -> CommandOutcome:
-        """Run a command and return its end.
+        """Run a command and return its outcome.
 
         Args:
-            operator: the page or program that gives the command.
+            operator: the session of the page or program that sends the command.
             asked: the command with its arguments.
             target: the open session of the robot.
-            timeout_s: longest wait for the reply, in seconds; None: `COMMAND_TIMEOUT_S` for a
+            timeout_s: longest wait for the reply, in seconds. None means `COMMAND_TIMEOUT_S` for a
                 command, and no limit for a sequence.
         """
-        sent: deque[Payload] = deque(maxlen=1)  # the last frame that was sent
+        sent: deque[Payload] = deque(maxlen=1)  # the last sent frame
         people: tuple[str, ...] = ()
         limit_s = self._limit_s(asked.command) if timeout_s is None else timeout_s
         try:
@@ -110,7 +110,7 @@ class CommandRunner:
     def refuse(
         self, operator: OperatorSession, asked: CommandRequest, code: str, message: str
     ) -> CommandOutcome:
-        """Record the refusal of a command before anything is sent, and return it."""
+        """Record and return the refusal of a command that was not sent."""
         self._controls.recorder.refused(operator.client, asked.command, message, self._clock.now())
         return CommandOutcome(code=code, message=message, is_ours=True)
 
@@ -142,17 +142,17 @@ class CommandRunner:
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, operator: OperatorSession, asked: CommandRequest) -> tuple[str, ...]:
-        """Return the people who confirmed a command; raise `CommandFailed` if it is refused."""
+        """Return the names of the people who confirmed a command, or raise `CommandFailed`."""
         self._admit(operator, asked)
         known = self._controls.once.driver.commands.get(asked.command)
         if known is None:
             return ()
         people = await self._consent.people(operator, asked.id, known, asked.arguments, asked.token)
-        self._admit(operator, asked)  # again: a confirmation takes time
+        self._admit(operator, asked)  # checked again, because a confirmation takes time
         return people
 
     def _admit(self, operator: OperatorSession, asked: CommandRequest) -> None:
-        """Raise `CommandRefused` if the page or program may not run a command now."""
+        """Raise `CommandRefused` if the page or program may not run the command now."""
         self._controls.recheck(operator)
         if not operator.rights.may_give(asked.command):
             raise CommandRefused("refused", OUT_OF_SCOPE)

@@ -1,8 +1,8 @@
 """The controls of one robot: one motion controller, and one operator session for each page.
 
-Layer 5. No call blocks. When the socket of a page is free, the page receives the newest lease, the
-newest heartbeat and one notice for each control. Above the rate limit, the newest tick replaces
-older ticks, and the last tick always takes effect.
+Layer 5. No call blocks. When a page's socket is free, the page receives the newest lease, the
+newest heartbeat and one notice per control. Above the rate limit, each new tick replaces the
+pending tick, so the last tick always takes effect.
 """
 
 import asyncio
@@ -32,17 +32,16 @@ from urc.web.wire import drive as wire
 __all__ = ["BEAT_S", "ControlService", "OperatorSession"]
 
 BEAT_S = 0.05
-"""Interval of the heartbeat numbers to the page that drives, in seconds; the ticks of that page
-echo the numbers."""
+"""Interval between heartbeat numbers to the page in control, in seconds. The page's ticks echo the
+numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between two applied ticks of one control, in seconds."""
 PATIENCE_S = 0.25
-"""Time after the end of a control's motion for which late ticks are not reported, in seconds."""
+"""Time after the end of a control's motion during which late ticks are not reported, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
-"""The kind of a message: a tick within the rate limit, a tick above the rate limit, or any other
-message."""
+"""Kind of a message: a tick within the rate limit, a tick above it, or any other message."""
 
 
 class ControlService:
@@ -57,9 +56,8 @@ class ControlService:
     ) -> None:
         """Restore the latch from `file`.
 
-        The controls are the held commands of `driver`. The file `file` preserves the latch over a
-        restart; None to keep no latch. The `recorder` receives the events of the audit log; None to
-        record no events.
+        The controls are the held commands of `driver`. The store `file` preserves the latch over a
+        restart; None stores no latch. The `recorder` receives audit events; None records no events.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -84,7 +82,7 @@ class ControlService:
 
     @property
     def operators(self) -> tuple[OperatorSession, ...]:
-        """The sessions of all pages that watch the robot."""
+        """The sessions of all pages of the robot."""
         return tuple(self._operators.values())
 
     @property
@@ -95,8 +93,8 @@ class ControlService:
     def renew(self, driver: Driver, file: LatchStore | None) -> None:
         """Switch to another version of the driver while no session is open.
 
-        A latched STOP stays latched, and a STOP that the robot has not acknowledged is still sent.
-        All leases end, and all controls are disarmed.
+        A latched STOP stays latched, and an unacknowledged STOP is still sent. All leases end, and
+        all controls are disarmed.
         """
         kept = Latch(self.controller.lease.state, not self.controller.is_confirmed)
         for operator in self._operators.values():
@@ -122,7 +120,7 @@ class ControlService:
     # -- sessions
 
     async def serve(self, session: Drivable) -> None:
-        """Let pages drive the robot over a session until this task is cancelled."""
+        """Allow pages to drive the robot over a session until this task is cancelled."""
         if not self.controller.can_move:
             return
         self._hub = session.hub
@@ -140,7 +138,7 @@ class ControlService:
             self._hub = None
             self.controller.detach()
             now = self._clock.now()
-            for command in self.commands:  # these stops are not reported
+            for command in self.commands:  # no messages about these stops
                 self.recorder.stopped(command, "the robot was disconnected", now)
 
     async def _follow(self, backend: MotionBackend) -> None:
@@ -151,11 +149,11 @@ class ControlService:
     # -- pages
 
     def add_page(self, peer: SocketPeer, wake: Callable[[], None]) -> OperatorSession:
-        """Add a page; raise `UrcError` when the robot has too many pages.
+        """Add a page; raise `UrcError` if the robot has too many pages.
 
         Args:
             peer: the person or program at the page.
-            wake: callback for new messages to the page.
+            wake: callback that is called when new messages to the page are ready.
         """
         self._peers += 1
         who = peer.identity
@@ -188,10 +186,10 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def name_screen(self, operator: OperatorSession, name: str) -> None:
-        """Name a screen of this computer, or of a visitor without a sign-in.
+        """Set the name of a screen of this computer, or of a visitor without a sign-in.
 
-        People, devices and programs keep the names of their sign-ins. A name that another page
-        already has gets the number of the screen, so that no page passes as another one.
+        People, devices and programs keep the names of their sign-ins. If another page already has
+        the name, the screen number is appended, so that no page can impersonate another.
         """
         client = operator.client
         if client.who and client.way != "key":
@@ -202,11 +200,11 @@ class ControlService:
             wanted = f"{wanted} ({operator.own_name})"
         operator.client = client._replace(name=wanted or operator.own_name)
         self.controller.change(operator.client)
-        operator.seen = -1  # the lease message has the page's own name
+        operator.seen = -1  # the lease message contains the page's name
         operator.wake()
 
     def recheck(self, operator: OperatorSession) -> None:
-        """Look at an operator's rights again; without the right to drive, its motion stops."""
+        """Check an operator's rights again, and stop held commands that are no longer permitted."""
         role = operator.rights.role()
         if role == operator.client.role:
             return
@@ -218,11 +216,11 @@ class ControlService:
         self.controller.change(operator.client)
         for report in tuple(operator.on_role):
             report()
-        operator.seen = -1  # the lease message tells the page its rights
+        operator.seen = -1  # the lease message contains the page's role
         operator.wake()
 
     def operator_of(self, key: str) -> OperatorSession | None:
-        """Return the session of the page with the key `key`; None for an unknown key."""
+        """Return the session of the page with the given key; None for an unknown key."""
         said = key.encode()
         return next(
             (one for one in self._operators.values() if compare_digest(one.key.encode(), said)),
@@ -230,9 +228,9 @@ class ControlService:
         )
 
     def changes(self, operator: OperatorSession) -> list[str]:
-        """Return the messages that the page has not received yet."""
+        """Return the page's pending messages, and clear them."""
         texts: list[str] = []
-        # The lease names the role of the page, on which its buttons depend.
+        # The lease message contains the page's role, on which its buttons depend.
         is_told = self.controller.can_move or self._has_roles
         is_told = is_told or not includes(operator.client.role, "drive")
         if is_told and operator.seen != self._number:
@@ -250,12 +248,12 @@ class ControlService:
     # -- messages from pages
 
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
-        """Accept a tick as raw bytes; return its kind.
+        """Accept a message that may be a tick, as raw bytes; return the message's kind.
 
-        The rights are read at each tick that is applied, in `_tick`.
+        Rights are checked when a tick is applied, in `_tick`.
 
         A new tick replaces a pending tick without being decoded. Too many ticks pause the socket,
-        so that they cost little time.
+        to save processor time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
@@ -308,8 +306,8 @@ class ControlService:
         """Stop and latch. Never refused.
 
         Args:
-            by: name of the person or page, shown to all pages.
-            who: the person or page, for the audit log; None for a stop by URC itself.
+            by: name of the person or page, which all pages show.
+            who: the person or page in the audit log; None for a stop by URC itself.
         """
         for operator in self._operators.values():
             for command in list(operator.alarms):
@@ -319,7 +317,7 @@ class ControlService:
         self.once.stopped()
 
     async def settle(self) -> None:
-        """Wait until the latch is stored, or storing has failed."""
+        """Wait until the latch is stored, or could not be stored."""
         if self._file is not None:
             await self._file.settle()
 
@@ -337,7 +335,7 @@ class ControlService:
         self._set_expiry()
 
     def _scope_refusal(self, operator: OperatorSession, verb: wire.Verb) -> str:
-        """Return the reason why a token for single commands does not permit a request, or ""."""
+        """Return why a token for single commands does not permit a request; "" if it does."""
         may_give = operator.rights.may_give
         if verb not in ("take", "ask", "force", "reset") or may_give(""):
             return ""
@@ -369,7 +367,7 @@ class ControlService:
             self._wait(operator, tick.command, tick)
 
     def _wait(self, operator: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
-        """Store a tick until the rate limit permits the tick, or a newer tick replaces it."""
+        """Hold a tick until the rate limit permits it, or a newer tick replaces it."""
         operator.dropped += command in operator.pending
         operator.pending[command] = tick
 
@@ -419,13 +417,13 @@ class ControlService:
         self.controller.stopped(command, reason)
         self.recorder.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
-            return  # the operator let go, or the lease reports it
+            return  # the operator released the control, or the lease message reports the stop
         for operator in self._operators.values():
             operator.moved_s.pop(command, None)
             operator.notice(command, wire.encode_stopped(command, reason))
 
     def _refused(self, command: str, why: str) -> None:
-        """Tell every page why the robot refused the motion."""
+        """Notify every page why the robot refused the motion."""
         self.recorder.stopped(command, why, self._clock.now())
         for operator in self._operators.values():
             operator.forget(command)
@@ -437,7 +435,7 @@ class ControlService:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Report that the latched STOP can no longer be stored, or can be stored again."""
+        """Report that the latched STOP cannot be stored, or can be stored again."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
@@ -476,7 +474,7 @@ class ControlService:
             self._heartbeat()
 
     def _heartbeat(self) -> None:
-        """Send a heartbeat number to the page that drives, and schedule the next heartbeat."""
+        """Send a heartbeat number to the page in control, and schedule the next heartbeat."""
         self._beating = None
         holder = self.controller.lease.state.holder
         operator = self._operators.get(holder.id) if holder is not None else None
@@ -502,12 +500,12 @@ class ControlService:
 
 
 def _roles(driver: Driver) -> dict[str, Role]:
-    """Return the role that each held command needs, by name."""
+    """Return the required role of each held command, by command name."""
     return {name: one.role for name, one in driver.commands.items() if one.hold is not None}
 
 
 def _has_roles(driver: Driver) -> bool:
-    """Return whether a command needs a higher role than ``drive``."""
+    """Return whether any command needs a role other than ``drive``."""
     return any(one.role != "drive" for one in driver.commands.values())
 
 

@@ -1,4 +1,4 @@
-"""The state of one page that may drive a robot: its pending ticks, pending notices and lease.
+"""The state of one page at a robot: pending ticks, pending notices and lease.
 
 Layer 5.
 """
@@ -17,7 +17,7 @@ from urc.web.wire import drive as wire
 __all__ = ["FLOOD", "OperatorSession", "RedundantLine"]
 
 FLOOD = 4
-"""Maximum number of ticks that are accepted while a tick is pending. Further ticks stay in the
+"""Maximum number of ticks accepted while another tick is pending. Further ticks stay in the
 socket's buffer."""
 
 
@@ -25,7 +25,7 @@ _DRIVES: Final = FixedRights()
 
 
 class RedundantLine(Protocol):
-    """The part of a redundant socket that a session uses; see `urc.web.drive.redundant_socket`."""
+    """The interface of a redundant socket for a session; see `urc.web.drive.redundant_socket`."""
 
     def heartbeat(self, number: int) -> None:
         """Send a heartbeat number to the page."""
@@ -35,7 +35,7 @@ class RedundantLine(Protocol):
 
 
 class OperatorSession:
-    """The state of one page that may drive a robot."""
+    """The state of one page at a robot."""
 
     def __init__(
         self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES
@@ -44,7 +44,7 @@ class OperatorSession:
         self.own_name = client.name
         """Name from the sign-in, or number of the screen."""
         self.rights = rights
-        """The present rights; `client` has the rights of the last look."""
+        """The current rights; `client` contains the role from the last check."""
         self.wake = wake
         self.heartbeat: int | None = None
         self.on_role: set[Callable[[], None]] = set()
@@ -54,28 +54,28 @@ class OperatorSession:
         self.seen = -1
         """Number of the newest lease sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}
-        """Newest pending tick of each control, decoded or as raw bytes, by control."""
+        """Newest pending tick of each control, decoded or as raw bytes."""
         self.paces: dict[str, RateLimiter] = {}
         self.alarms: dict[str, Timer] = {}
         self.moved_s: dict[str, float] = {}
-        """Time of the last applied tick of each control, in seconds, by control."""
+        """Time of the last applied tick of each control, in seconds."""
         self.moved_at_s = float("-inf")
         """Time of the last applied tick of any control, in seconds."""
         self.key = secrets.token_urlsafe(16)
-        """Secret key with which a redundant socket joins the page."""
+        """Secret key that a redundant socket needs to join the page."""
         self.spare: RedundantLine | None = None
         self.doubled: DuplicateElimination | None = None
-        """Filter for duplicate messages, used after the page has opened a redundant socket."""
+        """Filter for duplicate messages, set once the page has opened a redundant socket."""
         self.hold_back: Callable[[bool], None] = _nothing
         """Callback that pauses (True) or resumes (False) reading from the page's socket."""
         self.crowd = 0
         """Number of ticks received since the first pending tick; too many ticks pause the
         socket."""
         self.dropped = 0
-        """Number of pending ticks that newer ticks have replaced."""
+        """Number of pending ticks replaced by newer ticks."""
 
     def notice(self, key: str, text: str) -> None:
-        """Queue a notice, in place of an unsent notice with the same key."""
+        """Queue a notice; it replaces an unsent notice with the same key."""
         self.notices[key] = text
         self.wake()
 
@@ -87,7 +87,7 @@ class OperatorSession:
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether the number of a message shows that the message is not a duplicate."""
+        """Return whether a message is no duplicate, judging by its number."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:

@@ -1,13 +1,13 @@
 """The redundant socket of a page, for links with packet loss.
 
-Layer 5. A lost packet delays all later data of its TCP connection by at least one round trip. If
+Layer 5. A lost packet delays all later data on its TCP connection by at least one round trip. If
 the retransmitted packet is lost too, the delay doubles and exceeds the duration of a lease. Packet
-losses rarely hit two connections at the same time. On a link with packet loss, a page sends each
+losses rarely affect two connections at the same time. A page on a link with packet loss sends each
 message about held controls over both sockets, and receives heartbeats over both. Each message has a
-number, and only the first copy of a message takes effect.
+number. Only the first copy takes effect.
 
 A redundant socket has no rights without a page. The socket joins a page with a key that only this
-page has, and closes together with the page.
+page knows, and closes together with the page.
 """
 
 import msgspec
@@ -25,7 +25,7 @@ __all__ = ["CLOSE_NO_SEAT", "CLOSE_NOT_TAKEN", "KEY_WITHIN_S", "RedundantSocket"
 CLOSE_NO_SEAT = 4404
 CLOSE_NOT_TAKEN = 4400
 KEY_WITHIN_S = 5.0
-"""Maximum wait for the join message of a socket, in seconds."""
+"""Maximum wait for a socket's join message, in seconds."""
 MESSAGES_PER_S = 2000
 
 _hello = msgspec.json.Decoder(wire.JoinRedundant)
@@ -66,7 +66,7 @@ class RedundantSocket:
             pass
 
     def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number, unless an earlier number is still unsent."""
+        """Send a heartbeat number; skip it while an earlier number is unsent."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 

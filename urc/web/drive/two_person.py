@@ -1,13 +1,13 @@
 """The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. All pages and devices of one person count as one, and cannot approve their own command. A
-program is no person, so a token approves nothing. The local user is one person, too. On a server
-without sign-in, each page of an unknown visitor counts as one person. The number of pending
-questions and the wait for an answer are limited.
+Layer 5. All pages and devices of one person count as one person, and cannot approve that person's
+commands. Programs are not people, so a token cannot approve a command. The local user counts as one
+person. On a server without sign-in, each page of an unknown visitor counts as one person. The
+number of pending questions and the time for an answer are limited.
 
-A token from the server represents a confirmation. A token is valid only once and for a few seconds,
-on one page, and for one command with unchanged arguments. A replayed, changed or delayed
-confirmation is therefore invalid.
+The server represents each confirmation by a token. A token is valid once, for a few seconds, on one
+page, and for one command with unchanged arguments. The server therefore rejects replayed, changed
+and delayed confirmations.
 """
 
 import asyncio
@@ -32,11 +32,11 @@ from urc.web.wire import ask as wire
 __all__ = ["TOKEN_S", "WAIT_S", "TwoPersonRule"]
 
 WAIT_S: Final = 30.0
-"""Maximum wait for the approval of the second person, in seconds."""
+"""Maximum wait for the second person's approval, in seconds."""
 TOKEN_S: Final = 5.0
-"""Time for which a token is valid, in seconds."""
+"""Validity of a token, in seconds."""
 _MOST: Final = 8
-"""Maximum number of pending questions of one robot, and maximum number of tokens of one page."""
+"""Maximum number of one robot's pending questions, and of one page's tokens."""
 
 
 @dataclass(slots=True)
@@ -62,7 +62,7 @@ class TwoPersonRule:
     """The pending questions of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Create the list of questions; `operators` returns the pages that watch the robot."""
+        """Prepare without questions; `operators` returns the sessions of the robot's pages."""
         self._operators = operators
         self._clock = clock
         self._numbers = count(1)
@@ -70,7 +70,7 @@ class TwoPersonRule:
         self._tokens: dict[str, _Yes] = {}
 
     def prepare(self, asker: OperatorSession, said: wire.ApprovalRequest) -> str:
-        """Return a new token for a confirmation on the page `asker`."""
+        """Return a new token for a confirmation by the page `asker`."""
         now = self._clock.now()
         self._tokens = {key: yes for key, yes in self._tokens.items() if yes.until_s > now}
         mine = [key for key, yes in self._tokens.items() if yes.asker is asker]
@@ -89,14 +89,14 @@ class TwoPersonRule:
         arguments: Mapping[str, Reading],
         token: str,
     ) -> tuple[str, ...]:
-        """Return the names of the people who confirmed a command; () if none is required.
+        """Return the names of the people who confirmed a command; () if it needs no confirmation.
 
         Args:
             asker: the page that runs the command.
-            run: number that the page has given to this run of the command.
+            run: page's number for this run of the command.
             known: the command.
             arguments: its arguments.
-            token: the token from `prepare`, valid once; "" without a confirmation.
+            token: single-use token from `prepare`; "" without a confirmation.
 
         Raises:
             CommandFailed: a confirmation is missing.
@@ -118,12 +118,13 @@ class TwoPersonRule:
         return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
 
     async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
-        """Ask all other pages that may drive for approval; return the name of the second person.
+        """Ask all other pages with the role to drive for approval; return the second person's name.
 
-        `run` is the number that the asking page has given to this run of the command.
+        `run` is the asking page's number for this run of the command.
 
         Raises:
-            CommandFailed: approval was refused, withdrawn or too late, or STOP was pressed.
+            CommandFailed: approval was refused, withdrawn or too late, STOP was pressed, or too
+                many questions are pending.
         """
         if len(self._questions) >= _MOST:
             raise CommandFailed(
@@ -150,7 +151,7 @@ class TwoPersonRule:
         return second.client.name
 
     def stop(self) -> None:
-        """End every question and revoke every token after a press of STOP."""
+        """End all questions and revoke all tokens, because STOP was pressed."""
         self._tokens.clear()
         for one in self._questions.values():
             if not one.answer.done():
@@ -162,7 +163,7 @@ class TwoPersonRule:
             self._send(operator, one)
 
     def handle(self, operator: OperatorSession, said: wire.Approval) -> None:
-        """Handle the answer of a page; ignore an answer to a question that has ended."""
+        """Handle a page's answer; ignore answers to questions that have ended."""
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or not includes(operator.client.role, "drive"):
             return
@@ -190,7 +191,7 @@ class TwoPersonRule:
 
 
 def _is_second(one: OperatorSession, asker: OperatorSession) -> bool:
-    """Return whether `one` is a person other than the asker."""
+    """Return whether `one` may count as the second person for the asker's command."""
     if one.client.kind == "program":
         return False
     if one.client.person and asker.client.person:

@@ -1,7 +1,8 @@
-"""The distribution of one robot's alarms to all its pages.
+"""Distribution of one robot's alarms to all its pages.
 
-Layer 5. A page gets all alarms once, then only changes, at most five times a second: 200 alarms in
-10 s cost a page 50 messages. A message is encoded once for all pages with the same position.
+Layer 5. A page gets all alarms once, then only changes, at most five times a second. For example,
+200 alarms in 10 s result in 50 messages per page. Each message is encoded once for all pages with
+the same position.
 """
 
 import time
@@ -21,18 +22,18 @@ _ENCODED: Final = 64
 
 
 class AlarmPlace:
-    """The position of one page in the changes of the alarms."""
+    """The position of one page in the sequence of alarm changes."""
 
     __slots__ = ("edition", "revision")
 
     def __init__(self) -> None:
         self.edition = -1
-        """Edition of the alarms that the page has; -1 before the first message."""
+        """Edition of the page's alarms; -1 before the first message."""
         self.revision = 0
 
 
 class AlarmFeed:
-    """The pages of one robot, and the messages about its alarms."""
+    """The encoded alarm messages of one robot, and the callbacks of its pages."""
 
     def __init__(self, alarms: RobotAlarms, clock: Clock) -> None:
         self._alarms = alarms
@@ -43,11 +44,11 @@ class AlarmFeed:
         self._messages: dict[tuple[int, int], str] = {}
         self._encoded_at = (-1, -1)
         self._head = 0
-        """Revision of the last flush; newer changes wait for the next one."""
+        """Revision of the last flush; newer changes wait for the next flush."""
         alarms.on_change = self._changed
 
     def join(self, wake: Callable[[], None]) -> AlarmPlace:
-        """Call `wake` after changes, and return the position of a new page."""
+        """Add a callback for changes, and return the position of a new page."""
         self._wakes.add(wake)
         return AlarmPlace()
 
@@ -56,7 +57,7 @@ class AlarmFeed:
         self._wakes.discard(wake)
 
     def news(self, place: AlarmPlace) -> list[str]:
-        """Return the message that a page needs, if any, and advance its position."""
+        """Return a page's next message, if any, and advance the page's position."""
         edition = self._alarms.edition
         is_full = place.edition != edition
         if not is_full and place.revision >= self._head:
@@ -64,7 +65,7 @@ class AlarmFeed:
         alarms = self._alarms.list
         if place.edition < 0 and not (alarms.records or alarms.is_flooded):
             place.edition, place.revision = edition, alarms.revision
-            return []  # a new page knows no alarm
+            return []  # a new page already assumes that there are no alarms
         at = (edition, alarms.revision)
         if at != self._encoded_at or len(self._messages) >= _ENCODED:
             self._encoded_at = at
@@ -95,7 +96,7 @@ class AlarmFeed:
             if not self._wakes:
                 self._head = self._alarms.list.revision
             return
-        # Later in this turn of the loop at the earliest: one frame may change many alarms.
+        # Never flush immediately, because one frame may change many alarms.
         self._due = self._clock.call_at(max(self._clock.now(), self._pacer.free_s), self._flush)
 
     def _flush(self) -> None:

@@ -24,7 +24,7 @@ __all__ = [
 
 
 class ClientSocket(Protocol):
-    """The methods of an accepted WebSocket that clients use."""
+    """The interface of an accepted WebSocket for clients."""
 
     async def receive(self) -> Message:
         """Return the next ASGI message."""
@@ -49,10 +49,10 @@ class FlowControl(Protocol):
         """Write whole WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass each whole text message to `sink` before `ClientSocket.receive` gets the message.
+        """Pass each whole text message to `sink` before `ClientSocket.receive`.
 
-        The direct call saves two task switches per message. If `sink` returns False, `receive`
-        returns the message.
+        The direct call saves two task switches per message. `receive` returns only messages for
+        which `sink` returns False.
         """
 
     def hold_back(self, is_held: bool) -> None:
@@ -63,7 +63,7 @@ class FlowControl(Protocol):
 
 
 class SocketFlow:
-    """The flow control of a socket: writing of frames, waiting for an empty buffer, and abort."""
+    """The flow control of a socket: writing frames, waiting for an empty buffer, and aborting."""
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
@@ -76,12 +76,12 @@ class SocketFlow:
     # Called by the protocol
 
     def connected(self, transport: asyncio.Transport) -> None:
-        """Store the transport; request a callback as soon as the kernel accepts no more bytes."""
+        """Store the transport, and request a callback when the kernel accepts no more bytes."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 
     def lost(self) -> None:
-        """Wake a waiting writer, so that the writer notices the closed connection."""
+        """Wake a waiting writer, which then notices the closed connection."""
         self.resume()
 
     def pause(self) -> None:
@@ -148,17 +148,17 @@ class TokenBucket:
 
 
 class PeerRights(Protocol):
-    """The present rights of a socket's peer at the socket's robot."""
+    """The current rights of a socket's peer at the socket's robot."""
 
     def role(self) -> Role | None:
-        """Return the present role; None if the peer has no right any more."""
+        """Return the current role; None if the peer no longer has any right."""
 
     def may_give(self, command: str) -> bool:
-        """Return whether the peer's token permits a command; "": whether it permits all."""
+        """Return whether the peer's token permits a command; "" stands for all commands."""
 
 
 class FixedRights(NamedTuple):
-    """Rights that never change, for sockets without access control."""
+    """Constant rights, for sockets without access control."""
 
     fixed: Role | None = "drive"
 
@@ -177,10 +177,9 @@ class SocketPeer(NamedTuple):
     place: str = ""
     """Network address."""
     who: str = ""
-    """Identifier or address by which the sockets of one client are counted and limited; "" for no
-    limit."""
+    """Identifier or address used to count and limit one client's sockets; "" for no limit."""
     is_known: bool = False
-    """Whether the visitor has signed in; if false, `who` is an address."""
+    """Whether the visitor has signed in; if not, `who` is an address."""
     identity: Identity = NOBODY
     is_local: bool = False
     """Whether the visitor is the local user."""

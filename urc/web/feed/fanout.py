@@ -1,9 +1,9 @@
-"""The fan-out of one robot's readings to all its pages, at most once per display frame.
+"""Fan-out of one robot's readings to all its pages, at most once per display frame.
 
-Layer 5. Clients have no queues. A flush wakes every client. As soon as the socket of a client is
-free, the client receives all values that are newer than its last frame. A frame is encoded once for
-all clients with the same position. A slow client receives the newest values in one frame, and
-delays no other client.
+Layer 5. Clients have no queues. A flush wakes every client. As soon as a client's socket is free,
+the client receives all values newer than its last frame. Each frame is encoded once for all clients
+with the same position. A slow client receives the newest values in one frame, without delaying
+other clients.
 """
 
 import asyncio
@@ -24,28 +24,28 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time for which an encoded frame is reused, in seconds. The ages in a frame are valid at the time
-of its encoding."""
+"""Time limit for reusing an encoded frame, in seconds. Ages in a frame are valid at the time of
+encoding."""
 
 
 class FanoutPosition(NamedTuple):
-    """The position of a client in the state of the robot."""
+    """One client's position in the robot's state."""
 
     revision: int = 0
-    """Hub revision of the newest values that the client has."""
+    """Hub revision of the client's newest values."""
     links: int = 0
-    """Number of the newest link states that the client has."""
+    """Number of the client's newest link states."""
     progress: int = 0
-    """Number of the newest sequence states that the client has."""
+    """Number of the client's newest sequence states."""
     notes: int = 0
-    """Number of log lines that were sent to the client or dropped."""
+    """Number of log lines sent to the client or dropped."""
     joined: int = 0
     """Hub revision at which the client joined; 0 after the client has received its first values."""
 
 
 @dataclass(slots=True)
 class Place:
-    """The position of one client in values and images."""
+    """One client's position in values and images."""
 
     known: FanoutPosition = field(default_factory=FanoutPosition)
     subscription: ImageSubscription = field(default_factory=ImageSubscription)
@@ -61,17 +61,16 @@ class _Update(NamedTuple):
 
 
 class Pacer:
-    """A rate limiter that passes the first event of a burst immediately, then a steady rate.
+    """A rate limiter that passes a burst's first event immediately, then a steady rate.
 
-    The limiter tolerates a jitter of one period, so it never delays a source with exactly the
-    permitted rate. In any second, the number of passed events is at most one above the permitted
-    number.
+    The limiter tolerates jitter of one period, so it never delays a source with exactly the
+    permitted rate. In any second, it passes at most one event above the permitted number.
     """
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
         self.free_s = -self._period_s
-        """Time at which the next event may pass."""
+        """Earliest time at which the next event passes."""
 
     def went(self, now_s: float) -> None:
         """Count one event."""
@@ -80,7 +79,7 @@ class Pacer:
 
 
 class Fanout:
-    """The common flush for all clients of an open session."""
+    """The shared flush for all clients of an open session."""
 
     def __init__(
         self,
@@ -90,7 +89,7 @@ class Fanout:
         clock: Clock | None = None,
         each: Iterable[str] = (),
     ) -> None:
-        """Create the fan-out; `each` names the signals for which every reading is sent."""
+        """Create the fan-out; `each` contains the signals for which every reading is sent."""
         hub.streams.watch(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
@@ -98,10 +97,10 @@ class Fanout:
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        """Hub revision of the last flush; newer values wait for the next flush."""
+        """Hub revision of the last flush. Newer values wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
-        """Hub revision at which `_updates` were encoded."""
+        """Hub revision of the encoded `_updates`."""
         self._due: Timer | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -111,8 +110,8 @@ class Fanout:
         self.cache = ImageCache(hub, self._clock)
 
     async def run(self) -> None:
-        """Flush until cancelled; raise the exception of a failed flush."""
-        self._loop = asyncio.get_running_loop()  # cached: it costs a system call
+        """Flush until cancelled; a failed flush raises its exception here."""
+        self._loop = asyncio.get_running_loop()  # cached, because each call costs a system call
         self._broken = self._loop.create_future()
         try:
             with self.hub.heed(self._changed):
@@ -124,7 +123,7 @@ class Fanout:
                 self._due.cancel()
 
     def _changed(self) -> None:
-        """Schedule a flush in a later turn of the loop, as soon as the rate allows."""
+        """Schedule a flush for a later turn of the loop, as soon as the rate permits."""
         if self._due is not None or self._loop is None:
             return
         free_s = self._pacer.free_s
@@ -150,7 +149,7 @@ class Fanout:
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake` at each flush and return the client's position; `wake` must not block."""
+        """Call `wake` at each flush, and return the client's position; `wake` must not block."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
@@ -160,7 +159,7 @@ class Fanout:
         self._wakes.discard(wake)
 
     def frames_for(self, place: Place) -> bytes:
-        """Return the frames that the client at `place` still needs, and advance `place`."""
+        """Return the missing frames for the client at `place`, and advance `place`."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision
             self._updates.clear()
@@ -192,7 +191,7 @@ class Fanout:
         return _Update(after, frames, now_s)
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Remove images, which are sent separately; keep samples that end an image."""
+        """Remove images, which are sent separately; keep samples without a value."""
         pictures = self._pictures
         if not pictures:
             return samples

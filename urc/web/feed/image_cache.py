@@ -1,7 +1,7 @@
-"""The newest image of each signal, encoded once for all pages that show it.
+"""The newest image of each signal, encoded once for all pages.
 
-Layer 5. Images are never queued. When the socket of a client is free, the client receives the
-newest image and skips older images.
+Layer 5. Images are never queued. When a client's socket is free, the client receives the newest
+image and skips older images.
 """
 
 from collections.abc import Iterable
@@ -16,35 +16,34 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Time for which an encoded image is reused, in seconds. The message contains the age of the image
-at the time of encoding. In a reused message, the age is wrong by a few milliseconds, which does not
-justify another copy of several kilobytes.
-"""
+"""Time limit for reusing an encoded image, in seconds. The message contains the image's age at the
+time of encoding. In a reused message, the age is off by a few milliseconds, which does not justify
+another copy of several kilobytes."""
 
 
 class EncodedImage(NamedTuple):
-    """An encoded image, which can be sent to any client."""
+    """An encoded image for any client."""
 
     frame: bytes
     """The complete WebSocket frame."""
     sample: Sample
     number: int
-    """Number of the image in a common count of all signals' images."""
+    """Number of the image, counted over all signals."""
     made_s: float
 
 
 @dataclass(slots=True)
 class ImageSubscription:
-    """The images that one client shows, and the newest images that the client has received."""
+    """The images shown by one client, and the newest images sent to it."""
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)
     """Number of the last image sent to the client, by signal."""
     turn: int = 0
-    """Round-robin position among the images, so that a fast camera does not block other cameras."""
+    """Round-robin position among the images; prevents a fast camera from blocking other cameras."""
 
     def show(self, names: Iterable[str]) -> None:
-        """Set the images that the client shows; an image that was hidden is sent again."""
+        """Set the images shown by the client; a previously hidden image is sent again."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
 
@@ -64,7 +63,7 @@ class ImageCache:
         self._count = 0
 
     def next_image(self, subscription: ImageSubscription) -> EncodedImage | None:
-        """Return a shown image that the client lacks, or None; count the image as sent."""
+        """Return a new image for the client, or None; mark it as sent."""
         count = len(subscription.names)
         for step in range(count):
             name = subscription.names[(subscription.turn + step) % count]

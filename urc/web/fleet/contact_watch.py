@@ -1,6 +1,6 @@
-"""The task that notes which robots are used and heard.
+"""The task that records when robots were last used and last sent data.
 
-Layer 5. A look takes microseconds for a hundred robots, so no event of a robot is needed.
+Layer 5. The task polls, because a check of a hundred robots takes only microseconds.
 """
 
 import asyncio
@@ -15,9 +15,9 @@ from urc.web.fleet.robots import RobotService
 __all__ = ["ContactWatch"]
 
 _LOOK_S: Final = 2.0
-"""Interval between two looks, in seconds, and accuracy of the times."""
+"""Interval between two checks, and accuracy of the times, in seconds."""
 _SAVE_S: Final = 60.0
-"""Interval between two writes of the file, in seconds."""
+"""Interval between two saves of the file, in seconds."""
 
 
 class ContactWatch:
@@ -32,21 +32,22 @@ class ContactWatch:
         """Read the stored times.
 
         Args:
-            services: function that returns the served robots, by the name in their URL.
+            services: function that returns the robots' services, keyed by the robots' names in
+                URLs.
             folder: the data folder; None stores nothing.
-            utc: source of the time, in seconds since 1970.
+            utc: function that returns the UTC time, in seconds since 1970.
         """
         self._services = services
         self._store = ContactStore(folder / FILE if folder is not None else None)
         self._utc = utc
 
     def times(self, name: str) -> ContactTimes:
-        """Return the contact times of a served robot; an unknown robot has none."""
+        """Return the contact times of a robot; `NO_CONTACT` for an unknown robot."""
         service = self._services().get(name)
         return self._store.of(_key(name, service)) if service is not None else NO_CONTACT
 
     def look(self) -> None:
-        """Note the robots that are used or heard now."""
+        """Record the current time for robots in use and for robots with a live connection."""
         now = self._utc()
         for name, service in self._services().items():
             if service.robot.playback is None:
@@ -55,7 +56,7 @@ class ContactWatch:
                 )
 
     async def run(self) -> None:
-        """Look at the robots until cancelled, and save the times now and then."""
+        """Check the robots and save the times periodically, until cancelled."""
         loop = asyncio.get_running_loop()
         saved_s = loop.time()
         while True:
@@ -66,7 +67,7 @@ class ContactWatch:
                 await asyncio.to_thread(self._store.save)
 
     async def close(self) -> None:
-        """Note and save the last times."""
+        """Record and save the final times."""
         self.look()
         await asyncio.to_thread(self._store.save)
 

@@ -1,6 +1,6 @@
-"""The served robots and their services, by the name in their URL.
+"""The served robots and their services, keyed by the robots' names in URLs.
 
-Layer 5. Robots can be added and removed at run time. Removal of a robot first stops its motion.
+Layer 5. Robots can be added and removed at run time. Removing a robot first stops its motion.
 """
 
 import asyncio
@@ -37,10 +37,10 @@ class Fleet:
     def __init__(
         self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]
     ) -> None:
-        """Prepare the robots that are known at the start of the server.
+        """Prepare the robots known at the start of the server.
 
         Args:
-            robots: the robots, by the name in their URL.
+            robots: the robots, keyed by their names in URLs.
             service: function that creates the service of a robot.
 
         Raises:
@@ -53,7 +53,7 @@ class Fleet:
             name: service(name, robot) for name, robot in robots.items()
         }
         self.broken: dict[str, BrokenRobot] = {}
-        """Robots that cannot be used, by the name in their URL."""
+        """Unusable robots, keyed by their names in URLs."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
 
@@ -106,11 +106,10 @@ class Fleet:
             await asyncio.wait((task,), timeout=_END_S)
 
     def driven_by(self, name: str) -> str:
-        """Return the name of the operator who drives a robot; "" if no operator drives it.
+        """Return the name of the operator in control of a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver the stop. Without a session, a
-        pending stop does not count as driving; otherwise, an operator could not correct a wrong
-        address of the robot.
+        A pending stop counts as driving while a session can deliver it. Without a session it does
+        not count, because otherwise a wrong address of the robot could not be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -130,10 +129,10 @@ class Fleet:
 
 
 def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[str, RobotService]:
-    """Return name and service of the robot in a request's path; raise `ApiError` 404 without one.
+    """Return name and service of the robot in a request's path; raise `ApiError` 404 if unknown.
 
     Args:
-        services: the services of the served robots, by the name in their URL.
+        services: the robots' services, keyed by the robots' names in URLs.
         request: a request whose path has the parameter `name`.
     """
     name = request.path_params["name"]
@@ -144,7 +143,7 @@ def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[
 
 
 def _assets(robots: Mapping[str, Robot]) -> Assets:
-    """Return the files of all widgets; equal widgets of several robots are merged."""
+    """Return the files of all widgets; identical widgets of several robots are merged."""
     return widget_assets(
         unified(one for robot in robots.values() for one in robot.profile.widgets.values())
     )

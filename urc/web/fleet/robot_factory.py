@@ -1,7 +1,7 @@
-"""A factory that creates a dashboard's robots from documents, settings and installed packages.
+"""A factory for a dashboard's robots, from documents, settings and installed packages.
 
-Layer 5. The factory reads files and stores settings, but opens no session of a served robot.
-Reading files takes time, so the event loop calls the factory in a thread.
+Layer 5. The factory reads files and stores settings, but opens no sessions of served robots.
+Reading files takes time, so the factory is called in a thread.
 """
 
 import logging
@@ -36,35 +36,34 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """Options of the robot factory, set when the dashboard starts."""
+    """Options of the robot factory, set at the start of the dashboard."""
 
     data: Path
     """Folder of the settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
-    """Function that returns the robot of a profile with the given settings."""
+    """Function that creates a robot from a profile with the given settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
-    """Function that opens a session to test the transports, without any control of the robot."""
+    """Function that opens a session to test the transports, without controlling the robot."""
     given: Callable[[Profile], Mapping[str, Value]]
-    """Function that returns the settings given at the start of the server; these settings override
-    stored settings. The function raises `UrcError` for given settings that no longer fit the
-    profile."""
+    """Function that returns the settings given at the start of the server, which override stored
+    settings. The function raises `UrcError` if given settings no longer fit the profile."""
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
     monitors: bool = False
-    """Whether robots stay connected for their alarms, unless their settings say otherwise."""
+    """Whether robots stay connected for their alarms by default."""
 
 
 class ResolvedSettings(NamedTuple):
     """The resolved settings of a robot."""
 
     values: dict[str, Value]
-    """Values of all usable settings, by name of the setting."""
+    """Values of all usable settings, by setting name."""
     given: dict[str, Value]
-    """Values given at the start of the server, by name of the setting."""
+    """Values given at the start of the server, by setting name."""
     destination: str
     """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
-    """Names of secrets that were entered for another destination."""
+    """Names of secrets entered for another destination."""
 
 
 class InstalledInterface(NamedTuple):
@@ -75,19 +74,19 @@ class InstalledInterface(NamedTuple):
 
 
 class RobotFactory:
-    """A factory that creates robots from their documents."""
+    """A factory that creates robots from documents."""
 
     def __init__(self, robot_options: RobotOptions) -> None:
         """List the installed packages, without reading their documents."""
         self.robot_options = robot_options
         self.store = Store(robot_options.data / "packages")
         self._there = self._roots()
-        """Packages that were installed at the start of the server."""
+        """Packages installed at the start of the server."""
         self._begun: dict[str, str] = {}
-        """First destination of each robot, by robot. Settings given at the start are valid only for
-        this destination."""
+        """First destination of each robot, by package or robot name. Settings given at the start
+        are valid only for that destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """Cache of manifests, by digest and state of the archive; pages often need all
+        """Cache of manifests, by digest and state of the archive. Pages often need all
         manifests."""
 
     def _roots(self) -> frozenset[str]:
@@ -97,7 +96,7 @@ class RobotFactory:
             return frozenset()
 
     def stamp(self) -> object:
-        """Return a value that changes with every installation and removal."""
+        """Return a value that changes when a package is installed or removed."""
         try:
             found = (self.store.folder / "state.json").stat()
         except OSError:
@@ -109,12 +108,12 @@ class RobotFactory:
         return SettingsStore(self.robot_options.data / "robots", name)
 
     def robot(self, name: str, profile: Profile, kept: StoredSettings | None = None) -> Robot:
-        """Return a robot with its settings and all interfaces that fit it, or raise `UrcError`.
+        """Return a robot with its settings and all suitable interfaces, or raise `UrcError`.
 
         Args:
-            name: name of the robot in URLs.
+            name: the robot's name in URLs.
             profile: the robot's profile, without added interfaces.
-            kept: the stored settings of the robot; None to read the settings from the file.
+            kept: the robot's stored settings; None reads them from the file.
         """
         chosen = self.settings_store(name).load() if kept is None else kept
         filled = self.resolved_settings(profile, chosen)
@@ -136,7 +135,7 @@ class RobotFactory:
 
         A value given at the start overrides a stored value, and a stored value overrides the
         default. A stored value that has become invalid, for example after an update, counts as
-        missing. A secret is used only for the destination for which it was entered.
+        missing. A secret is used only for the destination that it was entered for.
         """
         defaults: dict[str, Value] = {
             name: setting.default
@@ -173,14 +172,14 @@ class RobotFactory:
         return ResolvedSettings(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-        """Return the robot's destination at the start; "" if the robot was installed later."""
+        """Return the robot's destination at the start of the server; "" if installed later."""
         if package and package not in self._there:
             return ""
         place = destination_of(profile, package, values)
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return the installed package of a robot, such as ``drivers/puppet``; "" for a file."""
+        """Return a robot's installed package, such as ``drivers/puppet``; "" without a package."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts
@@ -189,7 +188,7 @@ class RobotFactory:
         return "/".join(parts[1:3])
 
     def with_interfaces(self, profile: Profile, first: str = "") -> Profile:
-        """Return the profile with all installed interfaces that fit it, starting with `first`."""
+        """Return the profile with all suitable installed interfaces, starting with `first`."""
         interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
         for added in self.interfaces():
             found = self.fit(added, profile)
@@ -201,13 +200,13 @@ class RobotFactory:
         return profile._replace(interfaces=interfaces, widgets=widgets)
 
     def fit(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
-        """Return an installed interface, bound to the signals and commands of a robot."""
+        """Return an installed interface, bound to a robot's signals and commands."""
         if added.lock.key.name in profile.interfaces:
             return InterfaceFit(None, fault="this robot already has an interface with this name")
         return fit_interface(added.document, profile, widget_folder_of(added.document))
 
     def interfaces(self) -> list[InstalledInterface]:
-        """Return the newest version of each interface that a user has installed directly."""
+        """Return the newest version of each directly installed interface."""
         newest = {lock.root: lock for lock in _ascending(self.store.installed())}
         found = []
         for lock in newest.values():
@@ -219,9 +218,10 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return the installed packages with a robot, as a map from name to versions, oldest first.
+        """Return the versions of the installed packages with a robot, by name, oldest first.
 
-        If a robot and a driver have the same name, only the package in use is listed.
+        If a robot package and a driver package have the same name, the result contains only the
+        package in use.
         """
         locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
@@ -231,7 +231,7 @@ class RobotFactory:
         return dict(sorted(found.items()))
 
     def chosen_version(self, locks: list[Lock], version: str) -> Lock:
-        """Return the chosen version of a robot's package, or the newest if it is not installed."""
+        """Return the chosen version of a robot's package; by default, the newest version."""
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
     def profile(self, lock: Lock) -> Profile:
@@ -241,7 +241,7 @@ class RobotFactory:
         return profile
 
     def reload(self, profile: Profile) -> Profile:
-        """Reread the profile of a robot that was given at the start, or raise `UrcError`."""
+        """Read the profile of a robot given at the start again, or raise `UrcError`."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:

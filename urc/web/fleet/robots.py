@@ -1,8 +1,8 @@
-"""A robot that the dashboard serves, and the opening and closing of its session.
+"""A robot of the dashboard, and the opening and closing of its session.
 
-Layer 5. The session opens when the first client connects. The session closes a short time after the
-last client has disconnected. Therefore a reload of the page keeps the robot connected, but leaving
-the page disconnects the robot.
+Layer 5. The session opens when the first client connects, and closes shortly after the last client
+disconnects. Reloading the page therefore keeps the robot connected. Leaving the page disconnects
+it.
 """
 
 import asyncio
@@ -53,7 +53,7 @@ __all__ = [
 
 
 class Playback(Protocol):
-    """A recording that plays in place of a robot."""
+    """A recording shown instead of a robot."""
 
     @property
     def began_s(self) -> float:
@@ -90,21 +90,20 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum number of one robot's clients from one unknown address. `CLIENTS_OF_KNOWN` is the maximum
-number from one visitor with a key."""
+"""Maximum number of one robot's clients from one unknown address, and of one signed-in visitor."""
 CLOSE_TIMEOUT_S = 8.0
-"""Maximum wait for the end of a session, in seconds."""
+"""Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
-"""Maximum time for which a STOP over HTTP waits for its delivery, in seconds."""
+"""Maximum wait for the delivery of a STOP over HTTP, in seconds."""
 _LOOK_S = 0.01
 PICTURE_BYTES = 256 * 1024
-"""Maximum size of the image that stays after the end of a session."""
+"""Maximum size of the image that is kept after a session, in bytes."""
 
 log = logging.getLogger(__name__)
 
 
 class SessionLike(MotionSession, Protocol):
-    """The part of an opened profile that the dashboard uses."""
+    """The dashboard's interface to an opened profile."""
 
     @property
     def hub(self) -> Hub:
@@ -121,7 +120,7 @@ class SessionLike(MotionSession, Protocol):
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
     def reconnect(self) -> None:
-        """Try all lost connections now, instead of after their backoff."""
+        """Retry all lost connections now, without waiting for their backoff."""
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, resume or end a running sequence."""
@@ -131,29 +130,29 @@ class SessionLike(MotionSession, Protocol):
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
-"""An image, or values by signal; None if the state of the robot is unknown."""
+"""An image, or values by signal; None if the robot's state is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One robot that the dashboard serves."""
+    """One robot of the dashboard."""
 
     profile: Profile
     settings: Mapping[str, Value]
     """Current values of the settings, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Function that returns a context; the robot stays connected while the context is open.
+    """Function that returns a context, which keeps the robot connected while the context is open.
     Entering the context must not wait for a reply from the robot."""
     glimpse: Callable[[], Glimpse] | None = None
-    """Function that returns a view of an emulated robot without a connection; None for a real
+    """Function that returns a view of an emulated robot without connecting. None for a real
     robot."""
     is_emulated: bool = False
     """Whether the robot is emulated. Real and emulated robots with the same name share no stored
     state."""
     playback: Playback | None = None
-    """The recording that plays in place of the robot; None for a robot."""
+    """The playback shown instead of a robot; None for a robot."""
     is_monitored: bool = False
-    """Whether the robot stays connected for its alarms, with no page open."""
+    """Whether the robot stays connected for its alarms, even without open pages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,17 +164,17 @@ class LiveSession:
     number: str
     """Number of the session, unique even across restarts of the server."""
     ended: asyncio.Event
-    """Event that is set when the session has ended for any reason."""
+    """Event that is set when the session ends, for any reason."""
     began_s: float
-    """Time of its opening on the clock of the service, in seconds."""
+    """Start time of the session on the service's clock, in seconds."""
 
 
 class SessionFailed(UrcError):
-    """The error of a session that could not open, or that has ended."""
+    """The session could not be opened, or has ended."""
 
 
 def missing_settings(robot: Robot) -> tuple[Setting, ...]:
-    """Return the required settings without a value, which prevent a connection to the robot."""
+    """Return the required settings without a value; URC cannot connect without them."""
     return tuple(
         setting
         for name, setting in robot.profile.settings.items()
@@ -198,7 +197,7 @@ def keep_all_signals(profile: Profile) -> frozenset[str]:
 
 
 class RobotService:
-    """A service that opens a robot's session for the first client, and closes it after the last."""
+    """A service that opens a robot's session for the first client and closes it after the last."""
 
     def __init__(
         self,
@@ -215,13 +214,13 @@ class RobotService:
 
         Args:
             robot: the robot.
-            linger_s: time for which the session stays open after its last client has left, in
+            linger_s: time between the departure of the last client and the end of the session, in
                 seconds.
             clock: the clock.
-            latch: store that preserves a latched STOP over a restart; None to store nothing.
-            recorder: receives the events of the audit log; None to record nothing.
-            start_lock: lock that all robots of a server share, so that sessions start one by one.
-            alarms: the alarms of the robot; None for alarms that are not stored.
+            latch: store that preserves a latched STOP over a restart; None stores no latch.
+            recorder: receives the audit events; None records no events.
+            start_lock: shared lock of all robots of a server; makes sessions start one by one.
+            alarms: the robot's alarms; None creates alarms that are not stored.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -239,7 +238,7 @@ class RobotService:
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
-        """Number of callers that currently require a disconnected robot."""
+        """Number of callers that currently need the robot disconnected."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
         self._last_picture: bytes | None = None
 
@@ -258,17 +257,17 @@ class RobotService:
 
     @property
     def is_full(self) -> bool:
-        """Whether the maximum number of clients is reached."""
+        """Whether the robot has reached its maximum number of clients."""
         return self._visitors >= CLIENTS
 
     def has_room_for(self, peer: SocketPeer) -> bool:
-        """Return whether `peer` may open another client within its limit."""
+        """Return whether `peer` may connect another client."""
         most = CLIENTS_OF_KNOWN if peer.is_known else CLIENTS_OF_UNKNOWN
         return not peer.who or self._operators[peer.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count one more client of `who` while the context is open; for `who`, see `SocketPeer`."""
+        """Count a client of `who` while the context is open; see `SocketPeer` for `who`."""
         self._visitors += 1
         self._operators[who] += 1
         self._changed.set()
@@ -290,7 +289,7 @@ class RobotService:
 
     @property
     def open_session(self) -> LiveSession | None:
-        """The open session, without opening one; None if no session is open."""
+        """The open session; None if no session is open."""
         coming = self._next
         if coming is None or not coming.done() or coming.cancelled() or coming.exception():
             return None
@@ -307,7 +306,7 @@ class RobotService:
         return _view(live.session.hub) if live is not None else self._last_picture
 
     def _keep_picture(self, hub: Hub) -> None:
-        """Keep the last image of a session for the menu."""
+        """Store the last image of a session for the menu."""
         seen = _view(hub)
         if isinstance(seen, bytes):
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
@@ -330,7 +329,7 @@ class RobotService:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether no operator drives the robot, and every stop has reached the robot."""
+        """Whether no operator drives the robot, and the robot has received every stop."""
         controller = self.controls.controller
         return controller.lease.state.holder is None and controller.is_confirmed
 
@@ -343,7 +342,7 @@ class RobotService:
     async def held_off(self) -> AsyncIterator[None]:
         """Keep the robot disconnected while the context is open.
 
-        The context is needed because many robots accept only one connection. No operator may be
+        Callers need the context because many robots accept only one connection. No operator may be
         driving the robot. An open session ends first, and clients wait for the next session.
         """
         self._held_off += 1
@@ -371,7 +370,7 @@ class RobotService:
         self._is_open = False
         if self._successor is not None:
             (self.robot, latch), self._successor = self._successor, None
-            self._last_picture = None  # it may be of another robot
+            self._last_picture = None  # it may show another robot
             self.controls.renew(self.robot.profile.driver, latch)
             self.alarms.renew(self.robot.profile.driver, is_monitored=self._wants_monitoring)
 
@@ -394,7 +393,7 @@ class RobotService:
             except UrcError as error:
                 self._fail(str(error))
                 await self.clock.sleep(RETRY_S)
-            except Exception:  # a supervisor: one robot's bug must not end the others
+            except Exception:  # a supervisor: one robot's bug must not end other robots' sessions
                 log.exception("the session of %s failed", self.robot.profile.name)
                 self._fail("the robot's session failed; the reason is in the server's log")
                 await self.clock.sleep(RETRY_S)
@@ -455,11 +454,11 @@ class RobotService:
 
     @property
     def _is_unwanted(self) -> bool:
-        """Return whether an open session must end although it has clients."""
+        """Whether an open session must end despite its clients."""
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until a session is needed or, if not `present`, until no session is needed."""
+        """Wait until a session is needed; with `present` false, wait until no session is needed."""
         while not (self._is_wanted if present else not self._has_clients or self._is_unwanted):
             self._changed.clear()
             await self._changed.wait()
@@ -470,7 +469,7 @@ class RobotService:
 
     @property
     def _has_clients(self) -> bool:
-        """Return whether a page or program, or the monitoring of alarms, needs the robot."""
+        """Whether a page, a program or alarm monitoring needs the robot."""
         return self._visitors > 0 or self.is_monitored
 
     @property
@@ -496,7 +495,7 @@ class RobotService:
 
 
 def _view(hub: Hub) -> Glimpse:
-    """Return the first image of a robot, or else its values; None without any."""
+    """Return a robot's first image, or else its values; None if no data has arrived."""
     samples = {name: hub.latest(name) for name in hub.signals}
     values = {name: one.value for name, one in samples.items() if one is not None}
     pictures = (value for value in values.values() if isinstance(value, bytes))

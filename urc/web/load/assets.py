@@ -1,8 +1,7 @@
-"""Tables of the files that a page may load; no request can name a path outside these tables.
+"""Tables of the files that pages may load; no request can reach a path outside these tables.
 
-Layer 5. Every table is filled from folders that ship with URC or from widget manifests, and a
-request only looks up its URL in a table. A changed file is read again, so edits are visible
-immediately.
+Layer 5. The tables contain files from URC's own folders and from widget folders. A request only
+looks up its URL in a table. Changed files are read again, so edits are visible immediately.
 """
 
 import hashlib
@@ -33,10 +32,10 @@ KIT = (
     "offscreen_canvas",
     "path_simplify",
 )
-"""URC's modules that widgets import as ``urc/…``."""
+"""URC's modules that widgets can import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200
-"""Maximum number of files of one widget that pages may load."""
+"""Maximum number of files that pages may load from one widget."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -75,7 +74,7 @@ class _CachedFile:
 
 @dataclass(slots=True)
 class Assets:
-    """A table of files by their relative URL."""
+    """A table of files, keyed by relative URL."""
 
     files: dict[str, _CachedFile] = field(default_factory=dict)
 
@@ -109,7 +108,7 @@ def _tag(body: bytes) -> str:
 
 
 def folder_assets(folder: Path) -> Assets:
-    """Return all files in `folder` with a web media type, by relative path."""
+    """Return all files with a web media type in `folder`, keyed by relative path."""
     root = folder.resolve()
     found = Assets()
     for path in sorted(root.rglob("*")):
@@ -120,10 +119,10 @@ def folder_assets(folder: Path) -> Assets:
 
 
 def widget_assets(widgets: Iterable[Widget]) -> Assets:
-    """Return the widget files that pages load: modules, style sheets and small assets.
+    """Return the pages' widget files: modules, style sheets and small assets.
 
-    Each file is listed as ``<widget>/<path in its folder>``. Hidden files, and links to places
-    outside the folder, are left out.
+    Each file is listed as ``<widget>/<path in its folder>``. Hidden files and links out of the
+    folder are omitted.
 
     Raises:
         UrcError: widgets of the same name come from different folders, or a widget has too many
@@ -161,7 +160,7 @@ def _is_hidden(part: str) -> bool:
 
 
 def import_map(vendor: Path | None) -> Mapping[str, object]:
-    """Return the page's import map, with URC's modules and the third-party modules of the build."""
+    """Return the pages' import map, with URC's modules and the build's third-party modules."""
     imports = {f"urc/{name}": f"/static/widgets/{name}.js" for name in KIT}
     imports["urc/words"] = "/words/en.js"
     place = vendor / "importmap.json" if vendor else None

@@ -1,4 +1,4 @@
-"""Routes of the files that pages load: modules, styles, widgets, catalogues and map tiles.
+"""Routes of the pages' files: modules, styles, widgets, catalogues and map tiles.
 
 Layer 5. Each request is looked up in a table; see `urc.web.load.assets`.
 """
@@ -22,10 +22,10 @@ class FileRoutes:
     """The routes.
 
     Args:
-        vendor: folder of the third-party modules of the build; None without a build.
-        tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
-        widgets: function that returns the tables of widget files. If several tables contain a file,
-            the first table is used.
+        vendor: folder of the build's third-party modules; None without a build.
+        tiles: folder of map tiles, ``z/x/y.png``; None for a server without tiles.
+        widgets: function that returns the tables of widget files. The first table with a file takes
+            precedence.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class FileRoutes:
         ]
 
     def has_widget(self, name: str) -> bool:
-        """Return whether pages load files of a widget with this name."""
+        """Return whether there are files of a widget with this name."""
         return any(f"{name}/widget.js" in table.files for table in self._widgets())
 
     async def _favicon(self, request: Request) -> Response:
@@ -85,7 +85,7 @@ class FileRoutes:
         return answer
 
     async def _tile(self, request: Request) -> Response:
-        """Serve a map tile; without a configured folder of tiles, respond with status 404."""
+        """Serve a map tile; respond with status 404 if no tile folder is configured."""
         if self._tiles is None:
             raise HTTPException(404)
         return tile(self._tiles, **request.path_params, request=request)

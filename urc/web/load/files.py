@@ -1,8 +1,8 @@
-"""Map tiles, and the files that a robot's documents name in the options of widgets.
+"""Map tiles, and the files listed in widget options of a robot's documents.
 
-Layer 5. A URL contains either a key into a table of the loaded profile, or the three numbers of a
+Layer 5. A URL contains either a key of a table in the loaded profile, or the three numbers of a
 tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
-way; ``external_pages.py`` builds the document around them.
+way; ``external_pages.py`` builds the documents around them.
 """
 
 import hashlib
@@ -44,13 +44,13 @@ EMPTY_TILE = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010804000000b51c0c020000"
     "000b49444154789c636060000000030001b8ad3a630000000049454e44ae426082"
 )
-"""A transparent pixel that replaces missing tiles, so that layers below remain visible."""
+"""A transparent pixel in place of missing tiles, so that lower layers remain visible."""
 
 
 def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
-    """Return the options of a widget for the page, with URLs in place of file names.
+    """Return a widget's options for the page, with URLs in place of file names.
 
-    The URL of a third-party page is replaced by the URL of the document that frames the page.
+    A third-party page's URL is replaced by the URL of the document that frames the page.
     """
     files = {name: _url(robot, name, place) for name, place in use.files.items()}
     options = {name: _linked(value, files) for name, value in use.options.items()}
@@ -74,25 +74,25 @@ def _framed(robot: str, url: str) -> str:
 
 
 def page_key(url: str) -> str:
-    """Return the key of a third-party page in the URL of its frame document."""
+    """Return a third-party page's key, used in the URL of its frame document."""
     return hashlib.blake2b(url.encode(), digest_size=8).hexdigest()
 
 
 def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield the widget use of every filled slot in the profile and its interfaces."""
+    """Yield the widget use of every filled slot, in the profile and its interfaces."""
     yield from profile.slots.values()
     for interface in profile.interfaces.values():
         yield from interface.widgets.values()
 
 
 def _key(name: str, place: str) -> str:
-    # The digest keeps files of the same name apart. The path follows it, because a model names its
-    # parts by path.
+    # The digest distinguishes files of the same name. The path follows the digest, because models
+    # refer to their parts by path.
     return f"{hashlib.blake2b(place.encode(), digest_size=6).hexdigest()}/{name}"
 
 
 def robot_file(profile: Profile, key: str, request: Request) -> Response:
-    """Return a file that the profile names for a widget; raise status 404 for any other key."""
+    """Return a file that the profile lists for a widget; raise status 404 for any other key."""
     uses = uses_of(profile)
     table = {_key(name, place): place for use in uses for name, place in use.files.items()}
     if key not in table:
@@ -104,7 +104,7 @@ def robot_file(profile: Profile, key: str, request: Request) -> Response:
 
 
 def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> Response:
-    """Return a map tile from ``folder/z/x/y.kind``; a missing file gives a transparent tile.
+    """Return a map tile from ``folder/z/x/y.kind``; for a missing file, a transparent tile.
 
     Raises:
         HTTPException: 404 if a number is out of range, or the media type is unknown.

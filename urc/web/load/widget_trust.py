@@ -1,7 +1,7 @@
-"""The rule that decides which widgets run in the page, and which in a sandboxed frame.
+"""The rule for where a widget runs: in the page, or in a sandboxed frame.
 
-Layer 5. Widgets that ship with URC run in the page. Every other widget is third-party code and runs
-in a sandboxed frame, unless the server was started with the option to trust this widget.
+Layer 5. URC's own widgets run in the page. Every other widget is third-party code and runs in a
+sandboxed frame, unless the server was started with the option to trust it.
 """
 
 from collections.abc import Iterable
@@ -21,13 +21,12 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Names of the widgets that ship with URC. Any other folder next to these widgets is not
-trusted."""
+"""Names of URC's own widgets. Other folders next to these widgets are not trusted."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetTrust:
-    """The rule that distinguishes third-party widgets from trusted widgets."""
+    """The rule that identifies third-party widgets."""
 
     trusted: frozenset[str] = frozenset()
     """Names of third-party widgets that run in the page."""
@@ -47,7 +46,7 @@ class WidgetTrust:
     def styles(self, widgets: Iterable[Widget]) -> tuple[str, ...]:
         """Return the URLs of the widgets' style sheets for a page.
 
-        Style sheets of third-party widgets are left out, because they could restyle the whole page.
+        Style sheets of third-party widgets are omitted, because they could restyle the whole page.
         """
         mine = dict.fromkeys(one.name for one in widgets if not self.is_foreign(one))
         return tuple(f"/widgets/{quote(name)}/widget.css" for name in mine)

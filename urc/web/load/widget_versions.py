@@ -1,4 +1,4 @@
-"""Support for different versions of one widget: each robot keeps its installed version.
+"""Support for several versions of one widget: each robot keeps its installed version.
 
 Layer 5. Pages load widgets by name. If two different widgets have the same name, the second widget
 is renamed.
@@ -17,7 +17,7 @@ __all__ = ["apart", "is_same", "unified"]
 
 
 def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
-    """Return the profile with new names for widgets that differ from other profiles' widgets."""
+    """Return the profile with new names for widgets that conflict with other profiles' widgets."""
     taken: dict[str, Path] = {}
     for other in others:
         for widget in other.widgets.values():
@@ -31,7 +31,7 @@ def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
 
 
 def unified(widgets: Iterable[Widget]) -> list[Widget]:
-    """Return the widgets, with equal copies of a widget in several folders as one widget."""
+    """Return the widgets, with identical copies in several folders merged into one widget."""
     found: dict[str, Widget] = {}
     every = []
     for widget in widgets:

@@ -1,6 +1,7 @@
-"""The watch of the block lists: a robot with a blocked package is stopped, then disabled.
+"""A watch over the block lists, which stops and disables robots with blocked packages.
 
-Layer 5. The lists change by imports of the command line, and by the hourly requests of this watch.
+Layer 5. The lists change through imports on the command line and through this watch's hourly
+requests.
 """
 
 import asyncio
@@ -17,9 +18,9 @@ from urc.web.fleet.robots import Robot
 __all__ = ["BlockWatch"]
 
 _LOOK_S: Final = 1.0
-"""Interval between looks at the file of the lists, in seconds."""
+"""Interval between checks of the block list file, in seconds."""
 _FIRST_ASK_S: Final = 60.0
-"""Time from the start of the server to the first request to the repositories, in seconds."""
+"""Time from the server's start to the first request to the repositories, in seconds."""
 _ASK_S: Final = 3600.0
 """Interval between requests to the repositories, in seconds."""
 
@@ -27,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class BlockWatch:
-    """The watch of one dashboard."""
+    """The watch over the block lists for one dashboard."""
 
     def __init__(
         self,
@@ -42,10 +43,10 @@ class BlockWatch:
         Args:
             store: the installed packages.
             fleet: the served robots.
-            remade: function that creates a robot again from its documents, in a thread; raises
-                `UrcError`, for example for a blocked package.
-            own_interfaces: function that returns the names of the interfaces of a robot's own
-                document, in a thread; raises `UrcError`.
+            remade: function that recreates a robot from its documents. It is called in a thread,
+                and raises `UrcError`, for example for a blocked package.
+            own_interfaces: function that returns the names of the interfaces in a robot's own
+                document. It is called in a thread, and may raise `UrcError`.
             ask: function that starts a request to all repositories.
         """
         self._store = store
@@ -54,7 +55,7 @@ class BlockWatch:
         self._own_interfaces = own_interfaces
         self._ask = ask
         self._disabled: dict[str, Robot] = {}
-        """Robots that this watch has disabled, by name."""
+        """Robots disabled by this watch, by name."""
 
     async def run(self, changed: Callable[[], Awaitable[None]]) -> None:
         """Watch until cancelled.
@@ -64,7 +65,7 @@ class BlockWatch:
         """
         loop = asyncio.get_running_loop()
         asks_at_s = loop.time() + _FIRST_ASK_S
-        seen: object = None  # a server without lists has nothing to enforce
+        seen: object = None  # a server without block lists has nothing to enforce
         while True:
             await asyncio.sleep(_LOOK_S)
             if loop.time() >= asks_at_s:
@@ -80,10 +81,10 @@ class BlockWatch:
             seen = stamp
 
     async def enforce(self) -> None:
-        """Stop and disable each robot with a blocked package; enable robots without one again.
+        """Stop and disable robots with a blocked package; enable disabled robots without one.
 
         Raises:
-            UrcError: the lists cannot be read; no robot has changed.
+            UrcError: the lists cannot be read. No robot has changed.
         """
         for name, robot in list(self._fleet.robots.items()):
             lines = await asyncio.to_thread(self._lines, name, robot)
@@ -98,7 +99,7 @@ class BlockWatch:
                 log.warning("%s: its package is no longer blocked", name)
 
     def _lines(self, name: str, robot: Robot) -> list[str]:
-        """Return the blocked packages of a robot, in a thread."""
+        """Return one line for each blocked package of a robot; called in a thread."""
         if robot.playback is not None:
             return []
         lines = blocked_lines_of(Path(robot.profile.file))
@@ -122,12 +123,12 @@ class BlockWatch:
                 await service.deliver_stop()
         await service.controls.settle()
         await self._fleet.remove(name)
-        if not await self._add(name, robot):  # an added interface can be left out
+        if not await self._add(name, robot):  # works if only an added interface is blocked
             self._fleet.broken[name] = BrokenRobot(robot.profile.title or name, line)
             self._disabled[name] = robot
 
     async def _add(self, name: str, robot: Robot) -> bool:
-        """Serve a robot again from its documents; return whether no part is blocked."""
+        """Add a robot again from its documents; return False if this fails."""
         try:
             made = await asyncio.to_thread(self._remade, name, robot)
             self._fleet.add(name, made)

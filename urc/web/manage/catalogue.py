@@ -1,6 +1,6 @@
 """The package lists of the repositories, kept in memory and refreshed in the background.
 
-Layer 5. A page starts a refresh and shows the last known lists immediately, so no page waits for an
+Layer 5. Pages start a refresh and show the last known lists immediately, so they never wait for an
 unreachable server.
 """
 
@@ -22,17 +22,17 @@ from urc.web.manage.wire import RepositoryInfo
 __all__ = ["FRESH_S", "PackageCatalog"]
 
 FRESH_S: Final = 20.0
-"""Age below which a package list is not refreshed again, in seconds."""
+"""Minimum age of a package list before a refresh, in seconds."""
 
 
 class PackageCatalog:
-    """The packages of all repositories that the user has added."""
+    """The packages of all repositories added by the user."""
 
     def __init__(self, folder: Path, now: Callable[[], float]) -> None:
         """Prepare the lists without contacting any repository.
 
         Args:
-            folder: folder of the packages and of the list of repositories.
+            folder: folder of the packages and the list of repositories.
             now: function that returns the current time, in seconds.
         """
         self._folder = folder
@@ -41,7 +41,7 @@ class PackageCatalog:
         self._asking: asyncio.Task[None] | None = None
         self.places: tuple[RepositoryInfo, ...] = ()
         self.found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
-        """Every version of every package, and the URL of its repository."""
+        """Every version of every package, with the URL of its repository."""
         self.fault = ""
         """Reason why the list of repositories cannot be read; "" if it can."""
 
@@ -72,12 +72,12 @@ class PackageCatalog:
         return [entry for some in self.found.values() for entry, _ in some]
 
     def hits(self, words: str, kinds: tuple[str, ...]) -> list[IndexEntry]:
-        """Return the newest version of each package of the given kinds that matches all words."""
+        """Return the newest version of each package with a given kind that matches all words."""
         entries = [entry for entry in self.entries() if entry.kind in kinds]
         return search(entries, words.split())
 
     def versions(self, key: PackageId) -> list[IndexEntry]:
-        """Return all versions of a package that are not withdrawn, newest first."""
+        """Return all versions of a package without withdrawn ones, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
@@ -110,7 +110,7 @@ class PackageCatalog:
         self._asked_s = self._now()
 
     def _answer(self, repository: Repository) -> tuple[RepositoryInfo, tuple[IndexEntry, ...]]:
-        """Request the list of one repository, in a thread."""
+        """Request the package list of one repository; called in a thread."""
         said: list[str] = []
         url, is_plain = repository.name, repository.name.startswith("http:")
         try:
@@ -127,4 +127,4 @@ class PackageCatalog:
 
 
 def _unheard(_: str) -> None:
-    """Ignore a warning, because the result of the request already contains the warning."""
+    """Ignore a warning, because the result of the request also contains it."""

@@ -1,8 +1,8 @@
-"""The installation job, with the steps plan, review, approval and installation.
+"""Installation jobs, each with planning, review, approval and installation.
 
-Layer 5. A job can be cancelled at any step. No function of this module blocks the event loop.
-Downloads run in a thread, which is abandoned if the job is cancelled. The package store changes
-only at the end, in one step.
+Layer 5. A job can be cancelled until the installation starts. No function of this module blocks the
+event loop. Downloads run in a thread, which is abandoned if the job is cancelled. The package store
+changes only at the end, in one step.
 """
 
 import asyncio
@@ -33,10 +33,10 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Maximum number of changes in the frames to the robot that a job reports."""
+"""Maximum number of reported changes in the frames to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Maximum number of abandoned threads that are still waiting for a server."""
+"""Maximum number of abandoned threads that still wait for a server."""
 
 
 Wanted = PackageRequirement | Path | FileSource | Lock
@@ -45,7 +45,7 @@ package to update."""
 
 
 class Busy(UrcError):
-    """The refusal of a job or a change that is not possible at present."""
+    """Refusal of a job or change that is currently impossible."""
 
 
 class _Planned(NamedTuple):
@@ -53,21 +53,21 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without any setting by the user."""
+    """Resources of this machine that the package uses without a setting by the user."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
-    """The version that an update replaces; None for a new installation."""
+    """Version replaced by the update; None for a new installation."""
     stays: Lock | None = None
-    """The version that stays in use after the installation of another version, if any."""
+    """Version that stays in use after the installation of another version, if any."""
     changes: UpdateDiff | None = None
 
 
 @dataclass
 class Job:
-    """One installation job, from the request to its end.
+    """One installation job, from the request to the result.
 
-    The thread of a job writes only the job's texts and numbers.
+    The job's thread changes only texts and numbers of the job.
     """
 
     number: int
@@ -81,7 +81,7 @@ class Job:
     is_given_up: bool = False
 
     def news(self) -> JobNews:
-        """Return the state of the job for pages."""
+        """Return the job's state for pages."""
         planned = self.planned
         changes = planned.changes if planned is not None else None
         packages = planned.origins if planned is not None else ()
@@ -106,7 +106,7 @@ class Job:
 
 
 class _ReportingSource:
-    """A package source that reports progress to a job, and fails after the job's cancellation."""
+    """A package source that reports progress to a job, and fails once the job is cancelled."""
 
     def __init__(self, source: Source, job: Job) -> None:
         self._source = source
@@ -140,7 +140,7 @@ class _ReportingSource:
 class Jobs:
     """The jobs of one package store.
 
-    Only one job runs at a time, and the newest job stays visible.
+    Only one job runs at a time. The newest job stays visible.
     """
 
     def __init__(
@@ -153,9 +153,9 @@ class Jobs:
 
         Args:
             store: the store of installed packages.
-            sources: function that returns the repositories, and passes warnings to its argument.
-            used: function that returns the version in use of a package, or of another package with
-                the same name.
+            sources: function that returns the repositories and reports warnings to its argument.
+            used: function that returns the version in use of a package, or of a package with the
+                same name.
         """
         self._store = store
         self._used = used
@@ -166,7 +166,7 @@ class Jobs:
         self.newest: Job | None = None
 
     def begin(self, what: Wanted) -> Job:
-        """Start to plan an installation; raise `Busy` while another job is working."""
+        """Start planning an installation; raise `Busy` while another job is working."""
         if self.newest is not None and self.newest.state == "working":
             raise Busy(f"{self.newest.title} is still in progress: wait for its end, or cancel it")
         if self._left >= _LEFT_MOST:
@@ -192,12 +192,11 @@ class Jobs:
         Args:
             number: number of the job.
             takes_risks: whether the user also approved the package's own access to this machine.
-            unsigned: packages that the user accepts without a signature, by name.
+            unsigned: names of unsigned packages that the user accepts.
 
         Raises:
             Busy: the job is not waiting for approval.
-            PackageError: the package requires `takes_risks`, but `takes_risks` is false, or the
-                signature of a package is neither present nor waived.
+            PackageError: the package needs `takes_risks`, or an unsigned package was not accepted.
         """
         job = self._asked(number)
         planned = job.planned
@@ -224,13 +223,13 @@ class Jobs:
         return job
 
     async def planned(self) -> Job | None:
-        """Wait until the newest job needs approval or has ended; return the job."""
+        """Wait until the newest job needs approval or has ended, and return the job."""
         if self._task is not None:
             await asyncio.wait((self._task,))
         return self.newest
 
     def cancel(self, number: int) -> Job:
-        """Cancel a job before it changes anything; raise `Busy` if it is not the newest job."""
+        """Cancel the job unless its installation has started; raise `Busy` for an earlier job."""
         job = self._asked(number)
         if job.state in ("working", "asks") and job.line != _INSTALLING:
             job.is_given_up = True
@@ -270,7 +269,7 @@ class Jobs:
             thread.exception()  # marks the exception as retrieved
 
     def _plan(self, job: Job, what: Wanted) -> _Planned:
-        """Download all packages and read their permissions, in a thread."""
+        """Download all packages and read their permissions; called in a thread."""
         known = [_ReportingSource(one, job) for one in self._sources(job.notes.append)]
         plan = self._fetched(job, what, known)
         if job.is_given_up:
@@ -280,7 +279,7 @@ class Jobs:
         old = what if isinstance(what, Lock) else None
         with self._store.changing() as change:
             unsigned = tuple(self._store.state().lacking(plan))
-            # The preview needs the files; the installation needs the user's waivers.
+            # The preview needs the files before the user has given waivers.
             folder = change.stage(plan._replace(waived=frozenset(unsigned)))
             lock = plan.lock
             widgets = [key.name for key in kinds_in(lock, "widget")]
@@ -355,6 +354,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure as one line of text; of several problems, return only the first."""
+    """Return a failure as one line of text, limited to the first problem."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

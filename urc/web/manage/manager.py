@@ -1,4 +1,4 @@
-"""A manager that keeps the robots on the menu consistent with the installed packages.
+"""A manager of packages, which keeps the menu's robots consistent with installed packages.
 
 Layer 5. The manager has no routes and no pages: `urc.web.manage.routes` uses it.
 """
@@ -63,15 +63,13 @@ class Manager:
             lambda: self.catalogue.refresh(force=True),
         )
         self._packages: dict[str, Lock] = {}
-        """Served version of each robot that is on the menu because its package is installed, by
-        name."""
+        """Served version of each robot from an installed package, by robot name."""
         self._offered: dict[str, str] = {}
-        """Digest of each interface that robots offer because the interface is installed, by
-        name."""
+        """Digest of each installed interface, by name."""
         self._seen: object = None
-        """Fingerprint of the package store's state at the last update of the menu."""
+        """State of the package store at the last update of the menu."""
         self._is_behind = False
-        """Whether a change is pending until a robot is no longer driven."""
+        """Whether a change is pending because a robot is driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -86,7 +84,7 @@ class Manager:
     # The menu
 
     async def park(self) -> None:
-        """Update the robots of installed packages, if the menu shows installed robots."""
+        """Update the robots from installed packages, if the menu shows installed robots."""
         if not self.factory.robot_options.shows_installed:
             return
         installed = await asyncio.to_thread(self.factory.installed_robots)
@@ -108,7 +106,7 @@ class Manager:
                 self._packages.get(name),
             )
             if served in locks and not kept.version:
-                lock = served  # another program installed a newer version; the user chooses
+                lock = served  # the user must choose another program's newer version
             if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
             profile = await asyncio.to_thread(self.factory.profile, lock)
@@ -124,13 +122,13 @@ class Manager:
             self._packages.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
-        """Return whether a robot is driven, which defers a change of its package."""
+        """Return whether a robot is driven; if so, record that its change is pending."""
         is_driven = name in self.fleet.robots and bool(self.fleet.driven_by(name))
         self._is_behind = self._is_behind or is_driven
         return is_driven
 
     async def refurnish(self) -> None:
-        """Add the installed interfaces to every robot that is not being driven."""
+        """Update the installed interfaces of all robots that are not being driven."""
         added = await asyncio.to_thread(self.factory.interfaces)
         now = {one.lock.key.name: one.lock.digest for one in added}
         changed = {name for name, _ in now.items() ^ self._offered.items()}
@@ -160,29 +158,29 @@ class Manager:
                 self._packages[name] = self.factory.chosen_version(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
-        """Return a robot's profile as its document defines it, without added interfaces."""
+        """Return a robot's profile from its document, without added interfaces."""
         lock = self._packages.get(name)
         if lock is not None:
             return self.factory.profile(lock)
         return self.factory.reload(robot.profile)
 
     def drivers(self) -> dict[str, str]:
-        """Return the installed package of each robot, such as ``drivers/puppet 1.0.0``, by name."""
+        """Return each robot's installed package, such as ``drivers/puppet 1.0.0``, by name."""
         return {name: str(lock) for name, lock in self._packages.items()}
 
     def lock_of(self, name: str) -> Lock | None:
-        """Return the installed package of a robot; None for a robot given at the start."""
+        """Return a robot's installed package; None for a robot given at the start."""
         return self._packages.get(name)
 
     # Changes
 
     async def refresh(self) -> None:
-        """Update the menu if any program has installed or removed a package."""
+        """Update the menu if a package was installed or removed by any program."""
         if await asyncio.to_thread(self.factory.stamp) != self._seen:
             await self.changed()
 
     async def watch_blocks(self) -> None:
-        """Enforce the lists of blocked packages until cancelled."""
+        """Enforce the block lists until cancelled."""
         await self._block_watch.run(self._blocks_changed)
 
     async def _blocks_changed(self) -> None:
@@ -201,7 +199,7 @@ class Manager:
                 await self.refurnish()
                 if self._is_behind:
                     self._seen = None
-            except (UrcError, OSError) as error:  # the managers' pages show it, too
+            except (UrcError, OSError) as error:  # the manager pages show this error, too
                 log.warning("the installed packages cannot be read: %s", error)
 
     async def connect(self, url: str) -> None:
@@ -217,7 +215,7 @@ class Manager:
         self.catalogue.refresh(force=True)
 
     def gone(self, required: PackageRequirement) -> list[str]:
-        """Return all packages that a removal would remove, or raise `PackageError`."""
+        """Return all packages that would be removed, or raise `PackageError`."""
         before = self.factory.store.installed()
         meant = self._meant(required)
         after = [lock for lock in before if lock not in meant]
@@ -236,19 +234,19 @@ class Manager:
         return meant
 
     def forgettable(self, required: PackageRequirement) -> list[str]:
-        """Return the robots whose settings a removal could delete, or raise `PackageError`."""
+        """Return the robots whose settings the removal can delete, or raise `PackageError`."""
         meant = self._meant(required)
         left = [lock for lock in self.factory.store.installed() if lock not in meant]
         return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
-        """Remove a package and its unneeded dependencies; return the names of removed packages.
+        """Remove a package and its unneeded dependencies; return the names of the removed packages.
 
-        If `forgets` is true, the settings of the robot are deleted too.
+        If `forgets` is true, the robot's settings are deleted, too.
 
         Raises:
             PackageError: the package is not installed.
-            Busy: an operator drives the robot of the package.
+            Busy: an operator drives the package's robot.
         """
         required = parse_requirement(text)
         for lock in await asyncio.to_thread(self._meant, required):
@@ -270,7 +268,7 @@ class Manager:
     ) -> Job:
         """Install the planned package; raise `Busy` while its robot is being driven.
 
-        The version in use stays in use, unless the job is an update.
+        The current version stays in use, unless the job is an update.
         """
         key, used = await asyncio.to_thread(self.jobs.touched, number)
         if key is not None:
@@ -289,7 +287,7 @@ class Manager:
         return lock
 
     async def back(self, text: str) -> Lock:
-        """Restore and return the version before the last update. Raise `PackageError`."""
+        """Restore and return the version before the last update, or raise `PackageError`."""
         lock = await asyncio.to_thread(self.installed, text)
         self._check_idle_of(lock.key)
 
@@ -307,7 +305,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: PackageId) -> Lock | None:
-        """Return the package version in use; a robot's package is found by the robot's name."""
+        """Return the version in use of a package; robot packages match by name."""
         installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
@@ -329,15 +327,15 @@ class Manager:
     def cache(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
         """Return the package lists for a page.
 
-        Call this method in a thread, because it reads files.
+        The method reads files, so call it in a thread.
 
         Args:
-            words: search words for packages of repositories.
+            words: search words for packages in repositories.
             kinds: kinds of the listed packages.
             may_manage: whether the visitor may change packages and settings.
         """
         catalogue = self.catalogue
-        # Read first: replies that arrive during the search then cause one more request.
+        # Read first, so that replies that arrive during the search cause one more request.
         is_asking = catalogue.is_asking
         locks = self.factory.store.installed()
         hits = catalogue.hits(words, kinds)
@@ -403,14 +401,14 @@ class Manager:
         )
 
     def _block_of(self, lock: Lock) -> str:
-        """Return the reason why a package is blocked; "" for other packages."""
+        """Return why a package is blocked; "" for other packages."""
         try:
             return "; ".join(self.factory.store.blocked(lock))
         except UrcError as error:
             return str(error)
 
     def _fits(self, interface: str) -> tuple[str, ...]:
-        """Return the titles of the robots that offer an installed interface."""
+        """Return the titles of robots that offer an installed interface."""
         return tuple(
             robot.profile.title or name
             for name, robot in self.fleet.robots.items()

@@ -1,6 +1,6 @@
 """Requests that read or change the playback of a recording.
 
-Layer 5. A playback has the same pages as a robot without controls. Any visitor may control the
+Layer 5. A playback has the same pages as a robot without controls. All visitors may control the
 playback, because no real robot is connected.
 """
 

@@ -1,7 +1,7 @@
-"""Routes of the manager pages, and of their requests under ``/api/v1``.
+"""Routes of the manager pages, and of the pages' requests under ``/api/v1``.
 
-Layer 5. Each change is a POST request with a JSON body from this server's own pages;
-`urc.web.serve.policy` checks the origin. Each change requires the start key or the token of
+Layer 5. Changes are POST requests with a JSON body from the server's own pages;
+`urc.web.serve.policy` checks their origin. Each change requires the start key or the token of
 --manage.
 """
 
@@ -58,13 +58,13 @@ class ManagePage:
     nav: Nav
     title: str
     about: str
-    """One sentence that describes the packages on the page."""
+    """A short description of the packages on the page."""
     kinds: str
     """Kinds of packages, separated by commas."""
     may_manage: bool
     """Whether the visitor may change packages and settings."""
     may_name_paths: bool
-    """Whether the visitor may enter paths of this machine, which requires the start key."""
+    """Whether the visitor may enter paths on this machine, for which the start key is required."""
     is_shown: bool
     """Whether the menu shows the installed robots."""
 
@@ -78,7 +78,7 @@ def manage_page(
     may_name_paths: bool,
     is_shown: bool,
 ) -> str:
-    """Return a manager page; `which` is a key of `KINDS`."""
+    """Return a manager page; `which` is a key in `KINDS`."""
     title, about = {
         "drivers": (
             t("Drivers"),
@@ -115,7 +115,7 @@ _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 
 
 def _api(handler: _Handler) -> _Handler:
-    """Turn each `UrcError` of a handler into a response with one line of text."""
+    """Turn a handler's `UrcError` into a response with one line of text."""
 
     @wraps(handler)
     async def handle(self: "ManageRoutes", request: Request) -> Response:
@@ -134,7 +134,7 @@ def _api(handler: _Handler) -> _Handler:
 
 
 class ManageRoutes:
-    """The routes of a dashboard's manager pages."""
+    """The manager routes of a dashboard."""
 
     def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
         """Prepare.
@@ -157,7 +157,7 @@ class ManageRoutes:
         ]
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints of the API requests, by the name of their call."""
+        """Return the API endpoints, keyed by call name."""
         return {
             "packages": self.cache,
             "repositories_ask": self.refresh,
@@ -188,7 +188,7 @@ class ManageRoutes:
 
     @_api
     async def cache(self, request: Request) -> Response:
-        """Return the packages that match ``kinds`` and ``words``, from the lists in memory."""
+        """Return the packages that match ``kinds`` and ``words`` from the lists in memory."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
         cache = await asyncio.to_thread(
@@ -201,7 +201,7 @@ class ManageRoutes:
 
     @_api
     async def refresh(self, request: Request) -> Response:
-        """Start a refresh from the repositories; with ``force``, regardless of the lists' age.
+        """Start a refresh from the repositories; ``force`` ignores the age of the lists.
 
         Any visitor may start a refresh, at most once per `FRESH_S` seconds.
         """
@@ -211,7 +211,7 @@ class ManageRoutes:
 
     @_api
     async def connect(self, request: Request) -> Response:
-        """Add a repository if it responds."""
+        """Add a repository, which must respond."""
         said = await body_of(request, Url)
         text = said.url.strip()
         if "://" not in text:
@@ -222,7 +222,7 @@ class ManageRoutes:
 
     @_api
     async def disconnect(self, request: Request) -> Response:
-        """Remove a repository; the packages installed from this repository stay."""
+        """Remove a repository; packages installed from it stay."""
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
         self._record(request, "repository remove", [said.url])
@@ -230,7 +230,7 @@ class ManageRoutes:
 
     @_api
     async def install(self, request: Request) -> Response:
-        """Start a job that downloads a package given by name, and lists its permissions."""
+        """Start a job to download a named package and list its permissions."""
         said = await body_of(request, InstallRequest)
         return self._begun(parse_requirement(said.package))
 
@@ -254,7 +254,7 @@ class ManageRoutes:
 
     @_api
     async def update(self, request: Request) -> Response:
-        """Start the update of a package: download the newest version, and list the changes."""
+        """Start a job to download the newest version of a package and list the changes."""
         said = await body_of(request, InstallRequest)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
 
@@ -303,7 +303,7 @@ class ManageRoutes:
     def _record(
         self, request: Request, command: str, packages: Iterable[str], outcome: str = "done"
     ) -> None:
-        """Write a change of packages or repositories into the audit log."""
+        """Record a change of packages or repositories in the audit log."""
         self._recorder.package_changed(actor_of(request), command, packages, outcome)
 
     def _begun(self, what: Wanted) -> Response:
@@ -317,7 +317,7 @@ class ManageRoutes:
             try:
                 return parse_requirement(inside)
             except PackageError:
-                pass  # a folder of this machine may have that name
+                pass  # a folder on this machine may have that name
         if not visitor_of(request).is_local:
             raise ApiError(
                 403, "a path on this machine needs the key in the address that URC printed"

@@ -1,6 +1,6 @@
 """The groups of a robot's settings, and the setting behind a failed connection.
 
-Layer 5. Pure. Both follow from the use of the settings in the options of the transports.
+Layer 5. Pure. Both depend on how transport options use the settings.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,9 +14,9 @@ from urc.runtime.connection_cause import Cause
 __all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of"]
 
 CONNECTION: Final = ""
-"""Group of the settings that lead to the robot."""
+"""Group of the settings for the connection to the robot."""
 FURTHER: Final = "*"
-"""Group of the other settings without a declared group."""
+"""Group of all other settings without a declared group."""
 _PLACE: Final = ("host", "url", "address", "path")
 _LOGIN: Final = ("password", "key", "passphrase", "username", "user", "auth", "token", "headers")
 _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
@@ -33,13 +33,13 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
     "silent": ("port", "baud", "url", "host"),
     "host-key": ("host_key", "host"),
 }
-"""Options that most likely cause a failure, the most likely one first, by cause."""
+"""Options that most likely explain a failure, by cause, most likely first."""
 
 
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
 
-    A setting without a declared group belongs to the connection if a transport uses it, or if the
+    A setting without a declared group belongs to `CONNECTION` if a transport uses it or the
     operator must fill it in.
     """
     used = {
@@ -60,7 +60,7 @@ def groups_of(profile: Profile) -> dict[str, list[Setting]]:
 
 
 def failed_field(profile: Profile, transport: str, cause: Cause) -> str:
-    """Return the setting that most likely caused a failure; "" if no setting did.
+    """Return the setting that most likely caused a failure; "" if there is no such setting.
 
     Args:
         profile: profile of the robot.
@@ -74,7 +74,7 @@ def failed_field(profile: Profile, transport: str, cause: Cause) -> str:
 
 
 def _through(profile: Profile, spec: TransportSpec, cause: Cause) -> str:
-    """Return the setting of the tunnel, if the transport itself uses none."""
+    """Return the setting of the transport's tunnel that most likely caused a failure."""
     return failed_field(profile, spec.tunnel, cause) if spec.tunnel else ""
 
 

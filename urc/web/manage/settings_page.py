@@ -1,6 +1,6 @@
-"""Data of a robot's settings page: one form field per setting, chosen by the setting's type.
+"""Data of a robot's settings page, with one form field per setting, chosen by type.
 
-Layer 5. This pure module fills the fields, and `urc.web.manage.settings_routes` reads their values.
+Layer 5. This module fills the fields, and `urc.web.manage.settings_routes` reads their values.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -27,8 +27,8 @@ _INPUTS: Final = {
     "number": ("text", "decimal"),
     "path": ("text", ""),
 }
-"""Type of the field and of the on-screen keyboard for each type of setting. Numbers are entered in
-text fields, because a number field drops invalid input."""
+"""Field type and on-screen keyboard for each setting type. Numbers have text fields, because
+browsers drop invalid input from number fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Field:
     name: str
     title: str
     about: str
-    """Description of the setting, with its range."""
+    """Description of the setting, including its range."""
     kind: str
     """Type of the field: ``text``, ``password``, ``choice`` or ``switch``."""
     keys: str
@@ -55,26 +55,26 @@ class Field:
     value: str
     """Entered value; always "" for a secret."""
     default: str
-    """Value of the setting while the field is empty; "" without a default."""
+    """Value used while the field is empty; "" without a default."""
     is_optional: bool
-    """Whether the field may stay empty although it has no default."""
+    """Whether the field may stay empty even without a default."""
     options: tuple[Option, ...]
     is_given: bool
-    """Whether the value was given at the start of the server, and therefore cannot be changed."""
+    """Whether the value is fixed because it was given at the start of the server."""
     is_set: bool
-    """Whether a value of the secret is stored."""
+    """Whether a value is stored for the secret."""
     is_withheld: bool
-    """Whether the stored secret is unused because it was entered for another destination."""
+    """Whether the stored secret is not used because it was entered for another destination."""
 
 
 @dataclass(frozen=True, slots=True)
 class FieldGroup:
-    """Form fields that belong together."""
+    """A group of form fields."""
 
     title: str
     fields: tuple[Field, ...]
     is_folded: bool
-    """Whether the fields are hidden at first; never with an entered value."""
+    """Whether the fields are hidden at first; false if any field has an entered value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +93,10 @@ class SettingsPage:
     """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
     monitoring: tuple[Option, ...]
-    """Whether the robot stays connected for its alarms; empty for a robot without alarms."""
+    """Choices for staying connected for alarms; empty for a robot without alarms."""
     groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
-    """Names of the transports in the connection test."""
+    """Names of the tested transports."""
     may_manage: bool
     is_simulated: bool
     fault: str
@@ -117,16 +117,15 @@ def settings_page(
     may_manage: bool,
     fault: str = "",
 ) -> str:
-    """Return the page.
+    """Return the HTML of the settings page.
 
     Args:
         nonce: nonce of the response's content security policy.
-        name: name of the robot in URLs.
+        name: the robot's name in URLs.
         profile: the robot's profile with all its interfaces.
         kept: the stored settings of the robot.
         given: settings given at the start of the server.
-        withheld: names of secrets that are unused because they were entered for another
-            destination.
+        withheld: names of unused secrets, which were entered for another destination.
         ways: navigation links of this server.
         driver: name of the driver package or driver file in use.
         versions: installed versions of the driver, newest first.
@@ -250,5 +249,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value as text, in the form that a user enters."""
+    """Return a value as text, as a user would enter it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

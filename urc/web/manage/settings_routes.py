@@ -1,7 +1,7 @@
-"""Routes of a robot's settings page, which tests, stores and applies the entered settings.
+"""Routes of a robot's settings page, for testing, storing and applying settings.
 
-Layer 5. Settings that fail the test are stored only if the user confirms, for example because the
-robot is switched off.
+Layer 5. If the test fails, for example because the robot is switched off, the settings are stored
+only if the user confirms.
 """
 
 import asyncio
@@ -68,7 +68,7 @@ class SettingsRoutes:
         return [ProtectedRoute("/robots/{name}/settings", self.page, WATCH)]
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoint of the form, by the name of its call."""
+        """Return the form's endpoint, keyed by call name."""
         return {"settings": self.save}
 
     async def page(self, request: Request) -> Response:
@@ -149,7 +149,7 @@ class SettingsRoutes:
             if any(one.verdict == "fails" for one in lines) and not said.anyway:
                 text = t("Not saved: the robot cannot be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
-        manager.check_idle(name)  # again: the test takes a while
+        manager.check_idle(name)  # checked again, because the test takes time
         await asyncio.to_thread(factory.settings_store(name).save, kept)
         changes = _changes(before, kept, bare, secret_texts(bare, robot.settings))
         if changes:
@@ -167,7 +167,7 @@ class SettingsRoutes:
             return StoredSettings()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
-        """Return the profile of the chosen version, as its document defines it."""
+        """Return the profile from the chosen version's document."""
         manager, factory = self._manager, self._manager.factory
         lock = manager.lock_of(name)
         if lock is not None:
@@ -180,7 +180,7 @@ class SettingsRoutes:
     def _filled_in(
         self, profile: Profile, before: StoredSettings, said: SettingsAsked
     ) -> tuple[StoredSettings, dict[str, str]]:
-        """Return the settings to store, and the errors by field."""
+        """Return the settings to store and the errors by field."""
         texts, faults = _typed(profile, said)
         factory = self._manager.factory
         package = factory.package_of(profile)
@@ -208,7 +208,7 @@ class SettingsRoutes:
     async def _tried(
         self, name: str, profile: Profile, values: Mapping[str, Value]
     ) -> tuple[ProbedTransport, ...]:
-        """Test all transports while the robot is disconnected; a STOP ends the test immediately."""
+        """Test all transports while the robot is disconnected; STOP ends the test immediately."""
         robot_options = self._manager.factory.robot_options
         service = self._manager.fleet.services.get(name)
         held_off = service.held_off() if service is not None else nullcontext()
@@ -232,7 +232,7 @@ class SettingsRoutes:
 def _changes(
     before: StoredSettings, after: StoredSettings, profile: Profile, secrets: Iterable[str]
 ) -> dict[str, str | None]:
-    """Return the new text of each changed setting for the audit log; None for a secret."""
+    """Return each changed setting's new text for the audit log; None for a secret."""
     hidden = SecretForms(secrets)
     changes: dict[str, str | None] = {
         name: hidden.hide(getattr(after, name))
@@ -251,7 +251,7 @@ def _changes(
 
 
 def _epoch(service: RobotService | None) -> int:
-    """Return a number that changes with every STOP and every new operator."""
+    """Return a number that changes with every STOP and every change of the operator in control."""
     return service.controls.controller.lease.state.epoch if service is not None else 0
 
 
@@ -269,7 +269,7 @@ def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
 
 
 def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the valid inputs, and the errors of the invalid inputs, by field."""
+    """Return the valid inputs and the errors of invalid inputs, each by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():

@@ -1,7 +1,7 @@
-"""Sources of uploaded packages: a bundle, an archive, or an interface document without a package.
+"""Sources of uploaded packages: bundles, archives, and interface documents without a package.
 
-Layer 5. A document without a package is wrapped in a package, so the document is stored, listed and
-removed like all packages.
+Layer 5. A document without a package is wrapped in one, and then stored, listed and removed like
+any package.
 """
 
 from collections.abc import Sequence
@@ -31,9 +31,9 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
     """Return the package source of an uploaded file.
 
     Args:
-        name: file name from the browser; only the suffix matters.
+        name: file name from the browser, used for its suffix and in messages.
         data: its content.
-        installed: installed packages. A document gets a version that no installed package uses.
+        installed: installed packages. A document without a package gets an unused version number.
 
     Raises:
         PackageError: the file is neither a package nor an interface.
@@ -56,8 +56,8 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
 def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
     """Return the package source at a path on this machine, or raise `PackageError`.
 
-    The path leads to a package folder, a bundle, an archive, an interface document, or the folder
-    of an interface document.
+    The path may be a package folder, a bundle, an archive, an interface document, or the folder of
+    an interface document.
     """
     bare = path / "interface.yaml" if path.is_dir() else path
     if bare.suffix.lower() not in _DOCUMENTS or (path / MANIFEST).is_file():
@@ -70,7 +70,7 @@ def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
             raise PackageError(f"{path}: there is neither {MANIFEST} nor interface.yaml") from None
         raise PackageError(f"{path}: {error.strerror or error}") from None
     source = _wrapped(bare.name, data, installed)
-    source.is_folder = True  # the user named the file on this machine, so it is the user's own
+    source.is_folder = True  # the user chose the file on this machine, so it is the user's own
     return source
 
 

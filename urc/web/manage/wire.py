@@ -1,6 +1,6 @@
 """JSON messages between the manager pages and the server, in camel case.
 
-Layer 5. Pure. Requests are decoded into these types; the server refuses an invalid request with one
+Layer 5. Pure. The server decodes requests into these types, and refuses an invalid request with one
 line of text.
 """
 
@@ -65,60 +65,59 @@ class InstallRequest(ManageMessage, frozen=True):
 
     package: _Short
     yes: bool = False
-    """Whether to perform the removal; if not, the server only lists the packages."""
+    """Whether to remove the packages; if false, the server only lists them."""
     forget: bool = True
     """Whether a removal also deletes the robot's settings and secrets."""
 
 
 class Add(ManageMessage, frozen=True):
-    """Request to add a package by its path, in a repository or on this machine."""
+    """Request to add a package by its path in a repository or on this machine."""
 
     path: _Long
 
 
 class JobDecision(ManageMessage, frozen=True):
-    """Approval or cancellation of a job, after the user has seen the permissions."""
+    """Approval or cancellation of a job after the user has seen the permissions."""
 
     number: int
     takes_risks: bool = False
     """Whether the user also approved the package's own access to this machine."""
     unsigned: Annotated[tuple[_Short, ...], msgspec.Meta(max_length=128)] = ()
-    """Packages that the user accepts without a signature, such as ``widgets/dial``."""
+    """Unsigned packages that the user accepts, such as ``widgets/dial``."""
 
 
 JobState = Literal["working", "asks", "done", "failed", "cancelled"]
 
 
 class JobNews(ManageMessage, frozen=True):
-    """State of the current job."""
+    """State of the newest job."""
 
     number: int
     title: str
     state: JobState
     line: str
-    """Current activity of the job, or its result, in one line."""
+    """The job's current activity or result, in one line."""
     done: int
     of: int
     """Number of steps of the job; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
-    """Origin and signer of each package; for an update, the changes of the origin and the
-    signer."""
+    """Origin and signer of each package; for an update, the changed versions."""
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """Access to this machine that the package has without a setting; for an update, only additional
-    access."""
+    """Access to this machine without a setting; for an update, only additional access."""
     unsigned: tuple[str, ...] = ()
-    """Packages without the required signature, such as ``widgets/dial``. Each package must be
-    approved by name."""
+    """Packages without the required signature, such as ``widgets/dial``. The user must approve each
+    package by name."""
     gained: tuple[str, ...] = ()
     """Permissions that the update adds."""
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
-    """Changes that the update makes to the frames sent to the robot."""
+    """Changes to the frames sent to the robot."""
     stays: str = ""
-    """Version that stays in use until the user chooses another version; "" for no such version."""
+    """Version that stays in use until the user chooses another version. "" if the new version is
+    used."""
     notes: tuple[str, ...] = ()
     """Further notes, for example about a repository that does not respond."""
 
@@ -131,17 +130,17 @@ class RepositoryInfo(ManageMessage, frozen=True):
     count: int
     """Number of package versions in the repository."""
     fault: str
-    """Reason why the last request failed; "" if it succeeded."""
+    """Reason for the last request's failure; "" if it succeeded."""
     is_kept: bool
-    """Whether the cached list of the repository is in use."""
+    """Whether the repository's cached list is in use."""
     is_plain: bool
-    """Whether the repository is reached without encryption."""
+    """Whether the connection to the repository is unencrypted."""
     keeper: str = ""
     """Signer of the repository's index, with the key's fingerprint; "" for an unsigned index."""
 
 
 class Installed(ManageMessage, frozen=True):
-    """A package that a user has installed directly, not only as a dependency."""
+    """A directly installed package, not only a dependency."""
 
     package: str
     name: str
@@ -155,16 +154,16 @@ class Installed(ManageMessage, frozen=True):
     newer: str
     """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Earlier version that can be restored; "" if no earlier version can be restored."""
+    """Earlier version that can be restored; "" without such a version."""
     url: str
-    """URL of the package's page; "" if it has none."""
+    """URL of the package's page; "" without a page."""
     settings_url: str
     fits: tuple[str, ...]
-    """Titles of the robots that offer the interface."""
+    """Titles of robots that offer the interface."""
     fault: str
     """Reason why the package cannot be used; "" if it can."""
     withdrawn: tuple[str, ...] = ()
-    """Withdrawn packages and the reasons, one per line; includes dependencies of the package."""
+    """Withdrawn packages with reasons, one per line, including dependencies of the package."""
 
 
 class Available(ManageMessage, frozen=True):
@@ -182,7 +181,7 @@ class Available(ManageMessage, frozen=True):
     origin: str
     size: int
     has: str
-    """Installed version; "" if none is installed."""
+    """Installed version; "" if the package is not installed."""
 
 
 class PackageList(ManageMessage, frozen=True):
@@ -192,7 +191,7 @@ class PackageList(ManageMessage, frozen=True):
     installed: tuple[Installed, ...]
     available: tuple[Available, ...]
     total: int
-    """Number of packages found; the lists contain at most `MOST_HITS` packages."""
+    """Number of packages found; the list contains at most `MOST_HITS` of them."""
     is_asking: bool
     """Whether a refresh is running."""
     may_manage: bool
@@ -206,13 +205,13 @@ class ResultLine(ManageMessage, frozen=True):
 
 
 class RemovedPackages(ManageMessage, frozen=True):
-    """Packages that a removal affects."""
+    """Packages affected by a removal."""
 
     gone: tuple[str, ...]
     """Names and versions, such as ``drivers/puppet 1.0.0``."""
     line: str
     has_settings: bool = False
-    """Whether the robot has settings, which the removal may delete."""
+    """Whether the robot has stored settings, which the removal may delete."""
 
 
 class HealthStatus(ManageMessage, frozen=True):
@@ -226,24 +225,24 @@ class StopResult(ManageMessage, frozen=True):
     """Result of a STOP request."""
 
     latched: str
-    """Name of the operator who pressed STOP."""
+    """Name of the operator whose STOP is latched."""
     confirmed: bool
-    """Whether all transports of the robot have accepted the stop."""
+    """Whether all the robot's transports have accepted the stop."""
 
 
 class ControlState(ManageMessage, frozen=True):
-    """Holder of the lease, and state of STOP."""
+    """Holder of the lease, and state of the STOP latch."""
 
     holder: str
-    """Name of the page that drives; "" if no page drives."""
+    """Name of the operator in control; "" if no operator is in control."""
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     emulated: bool
-    """Whether the robot is emulated, or is a playback."""
+    """Whether the robot is emulated or a playback."""
 
 
 class PlaybackRequest(ManageMessage, frozen=True):
-    """Request to change the playback; omitted fields stay unchanged."""
+    """Request to change a playback; omitted fields stay unchanged."""
 
     position_s: float | None = None
     is_playing: bool | None = None
@@ -265,15 +264,15 @@ class AuditResult(ManageMessage, frozen=True):
     """Entries of the audit log, newest first."""
 
     entries: list[dict[str, Any]]
-    """The columns of each entry, with its number ``id``."""
+    """Columns of each entry, including its number ``id``."""
     fault: str
-    """Reason why the audit log is no longer written; "" if the log is written."""
+    """Reason why the audit log can no longer be written; "" if it can."""
     has_more: bool
-    """Whether older entries may exist; request them with the parameter ``before``."""
+    """Whether older entries may exist; use the parameter ``before`` to request them."""
 
 
 class ReloadResult(ManageMessage, frozen=True):
-    """Result of reloading the documents of a robot."""
+    """Result of reloading a robot's documents."""
 
     line: str
     url: str
@@ -281,10 +280,10 @@ class ReloadResult(ManageMessage, frozen=True):
 
 
 class SettingsAsked(ManageMessage, frozen=True):
-    """Settings of a robot, as submitted by the page."""
+    """A robot's settings, as submitted by the page."""
 
     settings: _Settings = {}
-    """Typed text of each setting, by name; None leaves a secret unchanged."""
+    """Entered text of each setting, by name; null leaves a secret unchanged."""
     version: _Short = ""
     interface: _Short = ""
     test: bool = True
@@ -292,7 +291,7 @@ class SettingsAsked(ManageMessage, frozen=True):
     anyway: bool = False
     """Whether to save the settings even if the connection test fails."""
     monitors_alarms: bool | None = None
-    """Whether the robot stays connected for its alarms; null for the choice of the server."""
+    """Whether the robot stays connected for its alarms; null for the server's default."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):
@@ -307,7 +306,7 @@ class ProbedTransport(ManageMessage, frozen=True):
     cause: str = ""
     """Name of the cause of a failure; "" if it is unknown."""
     field: str = ""
-    """Name of the setting that most likely caused the failure; "" if unknown."""
+    """Setting that most likely caused the failure; "" if unknown."""
 
 
 class SettingsAnswer(ManageMessage, frozen=True):
@@ -316,7 +315,7 @@ class SettingsAnswer(ManageMessage, frozen=True):
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """Error of each invalid setting, as one line of text, by name of the setting."""
+    """One-line error of each invalid setting, by setting name."""
     missing: tuple[str, ...] = ()
     """Titles of required settings without a value."""
     lines: tuple[ProbedTransport, ...] = ()

@@ -1,1 +1,1 @@
-"""Sign-in over HTTP: the ways in, and what people manage about themselves."""
+"""Sign-in over HTTP: the sign-in methods, and people's management of their own accounts."""

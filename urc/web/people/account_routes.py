@@ -1,6 +1,6 @@
-"""Routes of one's own account: passphrase, devices and sign-ins. Also the way in of guests.
+"""Routes of visitors' own accounts: passphrase, devices and sign-ins; and the entry of guests.
 
-Layer 5. A visitor changes only devices and sign-ins of the same person.
+Layer 5. Visitors can change only their own devices and sign-ins.
 """
 
 import asyncio
@@ -45,14 +45,14 @@ class AccountRoutes:
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            links: the maker of links.
+            links: the maker of pairing links.
         """
         self._sign_ins = sign_ins
         self._links = links
         self._control = sign_ins.control
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "guest": self.guest,
             "account": self.account,
@@ -64,7 +64,7 @@ class AccountRoutes:
 
     @answers_changes
     async def guest(self, request: Request) -> Response:
-        """Let a guest in by the secret of a link."""
+        """Admit a guest with the secret of a link."""
         said = await body_of(request, CodeRequest)
         self._sign_ins.check_wait(request)
         who = self._control.identify(said.code)
@@ -106,7 +106,7 @@ class AccountRoutes:
 
     @answers_changes
     async def passphrase(self, request: Request) -> Response:
-        """Change the own passphrase; all other sign-ins of the person end."""
+        """Change the visitor's own passphrase; all other sign-ins of the person end."""
         sign_ins = self._sign_ins
         said = await body_of(request, PassphraseRequest)
         who = visitor_of(request).identity
@@ -116,7 +116,7 @@ class AccountRoutes:
         sign_ins.check_wait(request, key)
         store = sign_ins.store
         async with sign_ins.hashing():
-            # Other attempts may have failed while this one waited for its turn.
+            # Other attempts may have failed while this attempt waited for its turn.
             sign_ins.check_wait(request, key)
             _, before = await asyncio.to_thread(store.passphrase_of, who.name)
             if before is None and not visitor_of(request).is_fresh:
@@ -137,7 +137,7 @@ class AccountRoutes:
 
     @answers_changes
     async def pair(self, request: Request) -> Response:
-        """Return a code that pairs a device of the visitor."""
+        """Return a code for pairing one of the visitor's devices."""
         who = visitor_of(request).identity
         if not _is_person(who):
             raise ApiError(409, t("Only a person pairs devices."))
@@ -150,7 +150,7 @@ class AccountRoutes:
 
     @answers_changes
     async def remove(self, request: Request) -> Response:
-        """Remove a device of the visitor."""
+        """Remove one of the visitor's devices."""
         said = await body_of(request, PrincipalChoice)
         who = visitor_of(request).identity
         device = self._control.directory.principals.get(said.id)
@@ -164,7 +164,7 @@ class AccountRoutes:
 
     @answers_changes
     async def end(self, request: Request) -> Response:
-        """End a sign-in of the visitor."""
+        """End one of the visitor's sign-ins."""
         said = await body_of(request, SignInChoice)
         if visitor_of(request).identity.kind == "guest":
             raise ApiError(409, t("Other guests may use the same link."))
@@ -177,7 +177,7 @@ class AccountRoutes:
         return answer(ResultLine(t("the sign-in has ended")))
 
     def _own(self, who: Identity) -> set[str]:
-        """Return the ids of a person and its devices; of a device or guest, only its own id."""
+        """Return the ids of a person and its devices; for other visitors, only their own id."""
         if not who.principal or not _is_person(who):
             return {who.principal}
         principals = self._control.directory.principals.values()
@@ -185,5 +185,5 @@ class AccountRoutes:
 
 
 def _is_person(who: Identity) -> bool:
-    """Return whether the visitor is a person of the store, and signed in as such."""
+    """Return whether the visitor is a stored person and signed in as that person."""
     return who.kind == "person" and who.way not in ("key", "token")

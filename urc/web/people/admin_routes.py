@@ -1,6 +1,7 @@
 """Routes of administrators: people, devices, tokens, guests and sign-ins.
 
-Layer 5. Each change is one transaction of the store, acts at once, and is in the audit log.
+Layer 5. Each change is one transaction of the store, takes effect immediately, and is recorded in
+the audit log.
 """
 
 import asyncio
@@ -65,8 +66,8 @@ class AdminRoutes:
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the codes that administrators wait for.
-            links: the maker of links.
+            pairings: the pending pairings of administrators.
+            links: the maker of pairing, invitation and guest links.
         """
         self._sign_ins = sign_ins
         self._pairings = pairings
@@ -74,7 +75,7 @@ class AdminRoutes:
         self._control = sign_ins.control
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "people": self.listed,
             "devices": self.listed,
@@ -114,7 +115,7 @@ class AdminRoutes:
 
     @answers_changes
     async def pairing(self, request: Request) -> Response:
-        """Return the state of a pairing; its identifier is random, and only its maker has it."""
+        """Return the state of a pairing; only its maker has the random identifier."""
         state = self._pairings.state(request.path_params["id"], self._control.now())
         return answer(state)
 
@@ -132,7 +133,7 @@ class AdminRoutes:
 
     @answers_changes
     async def invite(self, request: Request) -> Response:
-        """Return a link with which a person chooses a passphrase."""
+        """Return a link for choosing a passphrase."""
         person = self._chosen(await body_of(request, PrincipalChoice), "person")
         now = self._control.now()
         ends_at = now + INVITATION_S
@@ -146,7 +147,7 @@ class AdminRoutes:
 
     @answers_changes
     async def rename(self, request: Request) -> Response:
-        """Give a person, device, program or guest another name."""
+        """Rename a person, device, program or guest."""
         said = await body_of(request, RenameRequest)
         one = self._chosen(PrincipalChoice(said.id))
         await asyncio.to_thread(self._sign_ins.store.rename, one.id, said.name)
@@ -156,7 +157,7 @@ class AdminRoutes:
 
     @answers_changes
     async def roles(self, request: Request) -> Response:
-        """Replace the rights of a person, device or program."""
+        """Replace all grants of a person, device or program."""
         said = await body_of(request, RolesRequest)
         one = self._chosen(PrincipalChoice(said.id))
         if one.owner:
@@ -180,7 +181,7 @@ class AdminRoutes:
 
     @answers_changes
     async def revoke(self, request: Request) -> Response:
-        """End all sign-ins of a person, device, program or guest, and those of its devices."""
+        """End all sign-ins of a person, device, program or guest, and of its devices."""
         one = self._chosen(await body_of(request, PrincipalChoice))
         store = self._sign_ins.store
         ended = await asyncio.to_thread(
@@ -196,7 +197,7 @@ class AdminRoutes:
 
     @answers_changes
     async def pair(self, request: Request) -> Response:
-        """Return a code that pairs one device."""
+        """Return a code for pairing one device."""
         said = await body_of(request, PairingRequest)
         grants = _grants(said.roles)
         owner = self._chosen(PrincipalChoice(said.owner), "person") if said.owner else None
@@ -213,7 +214,7 @@ class AdminRoutes:
 
     @answers_changes
     async def token(self, request: Request) -> Response:
-        """Add a program, and return its token, which is never shown again."""
+        """Add a program, and return its token, which is shown only once."""
         said = await body_of(request, TokenRequest)
         store, now = self._sign_ins.store, self._control.now()
         ends_at = None if said.days is None else now + said.days * _DAY_S
@@ -228,7 +229,7 @@ class AdminRoutes:
 
     @answers_changes
     async def guest(self, request: Request) -> Response:
-        """Return a link with which guests watch one robot."""
+        """Return a guest link to one robot."""
         said = await body_of(request, GuestRequest)
         store, now = self._sign_ins.store, self._control.now()
         ends_at = now + said.hours * 3600
@@ -243,7 +244,7 @@ class AdminRoutes:
 
     @answers_changes
     async def end(self, request: Request) -> Response:
-        """End one sign-in; a device must then be paired again."""
+        """End one sign-in; a device must be paired again afterwards."""
         said = await body_of(request, SignInChoice)
         found = self._control.directory.sign_ins.get(said.id)
         if found is None:
@@ -264,7 +265,7 @@ class AdminRoutes:
         return one
 
     async def _changed(self, request: Request, command: str, **about: object) -> None:
-        """Apply a change at once, and record it."""
+        """Apply a change immediately, and record it."""
         actor = actor_of(request)  # before the change, which may concern the administrator
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, command, **about)

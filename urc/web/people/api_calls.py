@@ -1,4 +1,4 @@
-"""The calls of people, devices, tokens and sign-ins, for the table of all calls.
+"""The API calls for people, devices, tokens and sign-ins, for the table of all calls.
 
 Layer 5. Pure.
 """
@@ -28,7 +28,7 @@ class PeopleCall(NamedTuple):
     summary: str
     answer: type
     body: type | None = None
-    """Type of the request body; None for a GET request, or for a POST request without a body."""
+    """Type of the request body; None for a request without a body."""
     is_post: bool = True
 
     @property

@@ -1,7 +1,6 @@
-"""The end of every way to sign in with a browser: limits, audit entries, and the sign-in itself.
+"""The common part of all browser sign-in methods: limits, audit entries, and the sign-in itself.
 
-Layer 5. Failed attempts of an address, or for a name, make the next attempts wait. STOP is never
-affected.
+Layer 5. Failed attempts from an address or for a name delay later attempts. STOP is never delayed.
 """
 
 import asyncio
@@ -37,14 +36,14 @@ __all__ = [
 ]
 
 answers_changes: Final = answers_errors_with(422)
-"""Decorator of a handler that changes people, devices or sign-ins."""
+"""Decorator for handlers that change people, devices or sign-ins."""
 answers_refusals: Final = answers_errors_with(403)
-"""Decorator of a handler that lets a visitor in, or refuses."""
+"""Decorator for handlers that admit or refuse a visitor."""
 
 HASHES: Final = 2
-"""Most passphrases that are hashed at the same time; each one takes 64 MiB."""
+"""Limit on concurrent passphrase hashes, each of which needs 64 MiB."""
 MOST_WAITING: Final = 32
-"""Most attempts that wait for a hash."""
+"""Limit on attempts that wait for a hash."""
 _LONGEST_AGENT: Final = 200
 
 
@@ -63,8 +62,8 @@ class BrowserSignIns:
         Args:
             access: identities and rights.
             recorder: recorder of sign-ins in the audit log.
-            throttle: failed attempts of all ways to sign in; None for separate ones.
-            clock: source of monotonic time in seconds.
+            throttle: failed attempts of all sign-in methods; None to create a separate count.
+            clock: function that returns the monotonic time, in seconds.
         """
         self.access = access
         self.recorder = recorder
@@ -80,18 +79,18 @@ class BrowserSignIns:
 
     @property
     def store(self) -> AccessStore:
-        """The store of people; raise `ApiError` for a server without one."""
+        """The store of people; raise `ApiError` for a server without a store."""
         store = self.control.store
         if store is None:
             raise ApiError(404, t("This server keeps no people."))
         return store
 
     def check_wait(self, request: Request, *names: str) -> None:
-        """Raise `ApiError` 429 while attempts of the request's address, or for a name, must wait.
+        """Raise `ApiError` 429 while attempts from the request's address or for a name are delayed.
 
         Args:
             request: the attempt.
-            names: further keys of the attempt, such as the name of the person.
+            names: further keys for counting the attempt, such as the person's name.
         """
         wait_s = self._throttle.wait_s(self._clock(), place_of(address_of(request)), *names)
         if wait_s > 0:
@@ -105,10 +104,10 @@ class BrowserSignIns:
 
         Args:
             request: the attempt.
-            way: the way to sign in.
+            way: the sign-in method.
             error: the reason.
             names: further keys of the attempt, as for `check_wait`.
-            person: id of the person that was tried; "" for an unknown one.
+            person: id of the person in the attempt; "" for an unknown person.
         """
         place = address_of(request)
         self._throttle.failed(self._clock(), place_of(place), *names)
@@ -122,8 +121,8 @@ class BrowserSignIns:
 
     @asynccontextmanager
     async def hashing(self) -> AsyncIterator[None]:
-        """Wait for one of the few places to hash a passphrase; raise `ApiError` 503 if all wait."""
-        # Each attempt delays all later ones, so a crowd is refused at once.
+        """Wait for a turn to hash a passphrase; raise `ApiError` 503 if too many wait."""
+        # Each attempt delays all later attempts, so a crowd is refused immediately.
         if self._waiting >= MOST_WAITING:
             raise ApiError(503, t("Too many people sign in at this moment: try again."))
         self._waiting += 1
@@ -142,14 +141,14 @@ class BrowserSignIns:
         *,
         ends_at: float | None = None,
     ) -> Identity:
-        """Sign a person in: open a sign-in, and store it in the browser.
+        """Open a sign-in for a person, and store it in the browser.
 
         Args:
-            request: the request that has proven the person.
-            response: response that gets the cookie.
+            request: the request that proved the person's identity.
+            response: response to which the cookie is added.
             person: the person.
-            way: the way to sign in.
-            ends_at: UTC time of the end, in seconds since 1970; None for the usual one.
+            way: the sign-in method.
+            ends_at: UTC end time, in seconds since 1970; None for the usual end.
 
         Raises:
             AccessError: the person was removed, or has no role.
@@ -164,7 +163,7 @@ class BrowserSignIns:
             ends_at=min(ends, default=None), idle_s=PERSON.idle_s,
             place=address_of(request), agent=agent_of(request),
         )  # fmt: skip
-        # After the new sign-in: if opening it fails, the browser keeps the one that it has.
+        # The previous sign-in ends last, so that the browser keeps it if opening the new one fails.
         await self._end_previous(request)
         return self.admit(request, response, secret)
 
@@ -175,9 +174,9 @@ class BrowserSignIns:
 
         Args:
             request: the request.
-            response: response that gets the cookie.
-            secret: the secret of the sign-in, which the directory has already.
-            is_device: whether it is the key of a paired device, which stays after a sign-out.
+            response: response to which the cookie is added.
+            secret: the secret of the sign-in; the directory already contains the sign-in.
+            is_device: whether the secret is a paired device's key, which remains after a sign-out.
         """
         who = self.control.identify(secret)
         is_secure = request.url.scheme == "https"
@@ -195,10 +194,10 @@ class BrowserSignIns:
         self.recorder.signed_in(actor, agent)
 
     async def _end_previous(self, request: Request) -> None:
-        """End the sign-in of a person that this browser had before, and read the new one."""
+        """End the browser's previous sign-in of a person, and load the new sign-in."""
         before = visitor_of(request).identity
         if before.kind == "person" and before.way != "token":
-            # It may have ended meanwhile, in another way.
+            # The previous sign-in may already have ended.
             with suppress(AccessError):
                 await self.control.end_sign_in(before.sign_in)
                 return
@@ -206,10 +205,10 @@ class BrowserSignIns:
 
 
 def address_of(request: Request) -> str:
-    """Return the network address of a request, "" if it is unknown."""
+    """Return the network address of a request; "" if unknown."""
     return request.client.host if request.client else ""
 
 
 def agent_of(request: Request) -> str:
-    """Return browser and system of a request in words, such as “Chrome on Android”."""
+    """Return a request's browser and operating system in words, such as “Chrome on Android”."""
     return browser_name(request.headers.get("user-agent", "")[:_LONGEST_AGENT])

@@ -1,7 +1,7 @@
-"""The maker of links for other devices: codes of pairings and invitations, and guest links.
+"""A maker of links for other devices: pairing codes, invitations and guest links.
 
-Layer 5. Its methods block: they read files. The code of a link is in the fragment, which browsers
-never send to a server.
+Layer 5. The methods block, because they read files. A link contains its code in the fragment, which
+browsers never send to a server.
 """
 
 import ipaddress
@@ -28,42 +28,42 @@ _SCALE: Final = 8
 
 
 class LinkMaker:
-    """The links of one server."""
+    """A maker of links to one server."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, data: Path | None) -> None:
         """Prepare.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the codes that administrators wait for.
-            data: the data folder; None without one.
+            pairings: the pending pairings of administrators.
+            data: the data folder; None without a data folder.
         """
         self._sign_ins = sign_ins
         self._pairings = pairings
         self._data = data
 
     def link(self, request: Request, page: str, secret: str, ends_at: float) -> SecretLink:
-        """Return the link of a secret.
+        """Return the link with a secret.
 
         Args:
             request: the administrator's request.
-            page: page of the link, such as ``join``.
-            secret: the secret, which is only in the fragment.
-            ends_at: UTC time of the end, in seconds since 1970.
+            page: page that the link opens, such as ``join``.
+            secret: the secret, which only the fragment contains.
+            ends_at: UTC end time, in seconds since 1970.
         """
         address = _public_address(request, self._data, self._sign_ins.access.instance)
         text = f"{address}/{page}#{secret}"
         return SecretLink(text, _qr_image(text), ends_at, _is_reachable(address))
 
     def pairing(self, request: Request, invitation: Invitation) -> PairingCode:
-        """Return a new code that pairs one device within two minutes.
+        """Return a new code for pairing one device within two minutes.
 
         Args:
             request: the administrator's request.
             invitation: name, owner and rights of the device.
 
         Raises:
-            AccessError: too many codes are valid.
+            AccessError: too many codes are currently valid.
         """
         now = self._sign_ins.control.now()
         ends_at = now + PAIRING_S
@@ -81,15 +81,15 @@ class LinkMaker:
 
 
 def _public_address(request: Request, data: Path | None, instance: str) -> str:
-    """Return the address of this server for other devices, without a slash at its end.
+    """Return this server's address for other devices, without a trailing slash.
 
-    An administrator on another device uses such an address already. On the server's own computer,
-    the address is the one that the server has announced. The call reads files.
+    A request from another device already uses such an address. For a request from the server's own
+    computer, the function returns the address announced by the server. The function reads files.
 
     Args:
-        request: the administrator's request, with a host that the page policy has checked.
-        data: data folder with the addresses of running servers; None without one.
-        instance: identifier of this server among them.
+        request: the administrator's request; the page policy has checked its host.
+        data: data folder with the addresses of running servers; None without a data folder.
+        instance: identifier of this server among the running servers.
     """
     own = f"{request.url.scheme}://{request.headers['host']}"
     if _is_reachable(own) or data is None:
@@ -99,7 +99,7 @@ def _public_address(request: Request, data: Path | None, instance: str) -> str:
 
 
 def _is_reachable(address: str) -> bool:
-    """Return whether an address is valid on other devices, too."""
+    """Return whether other devices can use an address."""
     host = urlsplit(address).hostname or ""
     if host == "localhost" or host.endswith(".localhost"):
         return False
@@ -110,7 +110,7 @@ def _is_reachable(address: str) -> bool:
 
 
 def _qr_image(text: str) -> str:
-    """Return a QR code as the ``data:`` address of an SVG image: dark on white in every theme."""
+    """Return a QR code as the ``data:`` URL of an SVG image, dark on white in every theme."""
     code = segno.make(text, error="m", micro=False)
     return code.svg_data_uri(
         border=_QUIET, scale=_SCALE, dark="#000", light="#fff", svgclass=None, lineclass=None
@@ -118,7 +118,7 @@ def _qr_image(text: str) -> str:
 
 
 def _authority_fingerprint(data: Path | None) -> str:
-    """Return the fingerprint of the local certificate authority, or "" without one."""
+    """Return the local certificate authority's fingerprint; "" without an authority."""
     if data is None:
         return ""
     try:

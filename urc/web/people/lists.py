@@ -37,13 +37,13 @@ def principal_info(one: PrincipalStatus) -> PrincipalInfo:
 def sign_in_list(
     directory: Directory, now: float, own: str, is_chosen: Callable[[SignIn], bool]
 ) -> tuple[SignInInfo, ...]:
-    """Return the open sign-ins for which `is_chosen` returns true, the most recently used first.
+    """Return the open sign-ins selected by `is_chosen`, most recently used first.
 
     Args:
         directory: the directory.
         now: UTC time in seconds since 1970.
-        own: id of the sign-in of the request.
-        is_chosen: function that chooses sign-ins.
+        own: id of the request's own sign-in.
+        is_chosen: function that returns whether to include a sign-in.
     """
     return tuple(_infos(directory, now, own, filter(is_chosen, directory.sign_ins.values())))
 

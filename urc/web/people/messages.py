@@ -48,38 +48,38 @@ class PeopleMessage(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_
 
 
 class SignInRequest(PeopleMessage, frozen=True):
-    """Request to sign a person in."""
+    """Request to sign in a person."""
 
     name: _Short
     passphrase: _Passphrase
 
 
 class SignInResult(PeopleMessage, frozen=True):
-    """The identity of a browser after a sign-in, or after a sign-out."""
+    """A browser's identity after a sign-in or a sign-out."""
 
     name: str
     """Name of the person or device; "" after a sign-out."""
 
 
 class CodeRequest(PeopleMessage, frozen=True):
-    """Question about a code of a pairing or an invitation; the code stays valid."""
+    """Request for information about a pairing code or invitation; the code stays valid."""
 
     code: _Short
 
 
 class CodeInfo(PeopleMessage, frozen=True):
-    """The right that a code gives."""
+    """The right granted by a code."""
 
     kind: str
     """``device`` or ``person``."""
     name: str
-    """Name of the device or person; "" lets the device choose its name."""
+    """Name of the device or person; "" if the device chooses its name."""
     suggested: str
-    """Free name for a device, such as “Chrome on Android”."""
+    """Unused name for the device, such as “Chrome on Android”."""
     owner: str
-    """Name of the person whose device pairs; "" without one."""
+    """Name of the device's owner; "" without an owner."""
     roles: tuple[str, ...]
-    """Rights, such as ``drive@cart``."""
+    """Grants, such as ``drive@cart``."""
     ends_at: float
 
 
@@ -102,39 +102,39 @@ class PairResult(PeopleMessage, frozen=True):
 
     name: str
     check: str
-    """Digits to compare by eye with the other screen."""
+    """Check number, to compare with the number on the other screen."""
     robots: tuple[RobotLink, ...]
 
 
 class JoinRequest(PeopleMessage, frozen=True):
-    """Request of an invited person to set a passphrase."""
+    """Request by an invited person to set a passphrase."""
 
     code: _Short
     passphrase: _Passphrase
 
 
 class PairingRequest(PeopleMessage, frozen=True):
-    """Request for a code that pairs one device."""
+    """Request for a code to pair one device."""
 
     name: _Short = ""
-    """Name of the device; "" lets the device choose."""
+    """Name of the device; "" if the device chooses its name."""
     owner: _Short = ""
-    """Id of the person whose device pairs; "" for a device with roles of its own."""
+    """Id of the device's owner; "" for a device with its own roles."""
     roles: _Roles = ()
 
 
 class PairingCode(PeopleMessage, frozen=True):
-    """A code that pairs one device."""
+    """A code for pairing one device."""
 
     id: str
-    """Identifier of the pairing; no secret."""
+    """Identifier of the pairing, which is not secret."""
     link: str
-    """Address with the code in its fragment."""
+    """Link with the code in its fragment."""
     qr: str
-    """The link as a QR code: a ``data:`` address of an image."""
+    """QR code of the link, as the ``data:`` URL of an image."""
     code: str
     fingerprint: str
-    """Fingerprint of the local certificate authority; "" without one."""
+    """Fingerprint of the local certificate authority; "" without an authority."""
     is_reachable: bool
     """Whether other devices can open the link."""
     lasts_s: float
@@ -150,7 +150,7 @@ class PairingState(PeopleMessage, frozen=True):
     device: str = ""
     """Id of the paired device."""
     check: str = ""
-    """Digits to compare by eye with the new device."""
+    """Check number, to compare with the number on the new device."""
 
 
 class PrincipalInfo(PeopleMessage, frozen=True):
@@ -160,10 +160,10 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     kind: str
     name: str
     owner: str
-    """Name of the person whose device this is, or ""."""
+    """Name of the device's owner; "" without an owner."""
     roles: tuple[str, ...]
     commands: tuple[str, ...]
-    """Commands that a program may give; empty: all of its role."""
+    """Commands that the program may send; empty permits all commands of its role."""
     has_passphrase: bool
     passkeys: int
     accounts: int
@@ -182,7 +182,7 @@ class PrincipalList(PeopleMessage, frozen=True):
 
 
 class SignInInfo(PeopleMessage, frozen=True):
-    """The sign-in of one browser, the key of a device, or a token."""
+    """A browser's sign-in, a device's key, or a token."""
 
     id: str
     principal: str
@@ -190,19 +190,19 @@ class SignInInfo(PeopleMessage, frozen=True):
     kind: str
     way: str
     agent: str
-    """Browser and system in words."""
+    """Browser and operating system in words."""
     place: str
     """Network address at the sign-in."""
     created_at: float
     used_at: float
     ends_at: float | None
-    """Time of the end without further use."""
+    """Time at which the sign-in ends if it is not used again."""
     is_own: bool
-    """Whether the request itself uses this sign-in."""
+    """Whether the current request uses this sign-in."""
 
 
 class SignInList(PeopleMessage, frozen=True):
-    """Sign-ins, the most recently used first."""
+    """Sign-ins, most recently used first."""
 
     entries: tuple[SignInInfo, ...]
 
@@ -221,18 +221,18 @@ class PrincipalChoice(PeopleMessage, frozen=True):
 
 
 class RenameRequest(PeopleMessage, frozen=True):
-    """A person, device, program or guest, and its new name."""
+    """Request to rename a person, device, program or guest."""
 
     id: _Short
     name: _Short
 
 
 class RolesRequest(PeopleMessage, frozen=True):
-    """A person, device, program or guest, and its new rights."""
+    """Request to replace the rights of a person, device, program or guest."""
 
     id: _Short
     roles: _Roles
-    """All rights from now on, such as ``drive@#lab``; empty: none."""
+    """All new grants, such as ``drive@#lab``; empty removes all rights."""
 
 
 class TokenRequest(PeopleMessage, frozen=True):
@@ -241,13 +241,13 @@ class TokenRequest(PeopleMessage, frozen=True):
     name: _Short
     roles: _Roles
     commands: _Roles = ()
-    """Commands that the program may give; empty: all of its role."""
+    """Commands that the program may send; empty permits all commands of its role."""
     days: Annotated[float, msgspec.Meta(gt=0, le=3650)] | None = 90
-    """Validity in days; null: no end."""
+    """Validity in days; null for unlimited validity."""
 
 
 class NewToken(PeopleMessage, frozen=True):
-    """A new token, which is shown once."""
+    """A new token, which is shown only once."""
 
     name: str
     token: str
@@ -255,7 +255,7 @@ class NewToken(PeopleMessage, frozen=True):
 
 
 class GuestRequest(PeopleMessage, frozen=True):
-    """Request for a link that lets guests watch one robot."""
+    """Request for a guest link to one robot."""
 
     name: _Short
     robot: _Short
@@ -267,7 +267,7 @@ class SecretLink(PeopleMessage, frozen=True):
 
     link: str
     qr: str
-    """The link as a QR code: a ``data:`` address of an image."""
+    """QR code of the link, as the ``data:`` URL of an image."""
     ends_at: float
     is_reachable: bool
     """Whether other devices can open the link."""
@@ -280,29 +280,29 @@ class SignInChoice(PeopleMessage, frozen=True):
 
 
 class GuestResult(PeopleMessage, frozen=True):
-    """The page of a guest."""
+    """The page that a guest may open."""
 
     url: str
 
 
 class AccountInfo(PeopleMessage, frozen=True):
-    """The own account of a signed-in person, device or guest."""
+    """A signed-in visitor's own account."""
 
     name: str
     kind: str
     roles: tuple[str, ...]
     has_passphrase: bool
     is_local: bool
-    """Whether the browser holds the start key."""
+    """Whether the visitor is the local user."""
     may_pair: bool
-    """Whether a device of this person can be paired."""
+    """Whether this person can pair devices."""
     devices: tuple[PrincipalInfo, ...]
     sign_ins: tuple[SignInInfo, ...]
 
 
 class PassphraseRequest(PeopleMessage, frozen=True):
-    """Request to change the own passphrase."""
+    """Request to change one's own passphrase."""
 
     current: _Passphrase
-    """Present passphrase; "" if none is set."""
+    """Current passphrase; "" if no passphrase is set."""
     passphrase: _Passphrase

@@ -1,8 +1,8 @@
-"""Routes of the sign-in with an identity provider: the way to its page, and the way back.
+"""Routes for signing in with an identity provider: to the provider's page and back.
 
-Layer 5. A sign-in begins with a POST request of our own page. The provider sends the browser back
-to `CALLBACK`. The browser sends strict cookies only if a page of ours leads it further, so the
-response there is a page and no redirect.
+Layer 5. A sign-in begins with a POST request from one of URC's pages. The provider redirects the
+browser to `CALLBACK`. The response there is a page, because browsers send strict cookies only after
+navigation from one of URC's pages.
 """
 
 import asyncio
@@ -24,31 +24,31 @@ from urc.web.show.pages import PageHead, render
 __all__ = ["CALLBACK", "OidcRoutes", "ProviderPage"]
 
 CALLBACK: Final = "/sign-in/oidc/callback"
-"""Path of the redirect address, which the provider must allow."""
+"""Path of the redirect URL, which must be registered at the provider."""
 _COOKIE: Final = "urc-provider-"
 _NO_STORE: Final = {"cache-control": "no-store"}
 
 
 @dataclass(frozen=True, slots=True)
 class ProviderPage:
-    """Context of ``provider.html.j2``: the end of a sign-in at the provider."""
+    """Context of ``provider.html.j2``: the result of a sign-in with the provider."""
 
     head: PageHead
     fault: str
-    """Reason why the sign-in failed, or ""."""
+    """Reason for a failed sign-in; "" after success."""
     title: str
-    """Name of the provider for people."""
+    """Displayed name of the provider."""
 
 
 class OidcRoutes:
-    """The routes; without a provider, both refuse."""
+    """The routes of the provider sign-in; without a provider, both refuse."""
 
     def __init__(self, sign_ins: BrowserSignIns, provider: OidcSignIn | None) -> None:
         """Prepare.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            provider: the sign-ins at the provider; None for a server without one.
+            provider: the sign-ins with the provider; None for a server without a provider.
         """
         self._sign_ins = sign_ins
         self._known = provider
@@ -68,9 +68,9 @@ class OidcRoutes:
 
     @answers_refusals
     async def begin(self, request: Request) -> Response:
-        """Return the address of the provider's page."""
+        """Begin a sign-in; return the address of the provider's page."""
         self._sign_ins.check_wait(request)
-        # The address of the request is allowed by the page policy; the provider checks it again.
+        # The page policy has accepted the request's address, and the provider checks it again.
         address = self._provider.options.address or _origin(request)
         try:
             begun = await self._provider.begin(address + CALLBACK, address_of(request))
@@ -81,7 +81,7 @@ class OidcRoutes:
         return done
 
     async def finish(self, request: Request) -> Response:
-        """Sign the person in who comes back from the provider."""
+        """Sign in a person whom the provider has redirected here."""
         fault, status = "", 200
         page = HTMLResponse(headers=_NO_STORE)
         try:
@@ -107,7 +107,7 @@ class OidcRoutes:
         try:
             person = await asyncio.to_thread(admit_account, self._sign_ins.store, account, now)
         finally:
-            # Even a refusal may have ended roles.
+            # Roles may have ended even after a refusal.
             await self._sign_ins.control.reload()
         await self._sign_ins.open(request, response, person, "oidc", ends_at=account.ends_at)
 
@@ -123,7 +123,7 @@ class OidcRoutes:
     def _kept(self, request: Request, binding: str, lasts_s: int) -> str:
         """Return the cookie that binds a sign-in to the browser.
 
-        It is not strict: the provider leads the browser back from another site.
+        The cookie is not strict, because the browser returns from the provider's site.
         """
         secure = "; Secure" if request.url.scheme == "https" else ""
         return (

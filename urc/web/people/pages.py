@@ -1,7 +1,7 @@
-"""The pages about people and devices: for administrators, for one's own account, and for codes.
+"""The pages for people and devices: administration, the visitor's own account, and codes.
 
-Layer 5. The modules of the pages fetch all data; the pages themselves contain none of it. The page
-of a code is equal for all visitors; its module reads the code from the fragment.
+Layer 5. The pages' modules fetch all data; the HTML contains no data. Pages for codes are identical
+for all visitors; their modules read the code from the fragment.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,7 +32,7 @@ class GrantScope(NamedTuple):
     """A choice of robots for a role."""
 
     value: str
-    """End of a grant: "", ``@cart`` or ``@#lab``."""
+    """Suffix of a grant: "", ``@cart`` or ``@#lab``."""
     title: str
 
 
@@ -44,7 +44,7 @@ class PeoplePage:
     nav: Nav
     scopes: tuple[GrantScope, ...]
     robots: tuple[GrantScope, ...]
-    """The robots alone; the value is the name in URLs."""
+    """Choices of single robots; the value is the robot's name in URLs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class OneTimeCodePage:
 
 
 class PeoplePages:
-    """The routes of the pages."""
+    """The routes of the administration and account pages."""
 
     def __init__(
         self,
@@ -75,8 +75,8 @@ class PeoplePages:
 
         Args:
             ways: navigation links of this server.
-            robots: function that returns the titles of all robots, by name in URLs.
-            tags_of: function that returns the tags of a robot.
+            robots: function that returns the titles of all robots, keyed by their names in URLs.
+            tags_of: function that returns a robot's tags.
         """
         self._ways = ways
         self._robots = robots
@@ -107,21 +107,21 @@ class PeoplePages:
         return HTMLResponse(render("people.html.j2", page), headers=_NO_STORE)
 
     async def account(self, request: Request) -> Response:
-        """Show the page of the visitor's own account."""
+        """Show the visitor's own account page."""
         head = PageHead(request.state.nonce, t("Your account"))
         html = render("account.html.j2", AccountPage(head, Nav("account", self._ways)))
         return HTMLResponse(html, headers=_NO_STORE)
 
 
 class CodePages:
-    """The routes of the pages for links with a code: a new device, an invited person, a guest."""
+    """The routes of pages for links with a code, for new devices, invited people and guests."""
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes."""
         return [ProtectedRoute(path, self.page, ANYONE) for path in ("/pair", "/join", "/guest")]
 
     async def page(self, request: Request) -> Response:
-        """Show one of the pages."""
+        """Show the pairing, invitation or guest page."""
         name = request.url.path.strip("/")
         title = {
             "pair": t("Pair this device"),

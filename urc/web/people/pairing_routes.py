@@ -1,7 +1,7 @@
-"""Routes of codes that work once: a device pairs, or an invited person chooses a passphrase.
+"""Routes for single-use codes, which pair a device or let an invited person choose a passphrase.
 
-Layer 5. The code is in the fragment of the page's address, so no log of a server contains it. The
-page sends the code in a body. A code has 128 random bits, and attempts are limited all the same.
+Layer 5. The fragment of the page's address contains the code, so server logs never contain it. The
+page sends the code in a request body. A code has 128 random bits, and attempts are limited as well.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ from urc.web.words import t
 __all__ = ["PairingRoutes"]
 
 MOST_LINKS: Final = 8
-"""Most robots that the page of a new device lists; with more, it links to the menu."""
+"""Limit on listed robots on a new device's page; above the limit, the page links to the menu."""
 
 
 class PairingRoutes:
@@ -52,15 +52,15 @@ class PairingRoutes:
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the codes that administrators wait for.
-            robots: function that returns the titles of all robots, by name in URLs.
+            pairings: the pending pairings of administrators.
+            robots: function that returns the titles of all robots, keyed by their names in URLs.
         """
         self._sign_ins = sign_ins
         self._pairings = pairings
         self._robots = robots
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "codes": self.look,
             "pair": self.pair,
@@ -69,7 +69,7 @@ class PairingRoutes:
 
     @answers_refusals
     async def look(self, request: Request) -> Response:
-        """Return the right that a code gives; the code stays valid."""
+        """Return the right granted by a code; the code stays valid."""
         said = await body_of(request, CodeRequest)
         found = await self._invitation(request, said.code)
         directory = self._sign_ins.control.directory
@@ -89,7 +89,7 @@ class PairingRoutes:
 
     @answers_refusals
     async def pair(self, request: Request) -> Response:
-        """Make this browser a device with a key of its own."""
+        """Make this browser a device with its own key."""
         sign_ins = self._sign_ins
         said = await body_of(request, PairRequest)
         found = await self._invitation(request, said.code)
@@ -114,7 +114,7 @@ class PairingRoutes:
 
     @answers_refusals
     async def join(self, request: Request) -> Response:
-        """Set the passphrase of an invited person, who is signed in then."""
+        """Set the passphrase of an invited person, and sign the person in."""
         sign_ins = self._sign_ins
         said = await body_of(request, JoinRequest)
         found = await self._invitation(request, said.code)
@@ -152,7 +152,7 @@ class PairingRoutes:
         return found
 
     def _links(self, secret: str) -> tuple[RobotLink, ...]:
-        """Return the robots that the holder of a new sign-in may open; () for many robots."""
+        """Return the robots that a new sign-in permits; () if there are too many for a list."""
         access = self._sign_ins.access
         visitor = Visitor(access, access.control.identify(secret))
         found = [

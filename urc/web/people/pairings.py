@@ -1,6 +1,6 @@
-"""The pairings that administrators wait for: one for each code on a screen.
+"""Pending pairings of administrators, one for each displayed code.
 
-Layer 5. Pure. The codes themselves are in the store; only their digests are here.
+Layer 5. Pure. The store contains the codes. This module has only their digests.
 """
 
 import secrets
@@ -14,7 +14,7 @@ from urc.web.people.messages import PairingState
 __all__ = ["MOST_PAIRINGS", "Pairings"]
 
 MOST_PAIRINGS: Final = 256
-"""Most remembered pairings; the oldest one is forgotten for a new one."""
+"""Limit on remembered pairings; above the limit, the oldest pairing is dropped."""
 
 
 class _Pairing:
@@ -27,17 +27,17 @@ class _Pairing:
 
 
 class Pairings:
-    """The states of the newest pairings."""
+    """The newest pairings with their states."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[str, _Pairing] = OrderedDict()
 
     def add(self, code: str, ends_at: float) -> str:
-        """Wait for a device with `code`, and return the identifier of the pairing.
+        """Add a pairing for the device with `code`, and return the pairing's identifier.
 
         Args:
             code: the code.
-            ends_at: UTC time at which the code ends, in seconds since 1970.
+            ends_at: UTC time at which the code expires, in seconds since 1970.
         """
         name = secrets.token_hex(8)
         self._known[name] = _Pairing(digest_of(code), ends_at)
@@ -46,14 +46,14 @@ class Pairings:
         return name
 
     def paired(self, code: str, begun: NewSignIn) -> None:
-        """Note the device that used `code`."""
+        """Record the device that used `code`."""
         digest = digest_of(code)
         for one in self._known.values():
             if one.digest == digest:
                 one.begun = begun
 
     def state(self, name: str, now: float) -> PairingState:
-        """Return the state of a pairing; an unknown one is over."""
+        """Return the state of a pairing; an unknown pairing counts as over."""
         one = self._known.get(name)
         if one is not None and one.begun is not None:
             device = one.begun.principal

@@ -1,4 +1,4 @@
-"""Requests and responses of the pages for sign-in and for one's own passkeys.
+"""Requests and responses of the pages for sign-in and for visitors' own passkeys.
 
 Layer 5. Pure.
 """
@@ -18,22 +18,22 @@ __all__ = [
 
 
 class PasskeyAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The result of a ceremony in the browser."""
+    """The result of a WebAuthn ceremony in the browser."""
 
     response: dict[str, Any]
-    """The credential, in the JSON form of WebAuthn."""
+    """Credential in the JSON form of WebAuthn."""
     name: str = ""
     """Name of a new passkey."""
 
 
 class PasskeyChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A passkey to remove."""
+    """Request to remove a passkey."""
 
     id: str
 
 
 class PasskeyName(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A passkey, and its new name."""
+    """Request to rename a passkey."""
 
     id: str
     name: str
@@ -45,11 +45,11 @@ class PasskeyLine(msgspec.Struct, frozen=True):
     id: str
     name: str
     host: str
-    """Host name for which browsers offer it."""
+    """Host name at which browsers offer the passkey."""
     created_at: float
-    """UTC time in seconds since 1970."""
+    """UTC time at which the passkey was added, in seconds since 1970."""
     used_at: float | None
-    """UTC time of the last sign-in; null before the first."""
+    """UTC time of the last sign-in, in seconds since 1970; null before the first."""
 
 
 class PasskeyList(msgspec.Struct, frozen=True):
@@ -59,6 +59,6 @@ class PasskeyList(msgspec.Struct, frozen=True):
 
 
 class ProviderAddress(msgspec.Struct, frozen=True):
-    """The page of the identity provider to which the browser goes."""
+    """The identity provider's page, which the browser opens next."""
 
     url: str

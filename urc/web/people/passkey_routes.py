@@ -1,7 +1,7 @@
-"""Routes of passkeys: sign-in with one, and adding, naming and removing one's own.
+"""Routes for signing in with a passkey, and for adding, renaming and removing one's own passkeys.
 
-Layer 5. Only people have passkeys. A passkey needs a fresh sign-in, so a passer-by at a
-shared tablet cannot add one to the operator.
+Layer 5. Only people have passkeys. Adding a passkey requires a recent sign-in, so a passer-by
+cannot add one for the operator of a shared tablet.
 """
 
 import asyncio
@@ -63,7 +63,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def sign_in_options(self, request: Request) -> Response:
-        """Return the options of a sign-in."""
+        """Return the WebAuthn options of a sign-in."""
         self._sign_ins.check_wait(request)
         found = await asyncio.to_thread(
             self._passkeys.authentication, _party(request), address_of(request)
@@ -72,7 +72,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def sign_in(self, request: Request) -> Response:
-        """Sign in the owner of a passkey."""
+        """Sign in the passkey's owner."""
         self._sign_ins.check_wait(request)
         said = await body_of(request, PasskeyAnswer)
         party = _party(request)
@@ -99,13 +99,13 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def listed(self, request: Request) -> Response:
-        """List the passkeys of the person."""
+        """Return the person's passkeys."""
         passkeys = await asyncio.to_thread(self._passkeys.table.of, _person(request).id)
         return answer(PasskeyList([_line(each) for each in passkeys]))
 
     @answers_refusals
     async def options(self, request: Request) -> Response:
-        """Return the options of a new passkey."""
+        """Return the WebAuthn options of a new passkey."""
         found = await asyncio.to_thread(
             self._passkeys.registration, _person(request), _party(request), address_of(request)
         )
@@ -113,7 +113,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def add(self, request: Request) -> Response:
-        """Add a passkey to the person."""
+        """Add a passkey for the person."""
         said = await body_of(request, PasskeyAnswer)
         passkey = await asyncio.to_thread(
             self._passkeys.register, _person(request), _party(request), said.response, said.name,
@@ -124,7 +124,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def rename(self, request: Request) -> Response:
-        """Give a passkey of the person another name."""
+        """Rename one of the person's passkeys."""
         said = await body_of(request, PasskeyName)
         table, owner = self._passkeys.table, _person(request).id
         await asyncio.to_thread(table.rename, owner, said.id, said.name)
@@ -133,7 +133,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def remove(self, request: Request) -> Response:
-        """Remove a passkey of the person."""
+        """Remove one of the person's passkeys."""
         said = await body_of(request, PasskeyChoice)
         table, owner = self._passkeys.table, _person(request).id
         names = {one.id: one.name for one in await asyncio.to_thread(table.of, owner)}
@@ -152,7 +152,7 @@ class PasskeyRoutes:
 
 
 def _person(request: Request) -> Principal:
-    """Return the signed-in person; raise `ApiError` for any other visitor."""
+    """Return the signed-in person; raise `ApiError` for other visitors."""
     visitor = visitor_of(request)
     who = visitor.identity
     if who.kind != "person" or visitor.is_local or visitor.is_program:

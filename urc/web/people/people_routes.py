@@ -1,4 +1,4 @@
-"""All routes of people, devices, tokens and sign-ins of one server.
+"""All routes for people, devices, tokens and sign-ins of one server.
 
 Layer 5. Only wires.
 """
@@ -38,12 +38,12 @@ class PeopleRoutes:
         """Prepare.
 
         Args:
-            ways_in: the ways to sign in.
-            stoppable: function that returns all robots that STOP can stop.
-            robots: function that returns the titles of all robots, by name in URLs.
-            tags_of: function that returns the tags of a robot.
+            ways_in: the sign-in methods.
+            stoppable: function that returns all robots with motion.
+            robots: function that returns the titles of all robots, keyed by their names in URLs.
+            tags_of: function that returns a robot's tags.
             ways: navigation links of this server.
-            data: the data folder; None without one.
+            data: the data folder; None for a server without a data folder.
         """
         sign_ins = ways_in.sign_ins
         further = FurtherWays(sign_ins.control.store is not None, ways_in.oidc.title)
@@ -60,7 +60,7 @@ class PeopleRoutes:
         )
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints of the API, by the name of their call."""
+        """Return the API endpoints, keyed by call name."""
         return {name: one for part in self._calls for name, one in part.endpoints().items()}
 
     def routes(self) -> list[ProtectedRoute]:

@@ -1,11 +1,11 @@
-"""Requests of trusted proxies: the person in the header becomes the visitor of the request.
+"""Requests from trusted proxies: the person in the proxy's header becomes the request's visitor.
 
-Layer 5. This ASGI middleware is the outermost one. It removes the headers of proxies from all
-requests, so no other part of the server can see, or believe, a forged one.
+Layer 5. This ASGI middleware is outermost. It removes proxy headers from all requests, so no other
+part of the server can see or trust a forged header.
 
-Theory of operation. Each request carries the proof of the proxy. The first request of a
-browser opens a sign-in, whose secret stays in this process. The middleware puts the secret into
-the cookie of the request, so all other rules (rights, origin, revocation) are those of a browser.
+Theory of operation. Each request contains the proxy's proof. A browser's first request opens a
+sign-in, whose secret never leaves this process. The middleware adds the secret to the request's
+cookie, so the same rules for rights, origin and revocation apply as for a browser.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["MOST_PROXIED", "ProxyMiddleware"]
 
 MOST_PROXIED: Final = 1000
-"""Most browsers behind proxies; the least recently used one gets another sign-in."""
+"""Limit on remembered browsers behind proxies; the least recently used browser is forgotten."""
 _LASTS_S: Final = 12 * 3600.0
 _TELL_S: Final = 60.0
 _REFUSED_S: Final = 5.0
@@ -65,7 +65,7 @@ class ProxyMiddleware:
         self._told_at = float("-inf")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward the request without the headers of proxies, in the name of the person."""
+        """Forward the request without proxy headers, and with the person's sign-in."""
         if scope["type"] not in ("http", "websocket") or not self._proxies:
             await self._app(scope, receive, send)
             return
@@ -77,7 +77,7 @@ class ProxyMiddleware:
             try:
                 secret = await self._secret(scope, found, found.proxy)
             except AccessError as error:
-                # STOP needs no person.
+                # STOP does not need a signed-in person.
                 if scope["type"] == "http" and not is_stop(scope["method"], scope["path"]):
                     await _refuse(send, f"The proxy {found.proxy.name} was not believed: {error}")
                     return
@@ -89,7 +89,7 @@ class ProxyMiddleware:
     def _as_person(
         self, headers: Sequence[tuple[bytes, bytes]], secret: str, *, is_secure: bool
     ) -> list[tuple[bytes, bytes]]:
-        """Return the headers with the person's sign-in in place of the browser's own ones."""
+        """Return the headers, with the person's sign-in in place of the browser's sign-ins."""
         access = self._sign_ins.access
         names = (access.cookie, access.sign_in_cookie)
         ours = {each.encode() for name in names for each in (name, SECURE + name)}
@@ -110,12 +110,12 @@ class ProxyMiddleware:
         secret = self._known(browser)
         if secret is not None:
             return secret
-        # A page loads tens of files; a refused person must not cost a transaction for each of them.
+        # A page loads dozens of files. A refused person must not cause a transaction for each file.
         at, reason = self._refused.get(browser.user, (float("-inf"), ""))
         if time.monotonic() - at < _REFUSED_S:
             raise AccessError(reason)
         async with self._lock:
-            secret = self._known(browser)  # another request of this browser may have been faster
+            secret = self._known(browser)  # another request from this browser may have been faster
             if secret is None:
                 try:
                     secret = await self._opened(scope, user, proxy, agent)
@@ -130,7 +130,7 @@ class ProxyMiddleware:
             return secret
 
     def _known(self, browser: _Browser) -> str | None:
-        """Return the secret of an open sign-in of a person who still has the name."""
+        """Return the secret of the browser's open sign-in; None if its person was renamed."""
         secret = self._secrets.get(browser)
         who = self._sign_ins.control.identify(secret) if secret is not None else NOBODY
         if who == NOBODY or who.name.casefold() != browser.user:
@@ -164,7 +164,7 @@ class ProxyMiddleware:
         return secret
 
     def _tell(self, fault: str) -> None:
-        """Log a fault, at most once a minute: clients can cause any number of them."""
+        """Log a fault, at most once a minute, because clients can cause any number of faults."""
         now = time.monotonic()
         if now - self._told_at >= _TELL_S:
             self._told_at = now

@@ -1,6 +1,6 @@
-"""The sign-in page, which each visitor without a sign-in gets in place of the requested page.
+"""The sign-in page, which replaces the requested page for every visitor without a sign-in.
 
-Layer 5. The page also has a STOP button for each robot that can move.
+Layer 5. The page also has a STOP button for each robot with motion.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,41 +23,42 @@ _REFUSED: Final = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class Stoppable(NamedTuple):
-    """A robot that STOP can stop."""
+    """A robot with motion."""
 
     name: str
-    """Name of the robot in URLs."""
+    """Robot's name in URLs."""
     title: str
 
     @property
     def stop_url(self) -> str:
-        """The URL of the robot's STOP."""
+        """URL for STOP requests to the robot."""
         return f"/api/v1/robots/{quote(self.name, safe='')}/stop"
 
 
 class FurtherWays(NamedTuple):
-    """Ways to sign in, besides the start key, pairing and passphrases."""
+    """Sign-in methods in addition to the start key, pairing and passphrases."""
 
     has_passkeys: bool = False
     provider: str = ""
-    """Name of the identity provider for people; "" without one."""
+    """Displayed name of the identity provider; "" without a provider."""
 
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """Context of ``door.html.j2``: the ways to sign in or a link to the page, and STOP buttons."""
+    """Context of ``door.html.j2``: the sign-in methods or a link to the page, and STOP buttons."""
 
     head: PageHead
     url: str
-    """Path of the requested page, if the browser may open it now; "" if not."""
+    """Path of the requested page; "" if the browser may not open it yet."""
     is_old: bool
     """Whether the request had an invalid key; the page reports an invalid key first."""
     path: str
-    """Path and query of the page that opens after the sign-in. A browser that followed a link on
-    another site sends no cookie; with a link to this path, it does."""
+    """Path and query of the page that opens after the sign-in. A browser that followed a link from
+    another site sends no cookie. It sends the cookie once the user follows a link from this page to
+    this path."""
     robots: tuple[Stoppable, ...]
     has_people: bool
-    """Whether the server knows people, who may sign in with name and passphrase."""
+    """Whether the server has people, who can sign in with name and passphrase."""
     keeps_people: bool
     """Whether the server can pair devices."""
     ways: FurtherWays
@@ -76,15 +77,15 @@ class SignInPages:
 
         Args:
             access: the identities and rights of the server.
-            robots: function that returns all robots that STOP can stop.
-            ways: further ways to sign in.
+            robots: function that returns all robots with motion.
+            ways: further sign-in methods.
         """
         self._access = access
         self._robots = robots
         self._ways = ways
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the route of the page itself, for visitors that want another identity."""
+        """Return the sign-in page's route, for visitors who want to change their identity."""
         return [ProtectedRoute("/sign-in", self.page, ANYONE)]
 
     async def page(self, request: Request) -> Response:
@@ -97,13 +98,13 @@ class SignInPages:
     def response(
         self, scope: Scope, *, url: str = "", is_old: bool = False, path: str = ""
     ) -> HTMLResponse:
-        """Return the page.
+        """Return the sign-in page.
 
         Args:
             scope: ASGI scope of the request.
-            url: path of the requested page, if the browser may open it now.
+            url: path of the requested page; "" if the browser may not open it yet.
             is_old: whether the request had an invalid key.
-            path: path of the page that opens after the sign-in; "": the requested page.
+            path: path of the page that opens after the sign-in; "" for the requested page.
         """
         parts = scope["path"].split("/")
         robots = tuple(() if url else self._robots())
@@ -125,16 +126,16 @@ class SignInPages:
 
 
 def own_path(path: str) -> str:
-    r"""Return a path of this server, or "/" for a text that could lead to another one.
+    r"""Return `path`, or "/" if a browser could read it as another host.
 
-    Browsers read ``//host`` and ``/\host`` as another host.
+    Browsers interpret ``//host`` and ``/\host`` as another host.
     """
     is_ours = path.startswith("/") and path[1:2] not in ("/", "\\") and path.isprintable()
     return path if is_ours and path.isascii() else "/"
 
 
 def _requested(scope: Scope) -> str:
-    """Return path and query of a request; never "//…", which would be another host."""
+    """Return path and query of a request; never "//…", which browsers read as another host."""
     path = "/" + quote(scope["path"].lstrip("/"))
     query: Any = scope["query_string"].decode("latin-1")
     return f"{path}?{query}" if query else path

@@ -1,6 +1,7 @@
-"""Routes of the sign-in with name and passphrase, and of the sign-out.
+"""Routes for signing in with name and passphrase, and for signing out.
 
-Layer 5. The limits are per address and per name, and at most two passphrases are hashed at a time.
+Layer 5. Attempts are limited per address and per name. At most two passphrases are hashed at a
+time.
 """
 
 import asyncio
@@ -33,7 +34,7 @@ class SignInRoutes:
         self._sign_ins = sign_ins
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, by the name of their call."""
+        """Return the endpoints, keyed by call name."""
         return {
             "sign_in": self.sign_in,
             "sign_out": self.sign_out,
@@ -41,7 +42,7 @@ class SignInRoutes:
 
     @answers_refusals
     async def sign_in(self, request: Request) -> Response:
-        """Sign a person in by name and passphrase."""
+        """Sign in a person with name and passphrase."""
         sign_ins = self._sign_ins
         said = await body_of(request, SignInRequest)
         key = f"name {' '.join(said.name.split()).casefold()}"
@@ -65,7 +66,7 @@ class SignInRoutes:
 
     @answers_refusals
     async def sign_out(self, request: Request) -> Response:
-        """End the sign-in of this browser; a paired device stays paired."""
+        """End this browser's sign-in; a paired device stays paired."""
         who = visitor_of(request).identity
         access = self._sign_ins.access
         if visitor_of(request).is_program:

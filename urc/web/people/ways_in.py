@@ -1,6 +1,7 @@
-"""The ways to sign in of one server, and their routes.
+"""The sign-in methods of one server, and their routes.
 
-Layer 5. The start key, pairing and passphrases need no options; a provider and proxies do.
+Layer 5. The start key, pairing and passphrases need no options. A provider and proxies need
+options.
 """
 
 from typing import NamedTuple
@@ -19,16 +20,16 @@ __all__ = ["SignInOptions", "WaysIn"]
 
 
 class SignInOptions(NamedTuple):
-    """Options of the ways to sign in."""
+    """Options of the sign-in methods."""
 
     oidc: OidcOptions | None = None
-    """The identity provider, or None."""
+    """Options of the identity provider; None without a provider."""
     proxies: tuple[TrustedProxy, ...] = ()
-    """Proxies that name the person of a request."""
+    """Trusted proxies, which identify the person of a request."""
 
 
 class WaysIn:
-    """The ways to sign in."""
+    """The sign-in methods of one server."""
 
     def __init__(self, access: Access, recorder: ServerRecorder, options: SignInOptions) -> None:
         """Prepare.
@@ -45,7 +46,7 @@ class WaysIn:
         recorder.hide(one.secret.decode() for one in options.proxies)
         recorder.hide([options.oidc.client_secret] if options.oidc else [])
         self.sign_ins = BrowserSignIns(access, recorder)
-        """The end of every way to sign in."""
+        """The common part of all sign-in methods."""
         provider = OidcSignIn(options.oidc) if options.oidc else None
         self.oidc = OidcRoutes(self.sign_ins, provider)
         self._passkeys = PasskeyRoutes(self.sign_ins)

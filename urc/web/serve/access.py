@@ -1,9 +1,9 @@
-"""Access over HTTP: the identity of each request, from its cookie or its token, never its address.
+"""Access over HTTP: each request's identity, from its cookie or token, never from its address.
 
-Layer 5. The address printed by URC contains the start key. A browser sends the key once, and gets a
-sign-in in a cookie that scripts cannot read. Signed-in people and guests have a second cookie,
-which is valid after a restart. A paired device has a third one, which stays when its operator signs
-out. A program sends its token with each request.
+Layer 5. The address printed by URC contains the start key. A browser sends the key once, and
+receives a sign-in in a cookie that scripts cannot read. Signed-in people and guests have a second
+cookie, which stays valid after a restart. A paired device has a third cookie, which remains when
+its operator signs out. A program sends its token with each request.
 """
 
 import asyncio
@@ -22,27 +22,27 @@ from urc.web.serve.visitor import Visitor
 __all__ = ["PARAMETER", "Access"]
 
 PARAMETER: Final = "key"
-"""Name of the query parameter that carries the start key."""
+"""Query parameter that contains the start key."""
 START: Final = "urc-start-"
-"""Start of the name of the cookie of the local user."""
+"""Prefix of the cookie name for the local user."""
 SIGN_IN: Final = "urc-sign-in-"
-"""Start of the name of the cookie of people and guests."""
+"""Prefix of the cookie name for people and guests."""
 DEVICE: Final = "urc-device-"
-"""Start of the name of the cookie of a paired device."""
+"""Prefix of the cookie name for paired devices."""
 SECURE: Final = "__Host-"
-"""Start of the names of all cookies over TLS (RFC 6265bis, 4.1.3.2)."""
+"""Prefix of all cookie names over TLS (RFC 6265bis, 4.1.3.2)."""
 OLD_COOKIES: Final = 8
-"""Maximum number of cookies from earlier starts in one browser; beyond this number, all such
-cookies are deleted."""
+"""Maximum number of cookies from earlier starts in one browser. Above the limit, all such cookies
+are deleted."""
 COOKIE_S: Final = 400 * 24 * 3600
-"""Lifetime of the cookie of a sign-in, in seconds; the server decides when the sign-in ends."""
+"""Lifetime of sign-in cookies, in seconds; the server decides when a sign-in ends."""
 CLOCK_S: Final = 60.0
-"""Time between two checks of the clock, in seconds."""
+"""Interval between checks of the clock, in seconds."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
 class Access:
-    """The identities of one server's requests, and the sockets that depend on their rights."""
+    """The identities of one server's requests, and the sockets that depend on these identities."""
 
     def __init__(
         self,
@@ -55,10 +55,10 @@ class Access:
         """Prepare.
 
         Args:
-            control: identities and rights; None for the local user alone.
-            anonymous: role of visitors without a sign-in; None: they may only press STOP.
+            control: identities and rights; None creates a control with only the local user.
+            anonymous: role of visitors without a sign-in; None permits them only to press STOP.
             key: the start key of a server without `control`; "" to generate a key.
-            instance: identifier of this start in the cookie's name; "" to generate an identifier.
+            instance: identifier of this server start in cookie names; "" to generate an identifier.
         """
         self.control = control or AccessControl(key=key)
         self.anonymous = anonymous
@@ -66,24 +66,24 @@ class Access:
         self.cookie = START + self.instance
         store = self.control.store
         self.sign_in_cookie = SIGN_IN + (store.instance() if store else self.instance)
-        """Name of the cookie of people and guests, without the prefix for TLS."""
+        """Cookie name for people and guests, without the TLS prefix."""
         self.device_cookie = DEVICE + self.sign_in_cookie.removeprefix(SIGN_IN)
-        """Name of the cookie of a paired device, without the prefix for TLS."""
+        """Cookie name for paired devices, without the TLS prefix."""
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
-        """Secret path prefix of code for frames; needed because a frame has no origin and therefore
-        sends no cookies."""
+        """Secret path prefix of the frames' code. Frames have no origin and therefore send no
+        cookies."""
         self.tags_of: Callable[[str], Collection[str]] = _untagged
-        """Function that returns the tags of a robot."""
+        """Function that returns a robot's tags."""
         self.on_admit: Callable[[Identity, str, str], None] = _unrecorded
-        """Callback for each use of a start key or code: the new identity, or `NOBODY` for a wrong
-        key; the network address; the browser."""
+        """Callback for each use of a start key or code. Its arguments are the new identity, or
+        `NOBODY` for a wrong key, the network address, and the browser."""
         self.on_bad_token: Callable[[str], None] = _unheard
+        """Callback for each request with an unknown, expired or revoked token. Its argument is the
+        network address."""
         self.clock_check: Callable[[], str] = _right_clock
-        """Function that returns a warning about a wrong clock, or ""; it may block."""
+        """Function that returns a warning about a wrong clock, or "". It may block."""
         self.clock_warning = ""
-        """The last result of `clock_check`, which each page shows."""
-        """Callback for each request with a token that is unknown, over or revoked, with the network
-        address."""
+        """Latest result of `clock_check`, which every page shows."""
         self._dependents: set[Callable[[], None]] = set()
         self.control.on_change.append(self.recheck)
 
@@ -99,9 +99,9 @@ class Access:
         return f"{url}?{PARAMETER}={quote(self.key, safe='')}"
 
     def address_once(self, url: str) -> str:
-        """Return an address without the start key that admits only the first browser.
+        """Return an address with a single-use code in place of the start key.
 
-        The address may become visible to others, for example in the command line of a browser.
+        Other users may see the address, for example in a browser's command line.
         """
         return f"{url}?{PARAMETER}={self.control.code()}"
 
@@ -112,8 +112,8 @@ class Access:
 
         Args:
             headers: headers of the request, with names in lower case.
-            is_secure: whether the request came over TLS. Then only cookies with `SECURE` count:
-                other servers under the same host name cannot set them.
+            is_secure: whether the request came over TLS. If true, only cookies with `SECURE` count,
+                because other servers under the same host name cannot set them.
         """
         pairs = list(headers)
         for name, value in pairs:
@@ -130,9 +130,10 @@ class Access:
         return Visitor(self, self._seen(next((who for who in found if who != NOBODY), NOBODY)))
 
     def _holder(self, cookies: Iterable[tuple[str, str]], name: str) -> Identity:
-        """Return the identity of the cookies with a name; or `NOBODY`.
+        """Return the identity from the cookies with a given name, or `NOBODY`.
 
-        Programs on other ports of a machine may set cookies of the same name: all are tried.
+        All cookies with the name are tried, because programs on other ports of a machine may set
+        some of them.
         """
         for stored, secret in cookies:
             if stored == name:
@@ -147,7 +148,7 @@ class Access:
         return who
 
     def admit(self, word: str, *, place: str = "", agent: str = "") -> str | None:
-        """Return the secret of a new sign-in of the local user for the start key or a code."""
+        """Return the secret of a new local user sign-in; None for a wrong start key or code."""
         secret = self.control.admit(word, place=place, agent=agent)
         self.on_admit(self.control.identify(secret) if secret else NOBODY, place, agent)
         return secret
@@ -167,9 +168,9 @@ class Access:
             secret: the secret of the sign-in.
             headers: headers of the request.
             is_secure: whether the request came over TLS.
-            is_kept: whether the sign-in remains valid after a restart; it replaces the cookie of
-                the local user.
-            is_device: whether it is the key of a paired device, which stays after a sign-out.
+            is_kept: whether the sign-in remains valid after a restart; its cookie replaces the
+                local user's cookie.
+            is_device: whether the secret is a paired device's key, which remains after a sign-out.
         """
         how = _attributes(is_secure=is_secure)
         before = SECURE if is_secure else ""
@@ -184,11 +185,11 @@ class Access:
         return kept + (_deleted(old) if len(old) > OLD_COOKIES else [])
 
     def forgotten(self, headers: _Headers, *, is_device: bool = False) -> list[str]:
-        """Return the ``Set-Cookie`` headers that delete the sign-ins of a browser.
+        """Return the ``Set-Cookie`` headers that delete a browser's sign-ins.
 
         Args:
             headers: headers of the request.
-            is_device: whether to delete the key of the paired device, too.
+            is_device: whether to delete the paired device's key, too.
         """
         ours = {self.cookie, self.sign_in_cookie, *([self.device_cookie] if is_device else [])}
         return _deleted({one for one, _ in _cookies(headers) if one.removeprefix(SECURE) in ours})
@@ -196,16 +197,16 @@ class Access:
     # Rights
 
     def role(self, who: Identity, robot: str = "") -> Role | None:
-        """Return the present role of `who` at a robot; "" asks for the whole server."""
+        """Return the current role of `who` at a robot; "" stands for the whole server."""
         tags = self.tags_of(robot) if robot else ()
         return self.control.role(who, robot, tags) or self.anonymous
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest present role of `who` at any robot."""
+        """Return the highest current role of `who` at any robot."""
         return self.control.best_role(who) or self.anonymous
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether the scope of a token contains a command; a command is a use."""
+        """Return whether a token permits a command, and record the use of the token."""
         return self.control.directory.may_give(self._seen(who), command)
 
     def signed_in_s(self, who: Identity) -> float:
@@ -214,7 +215,7 @@ class Access:
         return self.control.now() - sign_in.created_at if sign_in else inf
 
     def is_local(self, who: Identity) -> bool:
-        """Return whether `who` is the local user, with a sign-in that has not ended."""
+        """Return whether `who` is the local user with a valid sign-in."""
         return self._is_own(who) and self.control.role(who) is not None
 
     def _is_own(self, who: Identity) -> bool:
@@ -223,13 +224,13 @@ class Access:
     # Sockets
 
     async def run(self) -> None:
-        """Follow changes by other processes, ends of sign-ins and the clock, until cancelled."""
+        """Watch for changes by other processes, expired sign-ins and clock errors."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self.control.watch())
             group.create_task(self._watch_clock())
 
     async def _watch_clock(self) -> None:
-        """Check the clock now and each minute: a network may set it at any time."""
+        """Check the clock now and every minute, because the network may set it at any time."""
         while True:
             self.clock_warning = await asyncio.to_thread(self.clock_check)
             await asyncio.sleep(CLOCK_S)
@@ -244,7 +245,7 @@ class Access:
             self._dependents.discard(recheck)
 
     def recheck(self) -> None:
-        """Let all sockets and streams look at their rights again."""
+        """Make all sockets and streams check their rights again."""
         for recheck in tuple(self._dependents):
             recheck()
 
@@ -269,7 +270,7 @@ def _unheard(place: str) -> None:
 
 
 def _right_clock() -> str:
-    """Return "", because nothing is known about the clock."""
+    """Return "", because no clock check is configured."""
     return ""
 
 
@@ -278,10 +279,10 @@ def _untagged(_: str) -> Collection[str]:
 
 
 def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
-    """Yield the name and value of each cookie; names may repeat."""
+    """Yield each cookie's name and value; names may repeat."""
     for name, value in headers:
         if name == b"cookie":
             for part in value.decode("latin-1").split(";"):
-                # Only spaces of ASCII: the filter of proxies must find the same names.
+                # Strip only ASCII spaces, because the proxy filter must find the same names.
                 key, _, word = part.strip(" \t").partition("=")
                 yield key, word

@@ -1,4 +1,4 @@
-"""The sender of a request, as other people and the audit log name it.
+"""The sender of a request, with the name for other people and the audit log.
 
 Layer 5. Pure.
 """
@@ -14,22 +14,22 @@ __all__ = ["actor_of", "record_admission", "record_bad_token", "stopper_of"]
 
 
 def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
-    """Return the visitor of a request with its present role.
+    """Return the visitor of a request as an actor with its current role.
 
     Args:
         connection: the request.
-        robot: name of the robot that the request concerns; "" for the server.
+        robot: name of the robot concerned; "" for the server.
     """
     visitor = visitor_of(connection)
     who = visitor.identity
     role = visitor.role(robot) if robot else visitor.best_role()
     place = peer_of(connection, robot).place
-    way = "key" if visitor.is_local else who.way  # programs send the start key like a token
+    way = "key" if visitor.is_local else who.way  # programs send the start key as a bearer token
     return Actor(who.name, who.principal, who.kind, role or "", way, place, who.sign_in)
 
 
 def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
-    """Return the visitor who presses STOP at a robot, with the name that other people see."""
+    """Return the visitor who presses STOP at a robot, with the name shown to other people."""
     visitor = visitor_of(connection)
     who = visitor.identity
     host = connection.client.host if connection.client else ""
@@ -52,13 +52,13 @@ def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
 
 
 def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent: str) -> None:
-    """Record the use of a start key or of a code in its place.
+    """Record the use of a start key or single-use code.
 
     Args:
         recorder: writer of the audit entries.
         who: the new identity; `NOBODY` for a wrong key.
         place: network address.
-        agent: browser and system in words.
+        agent: browser and operating system in words.
     """
     if who == NOBODY:
         recorder.sign_in_failed("key", place, "the start key is wrong, or of an earlier start")
@@ -68,7 +68,7 @@ def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent:
 
 
 def record_bad_token(recorder: ServerRecorder, place: str) -> None:
-    """Record a request with a token that is unknown, over or revoked; equal requests are counted.
+    """Record a request with an unknown, expired or revoked token; repeated requests are counted.
 
     Args:
         recorder: writer of the audit entries.

@@ -1,13 +1,13 @@
-"""The name of a browser and its system, for lists of sign-ins.
+"""The name of a browser and its operating system, for lists of sign-ins.
 
-Layer 5. Pure. The name is what the browser says about itself, so it proves nothing.
+Layer 5. Pure. The browser itself sends this information, so it proves nothing.
 """
 
 from typing import Final
 
 __all__ = ["browser_name"]
 
-# The first match counts: most browsers also name the browsers that they resemble.
+# The first match counts, because most browsers also list the browsers that they resemble.
 _BROWSERS: Final = (
     ("Edg", "Edge"),
     ("OPR/", "Opera"),
@@ -32,7 +32,7 @@ _SYSTEMS: Final = (
 
 
 def browser_name(agent: str) -> str:
-    """Return browser and system in words, such as “Chrome on Android”; "" if both are unknown.
+    """Return browser and operating system in words, such as “Chrome on Android”; "" if unknown.
 
     Args:
         agent: the ``User-Agent`` header.

@@ -1,4 +1,4 @@
-"""The certificate of a server: from the local authority, or from files of the operator.
+"""The server's certificate, from the local authority or from the operator's files.
 
 Layer 5. `Certificates` loads a certificate in a thread and replaces it while the server runs. New
 connections use the new certificate; open connections keep the old one.
@@ -23,29 +23,29 @@ from urc.web.serve.policy import own_names
 __all__ = ["Certificates", "GivenCertificate", "LoadedCertificate", "LocalCertificate", "names_of"]
 
 LOOK_S: Final = 60.0
-"""Time between two checks of addresses, files and dates, in seconds."""
+"""Interval between checks of addresses, files and dates, in seconds."""
 _ALWAYS: Final = ("localhost", "127.0.0.1", "::1")
 log = logging.getLogger(__name__)
 
 
 class LoadedCertificate(NamedTuple):
-    """A certificate, ready for new connections."""
+    """A certificate that is ready for new connections."""
 
     context: ssl.SSLContext
     fingerprint: str
-    """SHA-256 of the certificate that people trust: the authority, or the given certificate."""
+    """SHA-256 of the certificate to trust: the authority's, or the given certificate."""
     file: Path
-    """File in PEM by which local programs verify the server."""
+    """PEM file with which local programs verify the server."""
     name: str
-    """A name or an address in the certificate."""
+    """A host name or address from the certificate."""
     authority: bytes
-    """The local authority in PEM, which people may trust; b"" for a given certificate."""
+    """The local authority in PEM, for devices to trust; b"" for a given certificate."""
     notes: tuple[str, ...] = ()
-    """Messages for the operator, such as a new authority."""
+    """Notes for the operator, for example about a new authority."""
 
 
 class CertificateSource(Protocol):
-    """A kind of certificate; both methods block."""
+    """A source of certificates. Both methods block."""
 
     def load(self) -> LoadedCertificate:
         """Return the current certificate, or raise `UrcError`."""
@@ -55,15 +55,15 @@ class CertificateSource(Protocol):
 
 
 class LocalCertificate:
-    """A certificate of the local authority, for the names and addresses of this machine."""
+    """A certificate from the local authority, for this machine's names and addresses."""
 
     def __init__(self, folder: Path, host: str, allowed_hosts: Iterable[str] = ()) -> None:
         """Prepare.
 
         Args:
-            folder: folder of the authority.
+            folder: the authority's folder.
             host: address on which the server listens.
-            allowed_hosts: further names of this machine.
+            allowed_hosts: additional names of this machine.
         """
         self._folder = folder
         self._host = host
@@ -72,7 +72,7 @@ class LocalCertificate:
         self._renew_at = datetime.max.replace(tzinfo=UTC)
 
     def load(self) -> LoadedCertificate:
-        """Issue a certificate if necessary.
+        """Return the certificate; issue a new one if necessary.
 
         Raises:
             AccessError: the files cannot be read or written.
@@ -105,20 +105,20 @@ class LocalCertificate:
         )
 
     def has_changed(self) -> bool:
-        """Return whether the certificate ends soon, or this machine has other addresses."""
+        """Return whether the certificate expires soon, or this machine's addresses have changed."""
         is_late = datetime.now(UTC) >= self._renew_at
         return is_late or names_of(self._host, self._allowed_hosts) != self._names
 
 
 class GivenCertificate:
-    """A certificate and a key in files of the operator."""
+    """A certificate and a key from the operator's files."""
 
     def __init__(self, chain: Path, key: Path) -> None:
         """Prepare.
 
         Args:
-            chain: file in PEM: the server's certificate, then intermediate certificates.
-            key: file in PEM, without a passphrase.
+            chain: PEM file with the server's certificate, followed by intermediate certificates.
+            key: PEM file without a passphrase.
         """
         self._chain = chain
         self._key = key
@@ -128,7 +128,7 @@ class GivenCertificate:
         """Read both files.
 
         Raises:
-            UrcError: a file cannot be read, or the files do not belong together.
+            UrcError: a file cannot be read, or certificate and key do not match.
         """
         self._seen = self._stamps()
         try:
@@ -154,7 +154,7 @@ class GivenCertificate:
         )
 
     def has_changed(self) -> bool:
-        """Return whether a program has replaced a file."""
+        """Return whether a file has been replaced."""
         return self._stamps() != self._seen
 
     def _stamps(self) -> tuple[int, ...]:
@@ -168,7 +168,7 @@ class Certificates:
     """The current certificate of a running server."""
 
     def __init__(self, source: CertificateSource, first: LoadedCertificate) -> None:
-        """Begin with a certificate that `source` has loaded."""
+        """Begin with a certificate loaded from `source`."""
         self._source = source
         self.current = first
 
@@ -182,13 +182,13 @@ class Certificates:
         return self.current.context
 
     async def keep(self, look_s: float = LOOK_S) -> None:
-        """Renew the certificate until cancelled; a fault keeps the old certificate."""
+        """Renew the certificate until cancelled; after a fault, keep the old certificate."""
         while True:
             await asyncio.sleep(look_s)
             await self.renew()
 
     async def renew(self) -> bool:
-        """Load the certificate again if it has changed; return whether it is another one."""
+        """Load the certificate again if necessary; return whether it was replaced."""
         try:
             if not await asyncio.to_thread(self._source.has_changed):
                 return False
@@ -204,10 +204,10 @@ class Certificates:
 
 
 def names_of(host: str, allowed_hosts: Iterable[str]) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the names and addresses of a certificate: the required and the optional ones.
+    """Return the required and the optional names and addresses of a certificate.
 
-    The names are those that the page policy accepts. Public IPv6 addresses are left out if the
-    machine has other addresses: providers change them often, and the authority must name each.
+    The page policy accepts the same names. Public IPv6 addresses are omitted if the machine has
+    other addresses, because providers change them often and the authority must list each address.
     """
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
@@ -232,11 +232,11 @@ def _context(chain: Path, key: Path) -> ssl.SSLContext:
 
 
 class _PassphraseError(Exception):
-    """A key has a passphrase."""
+    """The key has a passphrase."""
 
 
 def _refused() -> str:
-    """Refuse a key with a passphrase; without this function, OpenSSL would ask the terminal."""
+    """Refuse a key with a passphrase; OpenSSL would otherwise prompt on the terminal."""
     raise _PassphraseError
 
 

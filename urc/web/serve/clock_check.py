@@ -1,6 +1,6 @@
-"""The check of the machine's clock against all times that the data folder knows.
+"""The check of the machine's clock against all recorded times in the data folder.
 
-Layer 5. `clock_warning` reads files: servers call it in a thread.
+Layer 5. `clock_warning` reads files, so call it in a thread.
 """
 
 import sqlite3
@@ -23,13 +23,13 @@ _NEWEST: Final = "SELECT max(at) FROM (SELECT at FROM entries ORDER BY id DESC L
 
 
 def clock_warning(data: Path, now: float | None = None) -> str:
-    """Return one line for people if the clock is earlier than a known event, or "".
+    """Return a one-line warning if the clock is earlier than a recorded event; otherwise "".
 
-    Unreadable files prove nothing, and are ignored.
+    Unreadable files are ignored.
 
     Args:
         data: data folder.
-        now: UTC time of the machine's clock, in seconds since 1970; None means the present.
+        now: UTC time on the machine's clock, in seconds since 1970; None reads the clock.
     """
     return clock_fault(time.time() if now is None else now, _known(data))
 
@@ -52,7 +52,7 @@ def _known(data: Path) -> Iterator[KnownTime]:
 
 
 def _of_certificates(data: Path) -> Iterator[KnownTime]:
-    """Yield the start of the local certificate authority's life."""
+    """Yield the issue times of the local authority's certificates."""
     from urc.access.authority import AUTHORITY_FOLDER, issued_at  # slow to load
 
     for name in ("authority.pem", "server.pem"):

@@ -1,8 +1,8 @@
-"""One HTTP connection, with a time limit for requests and with policy headers in every refusal.
+"""One HTTP connection, with a time limit for requests and policy headers in every refusal.
 
 Layer 5. A thin layer over uvicorn's protocol, used only by `server`. The library uvicorn refuses
-invalid HTTP, and connections above its limit. Without this layer, refusals by uvicorn would lack
-the headers of the page policy.
+invalid HTTP, and connections above its limit. Without this layer, uvicorn's refusals would lack the
+page policy's headers.
 """
 
 import asyncio
@@ -20,14 +20,13 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
 CONNECTIONS = 1024
-"""Maximum number of open connections, including WebSockets. If the limit is reached, a new
-connection closes the oldest idle connection of the address with the most idle connections."""
+"""Maximum number of open connections, including WebSockets. At the limit, a new connection closes
+the oldest idle connection from the address with the most idle connections."""
 RESERVE = 64
 """Number of additional connections that accept only STOP, used while no connection is idle."""
 REQUEST_S = 5.0
-"""Time limit for the arrival of a complete request with its body, in seconds. The time starts at
-the opening of the connection for the first request, and at the first byte for later requests.
-"""
+"""Time limit for the arrival of a complete request with its body, in seconds. The time starts when
+the connection opens for the first request, and at the first byte for later requests."""
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
@@ -53,13 +52,14 @@ def _stops(data: bytes) -> bool:
 class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
-    The state of a request has two keys for a response without an end. The event ``closing`` is set
-    when the server ends. The function ``abort`` closes the connection.
+    The request state has two keys for endless responses. The event ``closing`` is set when the
+    server ends. The function ``abort`` closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
         class uses the constructor's arguments, and the methods `send_400_response` and `shutdown`.
         It also uses the attributes `conn`, `connections`, `loop` and `transport`. The tests in
-        tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail when a part changes.
+        tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail if one of these parts
+        changes.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class HttpConnection(H11Protocol):
         self._is_one_too_many = False
         self._has_spoken = False
         self.made_s = 0.0
-        """Time when the connection opened, by the clock of the event loop."""
+        """Time at which the connection opened, on the event loop's clock."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Store the transport, and wait for a request."""
@@ -98,14 +98,14 @@ class HttpConnection(H11Protocol):
         """Process received bytes, and check whether the request is complete."""
         self._has_spoken = True
         if self._is_one_too_many and not _stops(data):
-            # Not earlier: the client would lose a response sent before it has written its request.
+            # An earlier refusal would be lost, because the client must write its request first.
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "Too many connections are open.")
             return
         super().data_received(data)
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Cancel the time limit of the request."""
+        """Cancel the request's time limit."""
         self._unwatch()
         super().connection_lost(exc)
 
@@ -114,12 +114,12 @@ class HttpConnection(H11Protocol):
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def shutdown(self) -> None:
-        """Let the response in progress end; the server calls this method when it ends."""
+        """Allow the response in progress to end; the ending server calls this method."""
         super().shutdown()
         self._closing.set()
 
     def _abort(self) -> None:
-        """Close the connection without waiting for a reader that reads nothing."""
+        """Close the connection immediately, without waiting for an unresponsive reader."""
         self.transport.abort()
 
     def _make_room(self) -> bool:
@@ -142,8 +142,8 @@ class HttpConnection(H11Protocol):
         return is_ours and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:
-        """Start the time limit while a request is incomplete; otherwise, cancel the time limit."""
-        is_ours = self.transport.get_protocol() is self  # else it is a WebSocket
+        """Start the time limit if a request is incomplete; otherwise, cancel it."""
+        is_ours = self.transport.get_protocol() is self  # otherwise a WebSocket
         is_open = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not (is_ours and is_open) or self.transport.is_closing():
             self._unwatch()
@@ -160,7 +160,7 @@ class HttpConnection(H11Protocol):
         if self._has_spoken:
             text = f"The request did not arrive within {self._request_s:g} s."
             self._refuse(HTTPStatus.REQUEST_TIMEOUT, text)
-        else:  # a browser that connects in advance takes an early response for a fault
+        else:  # a browser that connects in advance would treat an early response as a fault
             self.transport.close()
 
     def _refuse(self, status: HTTPStatus, text: str) -> None:
@@ -170,5 +170,5 @@ class HttpConnection(H11Protocol):
         if self.conn.our_state is h11.IDLE:
             self.transport.write(refusal(status, text))
             self.transport.close()
-        else:  # the application is answering: our response would land inside or after it
+        else:  # the application is responding, and a second response would corrupt its response
             self.transport.abort()

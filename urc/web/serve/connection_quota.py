@@ -15,11 +15,11 @@ __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
 """Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
-sockets and six requests. The limit therefore permits several pages, and a few people behind one
+sockets and six requests, so the limit permits several pages, and a few people behind one
 address."""
 KNOWN_PLACES = 256
-"""Maximum number of concurrent requests and sockets of a known person, device or program, which may
-watch many robots."""
+"""Maximum number of concurrent requests and sockets of one known person, device or program. A known
+visitor may watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 
@@ -38,7 +38,7 @@ class ConnectionQuota:
 
     @contextmanager
     def taken(self, visitor: Visitor, address: str) -> Iterator[bool]:
-        """Count a request while the context is open; yield whether the limit permits the request.
+        """Count a request while the context is open; yield whether the limit permits it.
 
         `address` identifies an unknown visitor.
         """

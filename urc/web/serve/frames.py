@@ -1,8 +1,8 @@
-"""A parser that finds WebSocket frames with one whole text message, such as nearly every tick.
+"""A parser for WebSocket frames that contain one whole text message, as almost all ticks do.
 
-Layer 5, pure. The parser only reads the bytes. From the same bytes, the WebSocket library processes
-all other frames: fragments, control frames and protocol errors. This module only counts the bytes
-of other frames, to find the start of the next frame.
+Layer 5, pure. The parser only reads the bytes. The WebSocket library processes all other frames
+from the same bytes: fragments, control frames and protocol errors. This module only counts the
+bytes of other frames, to find the start of the next frame.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ _SHORT, _LONG = 126, 127
 _HEAD: Final = 2
 _MASK: Final = 4
 _PLAIN: Final = bytes(_MASK)
-"""A masking key that leaves the payload unchanged."""
+"""Masking key that leaves the payload unchanged."""
 _CONTROL: Final = 0x08
 
 
@@ -27,17 +27,17 @@ class WebSocketFrames:
         self._is_between = True
         """Whether the next byte starts a new message."""
         self._left = 0
-        """Number of bytes of the current frame that have not arrived yet."""
+        """Number of missing bytes of the current frame."""
         self._head = b""
         """Bytes of an incomplete frame header."""
         self._is_inside = False
-        """Whether a fragmented message is still incomplete."""
+        """Whether a fragmented message is incomplete."""
         self.spans: list[tuple[int, int]] = []
         """Start and end of each whole text frame at the beginning of the last received bytes, for
-        use with `text_of`. The list is empty if the bytes were a single text frame."""
+        `text_of`. Empty if the bytes were a single text frame."""
 
     def whole(self, data: bytes) -> bytes | None:
-        """Return the text if `data` is exactly one whole text frame, else None."""
+        """Return the text if `data` is exactly one whole text frame; otherwise None."""
         size = len(data)
         if self._is_between and size >= _HEAD + _MASK and data[0] == _TEXT and data[1] & _MASKED:
             at, said = _HEAD + _MASK, data[1] & 0x7F
@@ -81,7 +81,7 @@ def text_of(frame: bytes) -> bytes:
 
 
 def _is_text(data: bytes, at: int) -> bool:
-    """Return whether a whole text frame with a length of at most 16 bits begins at `at`."""
+    """Return whether a whole text frame begins at `at` with a length of at most 16 bits."""
     size = data[at + 1]
     return data[at] == _TEXT and bool(size & _MASKED) and size & 0x7F != _LONG
 

@@ -1,9 +1,9 @@
 """Access checks and page policy for every request, before any route is looked up.
 
 Layer 5. This ASGI middleware wraps the whole application, so that error responses also get the
-headers of the policy. The check of Host refuses foreign host names that resolve to this machine.
-The check of Origin prevents foreign pages from opening a WebSocket or posting a form. The response
-headers block injected markup. The module depends on no route, robot or template.
+policy's headers. The Host check refuses foreign host names that resolve to this machine. The Origin
+check prevents foreign pages from opening a WebSocket or posting a form. The response headers block
+injected markup. The module depends on no route, robot or template.
 """
 
 import ipaddress
@@ -58,7 +58,8 @@ _FIXED_HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (
         b"permissions-policy",
-        # Features that driving needs are for our origin; all others are off, for widgets as well.
+        # Only URC's own origin has the features needed for driving; all others are off, also for
+        # widgets.
         b"accelerometer=(self), gyroscope=(self), magnetometer=(self), gamepad=(self), "
         b"fullscreen=(self), screen-wake-lock=(self), camera=(), microphone=(), geolocation=(), "
         b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
@@ -86,8 +87,8 @@ _FRAME_HEADERS = (
 _CODE_FOLDERS = ("static", "vendor", "words")
 _CODE_HEADERS = (
     *(pair for pair in _FIXED_HEADERS if pair[0] != b"cross-origin-resource-policy"),
-    # A frame without an origin shares an origin with no page. So its files are open to all that
-    # know the path: our pages and the frames in them.
+    # A frame without an origin shares no origin with any page. Its files are therefore open to
+    # everyone with the path, that is, to URC's pages and their frames.
     (b"cross-origin-resource-policy", b"cross-origin"),
     (b"access-control-allow-origin", b"*"),
 )
@@ -96,7 +97,7 @@ REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
     *_FIXED_HEADERS,
 )
-"""Headers of a plain-text refusal from outside the application; the headers forbid all scripts and
+"""Headers of a plain-text refusal from outside the application. They forbid all scripts and
 resources."""
 
 
@@ -106,7 +107,7 @@ class Authority(NamedTuple):
     host: str
     """Host in lower case; an IPv6 address keeps its brackets."""
     port: int | None
-    """Port number; None if the header has no port."""
+    """Port number; None if the header contains no port."""
 
 
 def parse_host(text: str) -> Authority | None:
@@ -118,16 +119,17 @@ def parse_host(text: str) -> Authority | None:
 def is_host_allowed(
     authority: Authority, names: frozenset[str], *, is_loopback: bool = False
 ) -> bool:
-    """Return whether the server accepts requests for the host in `authority`.
+    """Return whether the server accepts requests for a host.
 
-    DNS rebinding from a foreign name server affects neither a literal address nor ``localhost``.
-    Any other name must be in `names`, because every device on the network can claim a name under
+    DNS rebinding by a foreign name server affects neither literal addresses nor ``localhost``. Any
+    other name must be in `names`, because every device on the network can claim a name under
     ``.local``.
 
     Args:
         authority: the host.
         names: allowed names in lower case, including the names of this machine.
-        is_loopback: whether the request came over loopback, and only loopback addresses are valid.
+        is_loopback: whether to accept only loopback addresses, because the request came over
+            loopback.
     """
     host = authority.host
     name = host.removesuffix(".")
@@ -154,7 +156,7 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 
     Args:
         origin: the Origin header; ``null`` never matches.
-        scheme: scheme of the request: ``http``, ``https``, ``ws`` or ``wss``.
+        scheme: request scheme, one of ``http``, ``https``, ``ws`` and ``wss``.
         authority: host and port of the request.
     """
     match = _ORIGIN.fullmatch(origin)
@@ -170,19 +172,19 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 
 
 def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
-    """Return the policy of a frame, which allows only the code of URC and of one widget.
+    """Return a frame's policy, which permits only code from URC and one widget.
 
-    The policy has no nonce, because a nonce would allow scripts and styles from any address. Any
-    request to a foreign address can leak data. The digest allows only the import map.
+    The policy has no nonce, because a nonce would permit scripts and styles from any address. Any
+    request to a foreign address can leak data. The digest permits only the import map.
 
     Args:
-        scope: ASGI scope of the request for the frame, with a host that was already checked.
+        scope: ASGI scope of the request for the frame; its host has been checked.
         widget: name of the widget in URLs.
         digest: digest ``sha256-…`` of the import map.
-        place: path prefix of code for frames.
+        place: path prefix of the frames' code.
     """
     authority = parse_host(_values(scope, b"host")[0])
-    # The grammar of CSP sources has no IPv6 addresses.
+    # CSP sources cannot contain IPv6 addresses.
     if authority is None or authority.host.startswith("["):
         return _FRAME_POLICY.format(digest=digest, code="'self'")
     port = "" if authority.port is None else f":{authority.port}"
@@ -193,7 +195,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
 
 
 class Policy:
-    """Middleware that stores ``nonce`` and ``visitor`` in the state of each request."""
+    """Middleware that stores ``nonce`` and ``visitor`` in each request's state."""
 
     def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app
@@ -239,12 +241,12 @@ class Policy:
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
             if not origins and scope["state"]["visitor"].is_program:
-                pass  # a page of another site cannot send a token
+                pass  # pages of other sites cannot send a token
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")
         if lengths and _values(scope, b"transfer-encoding"):
-            # Another web server in front may take the rest of the body for the next request.
+            # A web server in front of URC may interpret the rest of the body as the next request.
             return 400, "A request has either a length or a transfer encoding."
         if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):
             return 413, f"A request may carry at most {BODY_BYTES} bytes."
@@ -254,8 +256,8 @@ class Policy:
 class _Answer:
     """A wrapper of `send` that adds the page policy's headers to a response.
 
-    A route may set three keys in the state of a request. ``frame_policy`` is the policy of a frame
-    in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file`` marks
+    A route may set three keys in the request state. ``frame_policy`` is a frame's policy in place
+    of the page policy. ``is_code`` marks files that frames may also load. ``is_file`` marks
     third-party content, which must not act as a page of URC when opened directly.
     """
 
@@ -289,13 +291,13 @@ class _Answer:
         elif kind == "websocket.accept":
             self._has_begun = True
         elif kind == "websocket.close" and not self._has_begun:
-            # The server's own refusal of an unknown route would carry no headers.
+            # The server's own refusal of an unknown route would lack the policy's headers.
             await self.refuse(404, "This page does not exist.")
             return
         await self._send(message)
 
     async def refuse(self, status: int, text: str) -> None:
-        """Respond with one line: as JSON to a call of the API, otherwise as plain text."""
+        """Respond with one line of text, as JSON for API calls and otherwise as plain text."""
         if self._is_upgrade and not self._can_explain:
             self._has_begun = True
             await self._send({"type": "websocket.close", "code": 1008, "reason": text})
@@ -316,7 +318,7 @@ class _Answer:
 
 
 def _limited(scope: Scope, receive: Receive) -> Receive:
-    """Return a version of `receive` that limits the total size of the body."""
+    """Return a version of `receive` that limits the total body size."""
     if scope["type"] == "websocket":
         return receive
     total = 0

@@ -1,7 +1,6 @@
 """JSON responses of the HTTP API, and the bodies of its requests.
 
-Layer 5. Every failure has the same form, whether a route, the access control or the page policy
-refuses the request.
+Layer 5. Failures from routes, access control and the page policy all have the same form.
 """
 
 from collections.abc import Awaitable, Callable
@@ -30,7 +29,7 @@ __all__ = [
 Endpoint = Callable[..., Any]
 
 API: Final = "/api/"
-"""Start of the paths of the HTTP API."""
+"""Prefix of all HTTP API paths."""
 _NO_STORE: Final = {"cache-control": "no-store"}
 _JSON: Final = "application/json"
 _T = TypeVar("_T")
@@ -39,18 +38,18 @@ _P = ParamSpec("_P")
 
 
 class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Response to a request that failed."""
+    """Response to a failed request."""
 
     code: str
-    """Reason as a word for programs, such as ``not-found``."""
+    """Reason code for programs, such as ``not-found``."""
     message: str
-    """Reason in one line, for people."""
+    """Reason for people, in one line."""
     error: str
-    """Same as `message`; the only key of earlier versions."""
+    """Same as `message`; earlier versions had only this key."""
 
 
 class ApiError(Exception):
-    """A failure: its status, one line of text, and a code."""
+    """A failure with a status, one line of text and a code."""
 
     def __init__(self, status: int, line: str, code: str = "") -> None:
         super().__init__(line)
@@ -60,7 +59,7 @@ class ApiError(Exception):
 
 
 def answer(value: object, status: int = 200) -> Response:
-    """Return a JSON response that is not cached."""
+    """Return a JSON response that must not be cached."""
     return Response(msgspec.json.encode(value), status, _NO_STORE, media_type=_JSON)
 
 
@@ -70,17 +69,17 @@ def told(status: int, line: str, code: str = "") -> Response:
     Args:
         status: HTTP status, 400 or above.
         line: the reason, in one line.
-        code: the reason as a word; "" for the standard phrase of the status.
+        code: reason code; "" for the status's standard phrase.
     """
     code = code or HTTPStatus(status).phrase.lower().replace(" ", "-")
     return answer(Failure(code, line, line), status)
 
 
 async def body_of(request: Request, kind: type[_T]) -> _T:
-    """Return the JSON body of a request, decoded as `kind`.
+    """Return a request's JSON body, decoded as `kind`.
 
     Raises:
-        ApiError: the body is of another type.
+        ApiError: the body has another type.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip() != _JSON:
         raise ApiError(415, f"expected a body of type {_JSON}")
@@ -96,10 +95,10 @@ def answers_errors_with(
     [Callable[Concatenate[_Self, Request, _P], Awaitable[Response]]],
     Callable[Concatenate[_Self, Request, _P], Awaitable[Response]],
 ]:
-    """Return a decorator that turns each `ApiError` and `UrcError` of a handler into a response.
+    """Return a decorator that converts a handler's `ApiError` or `UrcError` to a response.
 
     Args:
-        status: HTTP status of a `UrcError`; an `ApiError` has its own.
+        status: HTTP status for a `UrcError`; an `ApiError` contains its own status.
     """
 
     def decorate(
@@ -122,4 +121,4 @@ def answers_errors_with(
 
 
 answers_errors: Final = answers_errors_with(409)
-"""Decorator of a handler that refuses requests because of the state of a robot or the server."""
+"""Decorator for handlers that refuse requests because of a robot's or the server's state."""

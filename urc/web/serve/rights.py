@@ -1,7 +1,7 @@
-"""The right that each route needs, and the routes that check it before their endpoints.
+"""The right required by each route, and route classes that check it before calling the endpoint.
 
-Layer 5. The application has no other routes than `ProtectedRoute` and `ProtectedSocket`, as a
-contract test checks, so no route lacks a right.
+Layer 5. All routes of the application are a `ProtectedRoute` or `ProtectedSocket`, so no route
+lacks a right. A contract test checks this rule.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,13 +40,13 @@ __all__ = [
 
 
 class Right(NamedTuple):
-    """The right that a request needs."""
+    """The right required for a request."""
 
     role: Role | None
-    """The least role; None: everyone, without a sign-in."""
+    """Minimum role; None permits everyone, even without a sign-in."""
     scope: Literal["robot", "server", "anywhere"] = "robot"
-    """``robot``: at the robot of the path parameter ``name``. ``server``: for all robots.
-    ``anywhere``: for at least one robot."""
+    """Robots for which the role is required. ``robot`` means the robot in the path parameter
+    ``name``, ``server`` all robots, and ``anywhere`` at least one robot."""
     is_local: bool = False
     """Whether only the local user has the right."""
     is_fresh: bool = False
@@ -54,7 +54,7 @@ class Right(NamedTuple):
 
     @property
     def refusal(self) -> str:
-        """The message to a visitor without the right."""
+        """The message for visitors without the right."""
         if self.is_local:
             return t("This needs the key in the address that URC printed.")
         if self.scope == "server":
@@ -63,8 +63,8 @@ class Right(NamedTuple):
 
 
 FRESH_S: Final = 300.0
-"""Time after a sign-in in which people change packages, settings and rights, in seconds. A tablet
-that was left signed in does not suffice."""
+"""Time after a sign-in in which people can change packages, settings and rights, in seconds. A
+tablet that was left signed in is therefore not enough."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
@@ -81,7 +81,7 @@ LOCAL: Final = Right("administer", "server", is_local=True)
 
 
 class RightHolder(Protocol):
-    """The part of a visitor that routes use; see `urc.web.serve.visitor.Visitor`."""
+    """The interface of a visitor for routes; see `urc.web.serve.visitor.Visitor`."""
 
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor has a right now."""
@@ -115,7 +115,7 @@ class ProtectedRoute(Route):
 
 
 class ProtectedSocket(WebSocketRoute):
-    """A route of sockets that are opened only for visitors with a right."""
+    """A socket route that is open only to visitors with a right."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], right: Right) -> None:
         super().__init__(path, endpoint)
@@ -130,13 +130,13 @@ class ProtectedSocket(WebSocketRoute):
 
 
 def stale_text() -> str:
-    """Return the message to a visitor whose sign-in is too old."""
+    """Return the message for visitors whose sign-in is too old."""
     minutes = round(FRESH_S / 60)
     return t("Sign in again: this needs a sign-in of the last {n} minutes.", n=minutes)
 
 
 async def turn_away(receive: Receive, send: Send, reason: str) -> None:
-    """Accept a socket and close it with the reason; a page cannot read a refused handshake."""
+    """Accept a socket and close it with the reason; pages can't read refused handshakes."""
     await receive()
     await send({"type": "websocket.accept"})
     await send({"type": "websocket.send", "text": encode_error("refused", reason)})
@@ -145,7 +145,7 @@ async def turn_away(receive: Receive, send: Send, reason: str) -> None:
 
 def _may(scope: Scope, right: Right) -> bool:
     if scope["state"].get("is_code"):
-        return True  # the secret path of a frame's code, which sends no cookies
+        return True  # the secret path of frame code; frames send no cookies
     visitor: RightHolder = scope["state"]["visitor"]
     robot = scope["path_params"].get("name", "") if right.scope == "robot" else ""
     return visitor.may(right, robot)

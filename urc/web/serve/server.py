@@ -1,8 +1,7 @@
 """The HTTP and HTTPS server: uvicorn, run by a coroutine, with small send buffers.
 
-Layer 5. Only this module and `connection` depend on uvicorn. The kernel and the process buffer as
-little unsent data per client as possible, because buffered data becomes outdated and cannot be
-withdrawn.
+Layer 5. Only this module and `connection` depend on uvicorn. Buffers for unsent data are as small
+as possible, because buffered data becomes outdated and cannot be withdrawn.
 """
 
 import asyncio
@@ -60,14 +59,13 @@ async def serve(
         app: an application from `build_app`.
         host: an address or host name of this machine.
         port: TCP port; 0 lets the system choose one.
-        on_ready: called once with the first of `reachable_urls`, such as
+        on_ready: callback that is called once, with the first of `reachable_urls`, such as
             ``http://127.0.0.1:8080/``.
         request_s: time limit for the arrival of a complete request, in seconds.
-        connections: maximum number of open connections; beyond this number, new connections get
-            status 503.
-        certificates: certificates of HTTPS; None for plain HTTP.
-        allowed_hosts: names of this machine that plain HTTP redirects to HTTPS, besides its own.
-        handshakes: limits of unfinished handshakes; None for the usual limits.
+        connections: maximum number of open connections; above it, new connections get status 503.
+        certificates: certificates for HTTPS; None for plain HTTP.
+        allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
+        handshakes: limits on unfinished handshakes; None for the default limits.
 
     Raises:
         UrcError: the server cannot listen on the address.
@@ -124,7 +122,7 @@ def _first_bytes(
 
 @contextlib.contextmanager
 def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -> Iterator[None]:
-    """Renew the certificate while the context is open; then end all handshakes."""
+    """Renew the certificate while the context is open, then end all handshakes."""
     if certificates is None or handshakes is None:
         yield
         return
@@ -137,7 +135,7 @@ def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -
 
 
 class _UvicornServer(uvicorn.Server):
-    """A uvicorn server that signals its end with an event, instead of polling."""
+    """A uvicorn server that signals its end by an event, without polling."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -162,7 +160,7 @@ class _UvicornServer(uvicorn.Server):
 
 
 class _DashboardSocket(WebSocketsSansIOProtocol):
-    """A uvicorn WebSocket without a send queue, with a callback when the socket is writable.
+    """A uvicorn WebSocket without a send queue, and with a callback when the socket is writable.
 
     WARNING: this class may use only asyncio's protocol methods and the arguments of the
         constructor; the rest of the base class is private to uvicorn. The application finds the
@@ -187,7 +185,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         self._urc_flow.connected(cast("asyncio.Transport", transport))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wake a waiting writer, so that the writer notices the closed connection."""
+        """Wake a waiting writer, which then notices the closed connection."""
         super().connection_lost(exc)
         self._urc_flow.lost()
 
@@ -209,7 +207,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def _urc_several(
         self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
     ) -> None:
-        """Pass on messages that arrived together, up to the first that the client refuses."""
+        """Pass messages from one read to the client, up to the first refused message."""
         at = 0
         for begin, end in spans:
             if not sink(text_of(data[begin:end])):
@@ -219,12 +217,12 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
             super().data_received(data[at:])
 
     def pause_writing(self) -> None:
-        """Tell the client that the kernel's buffer is full."""
+        """Notify the client that the kernel's buffer is full."""
         super().pause_writing()
         self._urc_flow.pause()
 
     def resume_writing(self) -> None:
-        """Tell the client that the kernel's buffer is empty."""
+        """Notify the client that the kernel's buffer is empty."""
         super().resume_writing()
         self._urc_flow.resume()
 
@@ -244,8 +242,8 @@ def _listen(host: str, port: int) -> socket.socket:
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
         if family == socket.AF_INET6:
-            # "::" means every address, IPv4 and IPv6, whatever the system's default is.
-            with contextlib.suppress(OSError):  # a system without this option
+            # "::" means every IPv4 and IPv6 address, regardless of the system's default.
+            with contextlib.suppress(OSError):  # some systems lack this option
                 listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         listener.bind(address)
         listener.listen(BACKLOG)
@@ -262,8 +260,8 @@ def reachable_urls(host: str, port: int, scheme: str = "http") -> tuple[str, ...
     """Return the URLs of a dashboard that listens on `host`.
 
     For ``0.0.0.0`` and ``::``, the URLs contain the addresses of all network interfaces of this
-    machine, or else the loopback address. For any other host, the URL contains `host`. Network
-    addresses precede the loopback address. The function sends no packet.
+    machine, or else the loopback address. For any other host, the only URL contains `host`. Network
+    addresses precede the loopback address. The function sends no packets.
 
     Args:
         host: the address or name on which the server listens.
@@ -303,12 +301,12 @@ async def _follow(server: _UvicornServer, running: "asyncio.Future[None]") -> No
 
 @contextlib.contextmanager
 def _ending(server: _UvicornServer) -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the server while the context is open, if the platform permits."""
+    """End the server on SIGINT and SIGTERM while the context is open, if the platform permits."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # In a thread and on Windows, loops have no signal handlers: the caller's own stay.
+        # In a thread and on Windows, loops have no signal handlers, so the caller's handlers stay.
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
             loop.add_signal_handler(number, server.end)
             caught.append(number)

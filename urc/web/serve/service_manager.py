@@ -1,11 +1,12 @@
-"""Messages to systemd: the server is ready, alive or ending (sd_notify(3)).
+"""Messages to systemd that the server is ready, alive or ending (sd_notify(3)).
 
-Without systemd, or under another service manager, `NOTIFY_SOCKET` is not set, and nothing is sent.
+Without systemd, or under another service manager, `NOTIFY_SOCKET` is not set, and no messages are
+sent.
 
-The watchdog is tied to the server's own health: before each heartbeat, the server requests its
-own `/healthz` over a real connection. If the event loop is blocked, or the port no longer accepts
-connections, the heartbeat is missing, and systemd restarts the server. The guard has already
-stopped the robots by then (docs/motion.md).
+Before each heartbeat to the watchdog, the server requests its own `/healthz` over a real
+connection. If the event loop is blocked, or the port no longer accepts connections, the heartbeat
+is not sent, and systemd restarts the server. By then, the guard has already stopped the robots
+(docs/motion.md).
 """
 
 import asyncio
@@ -23,8 +24,8 @@ __all__ = ["ServiceManager", "answers"]
 log = logging.getLogger(__name__)
 
 _SIGNS: Final = 3
-"""Heartbeats in one interval of the watchdog. sd_watchdog_enabled(3) recommends two; with three,
-one lost request ends no server."""
+"""Heartbeats per watchdog interval. sd_watchdog_enabled(3) recommends two. With three, one lost
+request does not end the server."""
 _STATUS: Final = b"HTTP/1.1 "
 
 
@@ -40,13 +41,13 @@ class ServiceManager:
         if sys.platform == "win32" or not self._place.startswith(("/", "@")):
             self._place = ""
         self.watchdog_s = _watchdog_s(environment) if self._place else 0.0
-        """Interval in which systemd expects a heartbeat, in seconds; 0 without a watchdog."""
+        """Interval within which systemd expects a heartbeat, in seconds; 0 without a watchdog."""
 
     def tell(self, *lines: str) -> None:
-        """Send assignments such as ``READY=1``; ignore a service manager that does not listen."""
+        """Send assignments such as ``READY=1`` to systemd; only log a failure."""
         if sys.platform == "win32" or not self._place:
             return
-        # A leading @ is the notation for the abstract namespace (unix(7)).
+        # A leading @ denotes the abstract namespace (unix(7)).
         place = "\0" + self._place[1:] if self._place.startswith("@") else self._place
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
@@ -56,10 +57,11 @@ class ServiceManager:
             log.warning("systemd gets no messages: %s", error.strerror or error)
 
     async def watch(self, is_healthy: Callable[[float], Awaitable[bool]]) -> None:
-        """Send a heartbeat in time, as long as the server is healthy; never return.
+        """Send heartbeats while the server is healthy; with a watchdog, never return.
 
         Args:
-            is_healthy: function that returns whether the server answers within a time in seconds.
+            is_healthy: function that returns whether the server answers within a given time in
+                seconds.
         """
         if not self.watchdog_s:
             return
@@ -76,7 +78,7 @@ class ServiceManager:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float:
-    """Return the interval of the watchdog for this process, in seconds; 0 without a watchdog."""
+    """Return this process's watchdog interval, in seconds; 0 without a watchdog."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return 0.0
     text = environment.get("WATCHDOG_USEC", "")
@@ -84,12 +86,13 @@ def _watchdog_s(environment: Mapping[str, str]) -> float:
 
 
 async def answers(url: str, within_s: float) -> bool:
-    """Return whether a server answers a plain HTTP request for `/healthz` in time.
+    """Return whether a server answers a plain HTTP request for `/healthz` within a time limit.
 
-    Any answer counts, also that there are too many connections: a busy server is no broken server.
+    Any answer counts, even a refusal because of too many connections, because a busy server is not
+    broken.
 
     Args:
-        url: address of the server. A port with HTTPS answers plain HTTP for this path, too.
+        url: address of the server. HTTPS ports also answer plain HTTP for this path.
         within_s: time limit in seconds.
     """
     place = urlsplit(url)

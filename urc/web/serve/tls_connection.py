@@ -1,9 +1,9 @@
-"""One TLS connection over an asyncio transport, with no buffer of its own.
+"""One TLS connection over an asyncio transport, without its own buffer.
 
-Layer 5. Encryption is `ssl.SSLObject` of the standard library. The TLS layer of an event loop has
-a buffer above the transport of TCP, and reports a full buffer one write too late. The dashboard
-would then write one more frame, which becomes outdated in the buffer. Here, each write goes to TCP
-at once, so the callbacks of TCP are exact, and paused data stays in the kernel.
+Layer 5. The standard library's `ssl.SSLObject` encrypts the data. An event loop's own TLS layer has
+a buffer above the TCP transport, and reports a full buffer one write too late. The dashboard would
+then write one more frame, which becomes outdated in the buffer. This class passes each write to TCP
+immediately, so TCP's callbacks are exact, and paused data stays in the kernel.
 """
 
 import asyncio
@@ -15,13 +15,13 @@ from typing import Any
 __all__ = ["READ_BYTES", "TlsConnection"]
 
 READ_BYTES = 64 * 1024
-"""Maximum number of decrypted bytes in one call of a protocol."""
+"""Maximum number of decrypted bytes per protocol call."""
 HANDSHAKE_BYTES = 64 * 1024
-"""Maximum number of received bytes that wait for the next step of a handshake."""
+"""Maximum number of received bytes that can wait for the next step of a handshake."""
 
 
 class TlsConnection(asyncio.Transport, asyncio.Protocol):
-    """The protocol of a TCP transport, and the transport of a protocol above TLS."""
+    """A protocol above a TCP transport, and a transport below the upper protocol."""
 
     def __init__(
         self,
@@ -34,10 +34,10 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         """Prepare the handshake.
 
         Args:
-            tcp: an open transport, whose protocol becomes this connection.
+            tcp: an open transport; this connection becomes its protocol.
             context: certificate and options of the server.
-            make: function that returns the upper protocol, called after the handshake.
-            on_data: callback for data of the handshake, which `continue_handshake` processes.
+            make: function that creates the upper protocol after the handshake.
+            on_data: callback for received handshake data, which `continue_handshake` processes.
             on_end: callback for the end of the handshake: success, failure or lost connection.
         """
         super().__init__()
@@ -46,13 +46,13 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._on_data = on_data
         self._on_end = on_end
         self.has_replied = False
-        """Whether the client has sent a whole first message, so the server has replied."""
+        """Whether the server has replied to a whole first message from the client."""
         self._context = context
         self._in = ssl.MemoryBIO()
         self._out = ssl.MemoryBIO()
         self._tls = context.wrap_bio(self._in, self._out, server_side=True)
         self._protocol: asyncio.BaseProtocol | None = None
-        """The upper protocol; None before the handshake and after the end."""
+        """The upper protocol; None before the handshake and after the connection's end."""
         self._is_ready = False
         self._is_reading = True
         self._is_closing = False
@@ -71,14 +71,14 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             self._on_data()
 
     def eof_received(self) -> bool | None:
-        """Close the connection: without a closing message of TLS, the data may be incomplete."""
+        """Close the connection, because data without a TLS closing message may be incomplete."""
         self._in.write_eof()
         if isinstance(self._protocol, asyncio.Protocol) and not self._is_closing:
             self._protocol.eof_received()
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Pass on the end of the connection."""
+        """Report the end of the connection to the upper protocol."""
         self._is_closing = True
         if not self._is_ready:
             self._on_end()
@@ -87,17 +87,17 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             protocol.connection_lost(exc)
 
     def pause_writing(self) -> None:
-        """Pass on that the kernel's buffer is full."""
+        """Notify the upper protocol that the kernel's buffer is full."""
         if self._protocol is not None:
             self._protocol.pause_writing()
 
     def resume_writing(self) -> None:
-        """Pass on that the kernel has accepted all bytes."""
+        """Notify the upper protocol that the kernel has accepted all bytes."""
         if self._protocol is not None:
             self._protocol.resume_writing()
 
     def continue_handshake(self) -> None:
-        """Process the received data of the handshake, with slow cryptography."""
+        """Process the received handshake data; the cryptography is slow."""
         if self._is_closing or self._is_ready:
             return
         try:
@@ -125,17 +125,17 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             except ssl.SSLError:
                 self._fail()
                 return
-            if not data:  # the client has closed TLS
+            if not data:  # the client has closed the TLS connection
                 if isinstance(self._protocol, asyncio.Protocol):
                     self._protocol.eof_received()
                 self.close()
                 return
             if isinstance(self._protocol, asyncio.Protocol):
                 self._protocol.data_received(data)
-        self._flush()  # replies of TLS itself, such as a change of keys
+        self._flush()  # replies of the TLS protocol itself, such as a key update
 
     def _fail(self) -> None:
-        """Send the alert that explains the failure, and close."""
+        """Send the TLS alert about the failure, and close the connection."""
         self._flush()
         self._is_closing = True
         self._tcp.close()
@@ -147,7 +147,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
     # Called by the upper protocol
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return data on the connection, such as ``peername`` or ``sslcontext``."""
+        """Return information about the connection, such as ``peername`` or ``sslcontext``."""
         if name == "sslcontext":
             return self._context
         if name == "ssl_object":
@@ -159,11 +159,11 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         return self._protocol or self
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        """Replace the upper protocol, as at the start of a WebSocket."""
+        """Replace the upper protocol, for example at the start of a WebSocket."""
         self._protocol = protocol
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Encrypt data and give it to TCP."""
+        """Encrypt data and write it to TCP."""
         if self._is_closing or not data:
             return
         try:
@@ -178,16 +178,16 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._tcp.set_write_buffer_limits(high, low)
 
     def get_write_buffer_size(self) -> int:
-        """Return the number of encrypted bytes that the kernel has not accepted."""
+        """Return the number of encrypted bytes that the kernel has not accepted yet."""
         return self._tcp.get_write_buffer_size()
 
     def pause_reading(self) -> None:
-        """Leave further data in the kernel's buffer."""
+        """Pause reading; further data stays in the kernel's buffer."""
         self._is_reading = False
         self._tcp.pause_reading()
 
     def resume_reading(self) -> None:
-        """Read again, first the bytes of the last packet."""
+        """Resume reading, beginning with the remaining bytes of the last packet."""
         if not self._is_reading:
             self._is_reading = True
             self._loop.call_soon(self._resumed)
@@ -207,16 +207,16 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         return self._is_closing or self._tcp.is_closing()
 
     def can_write_eof(self) -> bool:
-        """Return False: TLS closes both directions together."""
+        """Return False, because TLS closes both directions together."""
         return False
 
     def close(self) -> None:
-        """Close the connection after all written data, without waiting for the client's reply."""
+        """Close the connection after sending all data, without waiting for the client's reply."""
         if self._is_closing:
             return
         self._is_closing = True
         if self._is_ready:
-            # The message is written; the client's reply is not awaited.
+            # The closing message has been written; the client's reply is not awaited.
             with contextlib.suppress(ssl.SSLError):
                 self._tls.unwrap()
             self._flush()

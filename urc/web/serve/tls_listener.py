@@ -1,7 +1,7 @@
-"""The first bytes of a connection to a port with TLS: handshake, or plain HTTP.
+"""The first bytes of a connection to a TLS port, which are a handshake or plain HTTP.
 
-Layer 5. A client can open many connections and never finish a handshake. `Handshakes` limits their
-number, their duration, and their share of the event loop's time.
+Layer 5. A client can open many connections without finishing a handshake. `Handshakes` limits the
+number and duration of handshakes, and their share of the event loop's time.
 """
 
 import asyncio
@@ -16,14 +16,14 @@ from urc.web.serve.tls_connection import TlsConnection
 __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
-"""Maximum number of unfinished handshakes. One more closes one of the address with the most: the
-oldest one without a whole message, or else the oldest one."""
+"""Maximum number of unfinished handshakes. Above the limit, the address with the most handshakes
+loses one: its oldest handshake without a whole message, or else its oldest handshake."""
 HANDSHAKE_S = 5.0
-"""Time limit from the opening of a connection to the end of its handshake, in seconds."""
+"""Time limit from opening a connection to the end of its handshake, in seconds."""
 SHARE = 0.25
-"""Maximum share of handshakes in the event loop's time, from 0 to 1; further handshakes wait."""
+"""Maximum share of the event loop's time for handshakes, from 0 to 1; further handshakes wait."""
 _TLS_HANDSHAKE = 0x16
-"""First byte of a TLS connection (RFC 8446, 5.1); no method of HTTP begins with it."""
+"""First byte of a TLS connection (RFC 8446, 5.1); no HTTP method begins with this byte."""
 
 
 class Handshakes:
@@ -49,7 +49,7 @@ class Handshakes:
         self._open: dict[FirstBytes, asyncio.TimerHandle] = {}
         self._waiting: dict[FirstBytes, None] = {}
         self._free_s = 0.0
-        """Time of the event loop's clock at which the next handshake may begin."""
+        """Time on the event loop's clock at which the next handshake step may begin."""
         self._is_timed = False
 
     def __len__(self) -> int:
@@ -57,18 +57,19 @@ class Handshakes:
         return len(self._open)
 
     def add(self, one: "FirstBytes") -> None:
-        """Limit the time of a new connection; close another connection if there are too many."""
+        """Set the time limit of a new connection; if there are too many connections, close one."""
         loop = asyncio.get_running_loop()
         self._open[one] = loop.call_later(self._limit_s, one.abort)
         if len(self._open) > self._most:
             count = Counter(each.address for each in self._open)
             most = max(count.values())
             crowd = [each for each in self._open if count[each.address] == most]
-            # A client that has sent a whole message finishes soon; others may never send one.
+            # A client that has sent a whole message will finish soon. Other clients may never send
+            # one.
             min(crowd, key=lambda each: each.has_replied).abort()
 
     def remove(self, one: "FirstBytes") -> None:
-        """Forget a connection: its handshake has ended, or the connection is lost."""
+        """Remove a connection after the end of its handshake or the loss of the connection."""
         self._waiting.pop(one, None)
         timer = self._open.pop(one, None)
         if timer is not None:
@@ -80,14 +81,14 @@ class Handshakes:
             one.abort()
 
     def take_turn(self, one: "FirstBytes") -> None:
-        """Continue a handshake now, or later if handshakes took much time."""
+        """Continue a handshake now, or later if handshakes have used up their share of time."""
         if one not in self._waiting:
             self._waiting[one] = None
         if not self._is_timed:
             self._next()
 
     def _next(self) -> None:
-        """Continue one waiting handshake; the duration determines the time of the next one."""
+        """Continue one waiting handshake; its duration determines when the next one continues."""
         self._is_timed = False
         loop = asyncio.get_running_loop()
         if loop.time() < self._free_s:
@@ -109,14 +110,14 @@ class Handshakes:
 
 
 class FirstBytes(asyncio.Protocol):
-    """The protocol of a new connection, until its first bytes have shown TLS or plain HTTP."""
+    """The protocol of a new connection until its first bytes show TLS or plain HTTP."""
 
     def __init__(self, handshakes: Handshakes, make: Callable[[], asyncio.Protocol]) -> None:
         """Prepare.
 
         Args:
             handshakes: the unfinished handshakes of the server.
-            make: function that returns the protocol of HTTP.
+            make: function that creates the HTTP protocol.
         """
         self._handshakes = handshakes
         self._make = make
@@ -133,7 +134,7 @@ class FirstBytes(asyncio.Protocol):
         self._handshakes.add(self)
 
     def data_received(self, data: bytes) -> None:
-        """Begin a handshake, or pass plain HTTP on."""
+        """Begin a handshake, or pass plain HTTP to its protocol."""
         if self._tcp is None:
             return
         next_one: asyncio.Protocol
@@ -162,12 +163,12 @@ class FirstBytes(asyncio.Protocol):
         return self._secure is not None and self._secure.has_replied
 
     def continue_handshake(self) -> None:
-        """Process the received data of the handshake."""
+        """Process the received handshake data."""
         if self._secure is not None:
             self._secure.continue_handshake()
 
     def abort(self) -> None:
-        """Close the connection, whose handshake took too long or too much room."""
+        """Close the connection because its handshake exceeded a limit."""
         self._handshakes.remove(self)
         if self._tcp is not None:
             self._tcp.abort()

@@ -1,8 +1,8 @@
-"""Plain HTTP on a port with TLS, and TLS that a web server in front of URC provides.
+"""Plain HTTP on a TLS port, and TLS from a web server in front of URC.
 
-Layer 5. Two small ASGI middlewares around the application. `TlsPort` redirects plain HTTP to HTTPS.
-Plain HTTP has three exceptions: connections of this machine, STOP, and the pages that a device
-needs before it trusts the certificate. `BehindProxy` gives requests to a public name its scheme.
+Layer 5. The module contains two ASGI middlewares around the application. `TlsPort` redirects plain
+HTTP to HTTPS. Exceptions are connections from this machine, STOP, and the pages that a device needs
+before it trusts the certificate. `BehindProxy` sets the secure scheme of requests to public names.
 """
 
 import ipaddress
@@ -34,21 +34,22 @@ _PLAIN = re.compile(
 
 
 class TlsPort:
-    """The middleware of a port with TLS."""
+    """The middleware of a TLS port."""
 
     def __init__(self, app: ASGIApp, allowed_hosts: Iterable[str] = ()) -> None:
         """Prepare.
 
         Args:
             app: the application.
-            allowed_hosts: names to redirect, besides addresses and the names of this machine.
+            allowed_hosts: additional host names to redirect, besides addresses and this machine's
+                names.
         """
         self._app = app
         self._names = own_names() | {one.lower().removesuffix(".") for one in allowed_hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward the request, or redirect it to HTTPS."""
-        is_secure = scope.get("scheme", "https") in ("https", "wss")  # a lifespan has no scheme
+        is_secure = scope.get("scheme", "https") in ("https", "wss")  # a lifespan lacks a scheme
         if is_secure or _may_be_plain(scope):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -58,20 +59,20 @@ class TlsPort:
 
 
 class BehindProxy:
-    """The middleware of a server with public names, whose TLS ends at a web server in front."""
+    """The middleware of a server with public names behind a web server that provides TLS."""
 
     def __init__(self, app: ASGIApp, names: Iterable[str]) -> None:
         """Prepare.
 
         Args:
             app: the application.
-            names: public host names with an optional port, as in the address bar of browsers.
+            names: public host names with an optional port, as in a browser's address bar.
         """
         self._app = app
         self._names = {one for one in map(parse_host, names) if one is not None}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward the request, with a secure scheme if its host is a public name."""
+        """Forward the request, with the secure scheme if its host is a public name."""
         if scope["type"] != "lifespan" and _host(scope) in self._names:
             scope = {**scope, "scheme": _SECURE.get(scope["scheme"], scope["scheme"])}
         await self._app(scope, receive, send)
@@ -88,7 +89,7 @@ def _may_be_plain(scope: Scope) -> bool:
 
 
 def _is_near(place: tuple[str, int | None] | None) -> bool:
-    """Return whether an end of a connection has a loopback address."""
+    """Return whether one end of a connection has a loopback address."""
     try:
         return place is not None and unmapped(ipaddress.ip_address(place[0])).is_loopback
     except ValueError:
@@ -96,7 +97,7 @@ def _is_near(place: tuple[str, int | None] | None) -> bool:
 
 
 def _redirect(scope: Scope, names: frozenset[str]) -> ASGIApp:
-    """Return the response to a plain request that needs HTTPS."""
+    """Return the response to a plain HTTP request that requires HTTPS."""
     host = _host(scope)
     headers = {name.decode(): value.decode() for name, value in REFUSAL_HEADERS}
     headers["cache-control"] = "no-store"
@@ -108,7 +109,7 @@ def _redirect(scope: Scope, names: frozenset[str]) -> ASGIApp:
     port = "" if host.port is None else f":{host.port}"
     query = scope["query_string"].decode("latin-1")
     path = "/" + quote(scope["path"].lstrip("/")) + (f"?{query}" if query else "")
-    # Temporary: the same address may serve plain HTTP after the next start.
+    # The redirect is temporary, because the address may serve plain HTTP after the next start.
     return RedirectResponse(f"https://{host.host}{port}{path}", 307, headers)
 
 

@@ -1,4 +1,4 @@
-"""Visitors: the identity of each request, and its present rights.
+"""Visitors: the identity of each request, and its current rights.
 
 Layer 5. Pure.
 """
@@ -17,26 +17,26 @@ __all__ = ["Visitor", "VisitorRights", "is_loopback", "peer_of", "visitor_of"]
 
 
 class VisitorRights(Protocol):
-    """The part of `urc.web.serve.access.Access` that visitors use."""
+    """The interface of `urc.web.serve.access.Access` for visitors."""
 
     def role(self, who: Identity, robot: str = "") -> Role | None:
-        """Return the present role of `who` at a robot; "" asks for the whole server."""
+        """Return the current role of `who` at a robot; "" stands for the whole server."""
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest present role of `who` at any robot."""
+        """Return the highest current role of `who` at any robot."""
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether the scope of a token contains a command; "": all commands."""
+        """Return whether a token permits a command; "" stands for all commands."""
 
     def signed_in_s(self, who: Identity) -> float:
         """Return the time since the sign-in of `who`, in seconds."""
 
     def is_local(self, who: Identity) -> bool:
-        """Return whether `who` is the local user, with a sign-in that has not ended."""
+        """Return whether `who` is the local user with a valid sign-in."""
 
 
 class Visitor:
-    """The sender of a request."""
+    """The sender of a request, with its current rights."""
 
     __slots__ = ("_rights", "identity", "is_program")
 
@@ -46,10 +46,10 @@ class Visitor:
         """Keep the identity.
 
         Args:
-            rights: source of the present rights.
+            rights: source of the current rights.
             identity: the proven identity; `NOBODY` for an unknown visitor.
-            is_program: whether the request carries a token, valid or not; a page of another site
-                cannot send such a request.
+            is_program: whether the request contains a token, valid or not. Pages of other sites
+                cannot send such requests.
         """
         self._rights = rights
         self.identity = identity
@@ -62,14 +62,14 @@ class Visitor:
 
     @property
     def is_local(self) -> bool:
-        """Whether the visitor is the local user now."""
+        """Whether the visitor is currently the local user."""
         return self._rights.is_local(self.identity)
 
     @property
     def is_fresh(self) -> bool:
         """Whether the visitor has signed in within the last `FRESH_S` seconds.
 
-        The local user and programs have no second sign-in, so they always count as fresh.
+        The local user and programs cannot sign in again, so they always count as fresh.
         """
         if self.is_local or self.identity.way == "token":
             return True
@@ -77,20 +77,20 @@ class Visitor:
 
     @property
     def client(self) -> str:
-        """Identifier by which the visitor's requests are counted; "" for an unknown visitor.
+        """Identifier for counting the visitor's requests; "" for an unknown visitor.
 
-        The browsers of the local user are counted one by one, because several people may use the
-        start key.
+        The local user's browsers are counted separately, because several people may use the start
+        key.
         """
         who = self.identity
         return who.sign_in if self.is_local else who.principal
 
     def role(self, robot: str = "") -> Role | None:
-        """Return the present role at a robot; "" asks for the whole server."""
+        """Return the current role at a robot; "" stands for the whole server."""
         return self._rights.role(self.identity, robot)
 
     def best_role(self) -> Role | None:
-        """Return the highest present role at any robot."""
+        """Return the highest current role at any robot."""
         return self._rights.best_role(self.identity)
 
     def may_give(self, command: str) -> bool:
@@ -98,10 +98,10 @@ class Visitor:
         return self._rights.may_give(self.identity, command)
 
     def may(self, right: Right, robot: str = "") -> bool:
-        """Return whether the visitor has a right now, at `robot` if the right is for one robot.
+        """Return whether the visitor currently has a right; `robot` is for rights at one robot.
 
-        A token for single commands maintains and administers nothing: its role only admits it to
-        its commands.
+        A token for single commands never permits maintenance or administration, regardless of its
+        role.
         """
         if right.role is None:
             return True
@@ -115,7 +115,7 @@ class Visitor:
 
 
 class _RobotRights:
-    """The present rights of a visitor at one robot; see `urc.web.feed.client_socket.PeerRights`."""
+    """A visitor's current rights at one robot; see `urc.web.feed.client_socket.PeerRights`."""
 
     def __init__(self, visitor: Visitor, robot: str, *, only_watches: bool) -> None:
         self._visitor = visitor
@@ -123,7 +123,7 @@ class _RobotRights:
         self._only_watches = only_watches
 
     def role(self) -> Role | None:
-        """Return the present role."""
+        """Return the current role."""
         role = self._visitor.role(self._robot)
         return "watch" if self._only_watches and role is not None else role
 
@@ -133,18 +133,18 @@ class _RobotRights:
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:
-    """Return the visitor that the page policy has identified for a request."""
+    """Return the visitor of a request, as identified by the page policy."""
     found: Visitor = connection.state.visitor
     return found
 
 
 def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = False) -> SocketPeer:
-    """Return the visitor of a robot's socket, with its present rights at the robot.
+    """Return the visitor of a robot's socket, with its current rights at the robot.
 
     Args:
         connection: the handshake.
         robot: name of the robot.
-        only_watches: whether the page gives no commands, as a page with ``?watch``.
+        only_watches: whether the page may only watch; pages with ``?watch`` always only watch.
     """
     visitor = visitor_of(connection)
     host = connection.client.host if connection.client else ""
@@ -160,7 +160,7 @@ def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = Fals
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether an address belongs to this machine itself."""
+    """Return whether an address is a loopback address of this machine."""
     try:
         return ip_address(host.partition("%")[0]).is_loopback
     except ValueError:

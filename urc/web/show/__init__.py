@@ -1,1 +1,1 @@
-"""The pages and their parts."""
+"""Rendering of pages and their parts."""

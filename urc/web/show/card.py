@@ -1,7 +1,7 @@
-"""The image on a robot's card on the menu: its camera, its pose in the world, or its main values.
+"""The content of a robot's card on the menu: a camera image, the pose in the world, or main values.
 
 Layer 5. A card never connects a robot. An emulated robot shows its simulated world. A real robot
-shows data only while a page is connected, and afterwards the last image.
+shows data while it is connected, and the last image afterwards.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,23 +21,23 @@ from urc.web.words import t
 __all__ = ["VALUES", "Cards", "small_values"]
 
 VALUES = 4
-"""Maximum number of values on a card without an image."""
+"""Maximum number of displayed values on a card without an image."""
 _FRESH = {"cache-control": "no-store"}
 _UNSHOWN = ("image", "blob", "array")
 
 
 class Cards:
-    """The route that serves the current content of the cards on the menu.
+    """The route for the current content of the menu's cards.
 
     Args:
-        services: the served robots, by the name in their URL.
+        services: function that returns the robots' services, keyed by the robots' names in URLs.
     """
 
     def __init__(self, services: Callable[[], Mapping[str, RobotService]]) -> None:
         self._services = services
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the route for the content of cards."""
+        """Return the route for card contents."""
         return [ProtectedRoute("/robots/{name}/card", self.card, WATCH)]
 
     async def card(self, request: Request) -> Response:
@@ -61,7 +61,7 @@ class Cards:
 
 
 def small_values(driver: Driver, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Return the title and the text of the robot's first values that fit on a card."""
+    """Return title and text of the robot's first values, as many as a card can show."""
     found = [
         (one.title or spoken(name), _text(one, readings[name]))
         for name, one in driver.signals.items()

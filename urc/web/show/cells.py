@@ -1,6 +1,6 @@
-"""One cell of a page: the markup of its widget, and the configuration for the widget's module.
+"""One cell of a page: the widget's markup, and the configuration for the widget's module.
 
-Layer 5. Widget templates come from packages. Widget templates run in a sandbox, and a failed
+Layer 5. Packages provide the widget templates. The templates run in a sandbox, and a failed
 template affects only its own cell.
 """
 
@@ -37,48 +37,48 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One slot of the grid, with the markup of its widget."""
+    """One slot of the grid, with its widget's markup."""
 
     index: int
-    """Number of the cell on the page, as used in the CSS rules of the grid."""
+    """Number of the cell on the page, used in the grid's CSS rules."""
     config: str
     """JSON for the widget host: slot, widget, inputs, outputs (see ``output.js``), options,
     title."""
     html: Markup
-    """Rendered template of the widget; "" if the template failed."""
+    """Rendered template of the widget; "" after a failure."""
     error: str
-    """Reason why the widget's template failed; "" on success."""
+    """Reason for the template's failure; "" on success."""
     is_background: bool
     frame: str = ""
     """URL of the widget's frame; "" for a widget that runs in the page."""
     footprint: Footprint = "instrument"
     is_picture: bool = False
-    """Whether the widget shows an image of a camera."""
+    """Whether the widget shows a camera image."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetContext:
     """Context of ``widgets/*/template.html.j2``; its fields are the variables of the template.
 
-    The page shows the markup before the widget's module has loaded. The markup must therefore be
-    understandable without any value.
+    The page shows the markup before the widget's module has loaded, so the markup must be
+    understandable without values.
     """
 
     title: str
-    """Title of the slot. If the slot has no title: the title of the first required signal, the
+    """Title of the slot. Without a slot title, this is the title of the first required signal, the
     first command, the first signal or the widget, in this order."""
     options: Mapping[str, object]
     """Checked options. Every declared option has a key; None means that the option has no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Signal of each input, or list of signals of each multiple input, by name of the input.
+    """Signal of each input, or list of signals of each multiple input, by input name.
     Unbound inputs are omitted."""
     widget: str
     """The widget's name."""
     uid: str
     """Identifier that is unique on the page, for ``id`` and ``aria-labelledby``."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Readable name of each output's command, by name of the output. Unbound outputs are omitted,
-    so a widget can leave out their controls."""
+    """Readable name of each output's command, by output name. Unbound outputs are omitted, so that
+    a widget can omit their controls."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
@@ -88,11 +88,11 @@ def render_widget(widget: Widget, context: WidgetContext) -> Markup:
 
 
 def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust) -> None:
-    """Render the markup of all third-party widgets of a page in one step, to save time.
+    """Render the markup of all third-party widgets on a page in one step, to save time.
 
     Args:
-        uses: the widget uses in the order of the cells, each with the profile of its robot.
-        trust: rule that distinguishes third-party widgets from trusted widgets.
+        uses: the widget uses in cell order, each with its robot's profile.
+        trust: rule that identifies third-party widgets.
     """
     wanted = []
     for index, (use, profile) in enumerate(uses):
@@ -102,7 +102,7 @@ def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust
                 context = widget_context(use, widget, profile, uid=f"cell-{index}")
                 wanted.append((_source(widget), _variables(context)))
             except OSError:
-                continue  # its cell shows the error
+                continue  # the widget's cell shows the error
     markup_of(wanted)
 
 
@@ -128,10 +128,10 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
-    """Return the subject of a widget: its first required signal, or else its command.
+    """Return the name of a widget's subject: its first required signal, or else its command.
 
-    An optional output is not the subject: the subject of a camera widget with pan and tilt is the
-    camera.
+    An optional output is not the subject. For example, the subject of a camera widget with pan and
+    tilt is the camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
@@ -171,7 +171,7 @@ def widget_cell(
             error = fault and f"{TEMPLATE}:{line}: {fault}"
         else:
             html = render_widget(widget, context)
-    except Exception as problem:  # a supervisor: a widget may only break its own cell
+    except Exception as problem:  # a supervisor: a faulty widget must affect only its own cell
         place = f"{TEMPLATE}:{fault_line(problem)}"
         error = f"{place}: {type(problem).__name__}: {problem}"
     if error:

@@ -29,7 +29,7 @@ _TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """Return the schema of a mapping that allows exactly the keys in `properties`."""
+    """Return the schema of a mapping that permits only the keys in `properties`."""
     return {
         "title": title,
         "type": "object",
@@ -48,7 +48,7 @@ _VALUE: Final = {
     "items": {"enum": _ELEMENTS},
     "size": _COUNT,
 }
-"""Properties that signals and arguments have in common."""
+"""Common properties of signals and arguments."""
 _SIGNAL: Final = _mapping(
     "signal of a demo",
     {
@@ -99,8 +99,8 @@ _FOLLOW: Final = dict.fromkeys(
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
     """Return all problems of a demo.
 
-    The states of a demo refer to the demo's bindings. The options of states are therefore checked
-    only if the bindings are valid.
+    A demo's states refer to its bindings, so the options of states are checked only if the bindings
+    are valid.
     """
     data = document.data
     problems = check_inline(document, (), data, _demo(widget, data))
@@ -147,7 +147,7 @@ def _part(data: Any, key: str) -> dict[str, Any]:
 def _state(
     bound: Mapping[str, Any], signals: Mapping[str, Any], outputs: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the schema of a state, for the signals of the state and of the whole demo."""
+    """Return the schema of a state, given the signals of the state and of the whole demo."""
     values = {name: _values(given) for name, given in signals.items()}
     past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
     answered = {*outputs, *_commands(outputs.values())}
@@ -177,14 +177,14 @@ def _values(given: Any) -> dict[str, Any]:
 
 
 def _ages(names: Iterable[str]) -> dict[str, Any]:
-    """Return the schema of ages: one age for all signals, or one age for each signal."""
+    """Return the schema of ages: one age for all signals, or one age per signal."""
     age = {"if": {"type": "array"}, "then": {"items": _NUMBER}, "else": _NUMBER}
     named = _mapping("the signals of this demo", dict.fromkeys(names, age))
     return {"type": ["number", "object"], "if": {"type": "object"}, "then": named}
 
 
 def _single(signals: Mapping[str, Any]) -> list[str]:
-    """Return the names of single signals; a list of signals results in one name per element."""
+    """Return the names of single signals; a list of signals adds one name per element."""
     names = []
     for name, given in signals.items():
         many = isinstance(given, list)

@@ -1,4 +1,4 @@
-"""A widget's ``demo.yaml``: its states, each represented by a small robot with fixed values.
+"""A widget's ``demo.yaml``: its states, each as a small robot with fixed values.
 
 Layer 5. The gallery, the tests and the images of the manual use these states.
 """
@@ -28,7 +28,7 @@ from urc.web.wire.messages import encode_hello
 __all__ = ["WidgetState", "demo_states", "colour_bars"]
 
 PICTURE_BYTES = 4 << 20
-"""Maximum size of an image in a demo, in bytes."""
+"""Maximum size of a demo image, in bytes."""
 _BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
 
 
@@ -38,11 +38,11 @@ class WidgetState(NamedTuple):
     name: str
     use: WidgetUse
     profile: Profile
-    """Profile of a robot with only this widget and no connection."""
+    """Profile of a robot with only this widget and without connections."""
     news: str
     """Values of the robot, as JSON for ``gallery.js``."""
     shows: tuple[str, ...]
-    """Texts that the widget must show in this state."""
+    """Required texts of the widget in this state."""
 
 
 def demo_states(widget: Widget) -> list[WidgetState]:
@@ -93,7 +93,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
 def _signals(
     declared: Mapping[str, Any],
 ) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the signals, the bindings of single inputs, and the bindings of multiple inputs."""
+    """Return the signals, and the bindings of single inputs and multiple inputs."""
     signals: dict[str, Signal] = {}
     inputs: dict[str, str] = {}
     lists: dict[str, tuple[str, ...]] = {}
@@ -186,7 +186,7 @@ def _nth(given: Any, place: int) -> Any:
 def _images(
     widget: Widget, document: Document, state: str, shown: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the images among the values of a state, by signal name."""
+    """Return the images among a state's values, by signal name."""
     images = {}
     for name, value in (shown.get("values") or {}).items():
         try:
@@ -231,7 +231,7 @@ def _file(folder: Path, name: str) -> bytes:
 
 
 def colour_bars(width: int, height: int) -> bytes:
-    """Return a PNG with colour bars above a grey ramp; equal sizes return equal bytes."""
+    """Return a PNG with colour bars above a grey ramp; the bytes depend only on the size."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
         raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))

@@ -1,8 +1,8 @@
-"""Routes of the files and third-party pages that a robot's documents name for their widgets.
+"""Routes of the files and third-party pages that a robot's documents list for widgets.
 
-Layer 5. A document without scripts displays a third-party page in a frame. The policy of the
-dashboard allows only frames from the dashboard's own origin. The document around the third-party
-page has a separate policy, which allows only the origin in the widget's option.
+Layer 5. A document without scripts displays a third-party page in a frame. The dashboard's policy
+permits only frames from the dashboard's own origin. The document around the third-party page has a
+separate policy, which permits only the origin in the widget's option.
 """
 
 import base64
@@ -45,18 +45,18 @@ class FramedPage:
     title: str
     """Host name of the third-party page."""
     url: str
-    """URL of the third-party page; "" if the page is refused."""
+    """URL of the third-party page; "" for a refused page."""
     fault: str
-    """Reason for the refusal, in one line; "" if the page is shown."""
+    """Reason for a refusal, in one line; otherwise ""."""
     style: Markup = _STYLE
-    """Exact text of the style, because the policy contains its digest."""
+    """Exact style text, because the policy contains its digest."""
 
 
 class ExternalPages:
-    """The routes.
+    """The routes of files and third-party pages.
 
     Args:
-        robots: the served robots, by the name in their URL.
+        robots: function that returns the served robots, keyed by their names in URLs.
     """
 
     def __init__(self, robots: Callable[[], Mapping[str, Robot]]) -> None:
@@ -83,9 +83,9 @@ class ExternalPages:
 
 
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
-    """Return the document around a page that an option names; respond with 404 for any other.
+    """Return the document around a page from a widget option; respond with 404 for other pages.
 
-    A page of this server is refused, because such a page could access the dashboard from the frame.
+    Pages of this server are refused, because they could access the dashboard from the frame.
     """
     pages = (many for use in uses_of(profile) for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}

@@ -1,7 +1,7 @@
-"""The document for a frame with a third-party widget: an empty cell and an import map.
+"""The document in the frame of a third-party widget: an empty cell and an import map.
 
-Layer 5. The document contains no data of a robot; the page passes in the markup and values
-(``frame_host.js``). The policy of the document allows code from a few paths, and blocks all other
+Layer 5. The document contains no robot data; the page passes in the markup and values
+(``frame_host.js``). The document's policy permits code from a few paths, and blocks all other
 network access.
 """
 
@@ -29,11 +29,11 @@ class FramePage:
 
     title: str
     import_map: Markup
-    """Exact text of the JSON, because the policy contains its digest."""
+    """Exact JSON text, because the policy contains its digest."""
     style: str
     """URL of the widget's style sheet."""
     place: str
-    """Path prefix of the files that the frame loads."""
+    """Path prefix of the frame's files."""
 
 
 class FrameDocuments:
@@ -41,7 +41,7 @@ class FrameDocuments:
 
     Args:
         modules: import map of the pages.
-        has: function that returns whether a widget with a given name exists.
+        has: function that returns whether a named widget exists.
         place: path prefix of code for frames.
     """
 
@@ -64,6 +64,6 @@ class FrameDocuments:
         return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
 
     def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the import map with the path prefix for frames added to each URL."""
+        """Return the import map with the frames' path prefix before each URL."""
         imports = cast("Mapping[str, str]", modules["imports"])
         return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}

@@ -1,4 +1,4 @@
-"""The gallery: every widget in all states of its demo, without a robot.
+"""The gallery: every widget in all its demo states, without a robot.
 
 Layer 5. The script ``gallery.js`` simulates the robot in the page, so the page opens no socket and
 sends nothing.
@@ -41,7 +41,7 @@ class Found(NamedTuple):
 
     folder: Path
     widget: Widget | None
-    """The widget that the manifest describes; None for an invalid manifest."""
+    """The widget described by the manifest; None for an invalid manifest."""
     problems: tuple[Problem, ...] = ()
     """Problems in the manifest."""
 
@@ -51,8 +51,8 @@ class WidgetLookup:
 
     Args:
         profiles: function that returns the profiles of the served robots.
-        is_fresh: whether each look-up reads the manifest again; if false, the widgets loaded by
-            robots are used.
+        is_fresh: whether each look-up reads the manifest again; if false, look-ups return the
+            robots' loaded widgets.
     """
 
     def __init__(self, profiles: Callable[[], Iterable[Profile]], *, is_fresh: bool) -> None:
@@ -85,7 +85,7 @@ class WidgetLookup:
         return next(iter(mine), None) or next(in_folder, None)
 
     def _registries(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
-        """Return the folders of widgets; URC's folder is first and takes precedence."""
+        """Return the widget folders; URC's folder is first and takes precedence."""
         files = dict.fromkeys(one.file for one in profiles)
         return [WidgetFolder(shipped("widgets")), *(widget_folder_of(file) for file in files)]
 
@@ -98,13 +98,13 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function marks the text for the catalogues; pages translate the text with `t`.
+    The function marks the text for the catalogues; pages translate it with `t`.
     """
     return text
 
 
 EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
-"""Names of states that most widgets have; a demo may add further states."""
+"""Names of common states; a demo may add further states."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Maximum number of widgets on one page."""
@@ -122,7 +122,7 @@ class GalleryEntry:
     summary: str
     url: str
     fault: str
-    """Reason why the widget cannot be shown; "" if the widget can be shown."""
+    """Reason why the widget cannot be shown; "" if it can."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,25 +141,25 @@ class DemoView:
     widget: str
     state: str
     label: str
-    """Name of the state; common names are translated."""
+    """Name of the state; common state names are translated."""
     title: str
     cell: Cell
     news: str
 
 
 class WidgetView(NamedTuple):
-    """One widget on a page of the gallery."""
+    """One widget on a gallery page."""
 
     name: str
     widget: Widget | None
     states: list[WidgetState]
     problems: tuple[Problem, ...] = ()
-    """Problems that prevent the states of the widget from being shown."""
+    """Problems in the widget, which prevent the display of its states."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetProblem:
-    """One problem of a widget that cannot be shown."""
+    """One problem in a widget that cannot be shown."""
 
     line: str
     """Location and description."""
@@ -168,7 +168,7 @@ class WidgetProblem:
 
 @dataclass(frozen=True, slots=True)
 class DemoPage:
-    """Context of ``widget.html.j2``: widgets in the states of their demos."""
+    """Context of ``widget.html.j2``: widgets in their demo states."""
 
     head: PageHead
     title: str
@@ -177,10 +177,9 @@ class DemoPage:
     faults: tuple[WidgetProblem, ...]
     """Problems of widgets that cannot be shown."""
     stamp_url: str
-    """URL that returns the current stamp, for reloads after an edit; "" for a page without
-    reloads."""
+    """URL of the current stamp, for reloads after an edit; "" for a page without reloads."""
     stamp: str
-    """The stamp of the widget files, computed before the files were read."""
+    """Stamp of the widget files, computed before the files were read."""
 
 
 class Gallery:
@@ -189,9 +188,9 @@ class Gallery:
     Args:
         modules: import map of the pages.
         profiles: function that returns the profiles of the served robots.
-        is_dev: whether pages reload when a file of their widgets is saved.
+        is_dev: whether pages reload when one of their widgets' files is saved.
         ways: navigation links of this server.
-        trust: rule that distinguishes third-party widgets from trusted widgets.
+        trust: rule that identifies third-party widgets.
     """
 
     def __init__(
@@ -209,10 +208,10 @@ class Gallery:
         self._ways = ways
         self._trust = trust
         self.assets = Assets()
-        """Files of the shown widgets, including widgets that no robot uses."""
+        """Files of the shown widgets, including unused widgets."""
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the gallery, which must precede the route of the widget files."""
+        """Return the gallery's routes, which must precede the route of the widget files."""
         return [
             ProtectedRoute("/widgets", self.index, SIGNED_IN),
             ProtectedRoute("/widgets/", self.index, SIGNED_IN),
@@ -230,7 +229,7 @@ class Gallery:
         )
 
     async def demo(self, request: Request) -> Response:
-        """Show one widget, or several widgets whose names are joined by plus signs."""
+        """Show one widget, or several widgets with names joined by plus signs."""
         names = self._names(request)
         # Taken before the files are read, so that no change is missed.
         stamp = await asyncio.to_thread(self._stamp, names) if self._is_dev else ""
@@ -266,7 +265,7 @@ class Gallery:
         )
 
     async def stamp(self, request: Request) -> Response:
-        """Return a stamp that changes whenever a file of the widgets is saved."""
+        """Return a stamp that changes whenever a widget file is saved."""
         if not self._is_dev:
             raise HTTPException(404)
         stamp = await asyncio.to_thread(self._stamp, self._names(request))
@@ -328,7 +327,7 @@ def _exhibits(shown: Iterable[WidgetView], trust: WidgetTrust) -> Iterable[DemoV
 
 
 async def with_slash(request: Request) -> Response:
-    """Redirect to the same path with a final slash."""
+    """Redirect to the same path with a trailing slash."""
     return RedirectResponse(request.url.replace(path=f"{request.url.path}/").path, 308)
 
 

@@ -1,6 +1,6 @@
 """Selection of a robot's interface and its pages.
 
-Layer 5. Pure. Each robot has a generated debug interface in addition to its designed interfaces.
+Layer 5. Pure. Each robot also has a generated debug interface.
 """
 
 import json
@@ -42,7 +42,7 @@ path is the page of the robot; ``interfaces.js`` writes the cookie.
 
 @dataclass(frozen=True, slots=True)
 class InterfaceChoice:
-    """An interface that the operator can choose for a robot."""
+    """A choice in a robot's list of interfaces."""
 
     name: str
     title: str
@@ -62,11 +62,11 @@ class PageTab:
 
 @dataclass(frozen=True, slots=True)
 class DebugPart:
-    """Context of ``debug.html.j2``: all signals and commands of a robot."""
+    """Context of ``debug.html.j2``: all of a robot's signals and commands."""
 
     signals: tuple[Signal, ...]
     commands: str
-    """Commands as a JSON list for ``debug_commands.js``."""
+    """JSON list of commands for ``debug_commands.js``."""
     count: int
     """Number of commands."""
     wire: str
@@ -80,8 +80,7 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
     Args:
         profile: profile of the robot.
         wanted: name of the interface in the URL; None for a URL without an interface.
-        kept: name of the interface that the device showed last; ignored if this interface no longer
-            exists.
+        kept: name of the device's last shown interface; ignored if the interface no longer exists.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
     if wanted is not None:
@@ -92,13 +91,13 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
 def choices(
     profile: Profile, interface: Interface, url: str, more: str
 ) -> tuple[InterfaceChoice, ...]:
-    """Return all interfaces of a robot, the debug interface last.
+    """Return all interfaces of a robot, with the debug interface last.
 
     Args:
         profile: profile of the robot.
-        interface: the interface that is shown.
+        interface: the shown interface.
         url: path of the robot's page.
-        more: text to append to each URL.
+        more: suffix of each URL.
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(
@@ -123,7 +122,7 @@ def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
 
 
 def is_turned(interface: Interface, slots: tuple[str, ...]) -> bool:
-    """Return whether a phone shows the designed layout only in landscape."""
+    """Return whether phones show the designed layout only in landscape."""
     return any(needs_turning(page, slots) for page in interface.pages)
 
 

@@ -1,10 +1,10 @@
-"""Rendering of third-party widget templates in a separate process with limited memory and time.
+"""Rendering of third-party widget templates in a separate process, with memory and time limits.
 
-``python -m urc.web.show.isolated_markup`` reads templates and their variables as JSON from standard
+``python -m urc.web.show.isolated_markup`` reads templates and variables as JSON from standard
 input, and writes the markup to standard output. Layer 5.
 
-The template sandbox blocks access to Python objects, but cannot stop endless loops. The markup is
-cached, because it depends only on the template, the variables and the language.
+The template sandbox blocks access to Python objects but cannot stop endless loops. Markup is
+cached, because it depends only on template, variables and language.
 """
 
 import json
@@ -26,8 +26,8 @@ __all__ = ["MOST_CHARACTERS", "RenderedMarkup", "markup_of"]
 MOST_CHARACTERS: Final = 65536
 """Maximum number of characters in the markup of one cell."""
 TOTAL_S: Final = 20.0
-"""Time limit for rendering several templates together, in seconds; long enough for slow or busy
-machines."""
+"""Time limit for rendering several templates together, in seconds. It is long enough for slow or
+busy machines."""
 PROCESSOR_S: Final = 4
 MEMORY_BYTES: Final = 512 << 20
 _COMMAND: Final = ("-P", "-m", "urc.web.show.isolated_markup")
@@ -38,11 +38,11 @@ class RenderedMarkup(NamedTuple):
     """The result of rendering one template."""
 
     html: Markup
-    """The rendered markup; "" after a failure."""
+    """Rendered markup; "" after a failure."""
     fault: str
     """Reason for the failure, in one line; "" on success."""
     line: int = 1
-    """Line of the template at which the rendering failed, counted from 1."""
+    """Template line of the failure, counted from 1."""
 
 
 _made: dict[str, RenderedMarkup] = {}
@@ -50,9 +50,9 @@ _lock = Lock()
 
 
 def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[RenderedMarkup]:
-    """Return the markup of templates in the current language; block until all are rendered.
+    """Return the templates' markup in the current language; block until all are rendered.
 
-    Each element of `wanted` has the source and the variables of one template.
+    Each element of `wanted` contains one template's source and variables.
     """
     language = words.language.get()
     jobs = [json.dumps([language, source, _plain(variables)]) for source, variables in wanted]
@@ -68,7 +68,7 @@ def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[Render
 
 
 def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
-    """Return the markup of some templates; a crash of one does not affect the others."""
+    """Return the markup of templates; a crash in one template does not affect the others."""
     said = _asked(jobs)
     if said is not None:
         return said

@@ -1,21 +1,21 @@
-"""The layout of an interface as CSS: the position of each cell, for each kind of screen.
+"""The CSS layout of an interface: the position of each cell for each kind of screen.
 
 Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
 element.
 
-A row or column without a slot is a margin: the margin keeps its position, with an eighth of the
-normal size. Phones show no margins. A phone in portrait shows the grid ``phone_portrait``, else
-``portrait``, else ``landscape``. The grids ``portrait`` and ``landscape`` are stacked in reading
-order on such a phone if they have more than two columns. A phone in landscape shows the grid
-``phone_landscape``, else ``landscape``.
+A row or column without a slot is a margin. It keeps its position, with an eighth of the normal
+size. Phones show no margins. A phone in portrait shows the first available grid of
+``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``portrait`` or
+``landscape`` in reading order if the grid has more than two columns. A phone in landscape shows
+``phone_landscape``, or else ``landscape``.
 
-Over a background, each widget has the size of its footprint, at the side of the screen where its
-slot is. Empty rows and columns take the remaining space: there the background is visible. On a
-phone in portrait, the background takes the height that the widgets below leave.
+Over a background, each widget has the size of its footprint, and is at its slot's side of the
+screen. Empty rows and columns take the remaining space, where the background is visible. On a phone
+in portrait, the background takes the height above the widgets.
 
-STOP is at the bottom of the screen, in the middle. Widgets end above STOP. In the lower corners,
-sticks reach down next to it. Over a background, columns of buttons and values do, too, but a row of
-them stays a row.
+STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
+extend down next to it. Over a background, columns of buttons and values in the corners also extend
+down, but rows of them do not.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -35,36 +35,37 @@ SHORT = "(max-height: 29.999rem)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
 LEFT_HAND = ':root[data-hand="left"]'
-"""Selector for left-handed operators; ``handedness.js`` sets the attribute."""
+"""Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
-"""Height of a row on a phone in landscape; two rows of this height fit on the screen."""
+"""Row height on a phone in landscape; two such rows fit on the screen."""
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
-"""Sizes of rows and columns over a background: with a widget, and empty."""
+"""Sizes of rows and columns over a background, with a widget and empty."""
 _PHONE_WINDOW = "minmax(min-content,.01fr)"
-"""Size of an empty or growing row on a phone in portrait: the background takes nearly all space."""
+"""Size of an empty or growing row on a phone in portrait. The background takes nearly all space."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
-"""Height of the background on a phone in portrait: as much as the widgets below leave."""
+"""Height of the background on a phone in portrait: all space above the widgets."""
 _LOW_OVER = ("stick", "lever", "button", "value")
-"""Footprints that reach down next to STOP over a background; without one, only sticks do."""
+"""Footprints that extend down next to STOP over a background. Without a background, only sticks
+do."""
 _SHRINKING = ("value", "instrument", "view", "list")
-"""Footprints whose rows give way to sticks and buttons on a phone in landscape."""
+"""Footprints with rows that shrink for sticks and buttons on a phone in landscape."""
 _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-drive)"}
-"""Heights of footprints that have the same height on all pages."""
+"""Heights of footprints with a fixed height."""
 _SOFT = "minmax(3.625rem,max-content)"
-"""Height of such a row: at least that of a value."""
+"""Height of a shrinking row, at least the height of a value."""
 _SIDES = ("start", "center", "end")
 
 
 def grid_css(
     interface: Interface, slots: Sequence[str], footprints: Mapping[str, Footprint] = NOTHING
 ) -> str:
-    """Return the CSS rules for the cells, which are numbered in the order of `slots`.
+    """Return the CSS rules for the cells, numbered in the order of `slots`.
 
     Args:
         interface: the interface.
-        slots: names of the slots that have widgets.
-        footprints: footprint of the widget in each slot.
+        slots: names of the slots with widgets.
+        footprints: footprint of each slot's widget.
     """
     css = ""
     background = interface.background if interface.background in slots else ""
@@ -83,11 +84,11 @@ def grid_css(
 
 
 class _Canvas(NamedTuple):
-    """The slots of a page, and its background slot."""
+    """The slots of a page, with its background slot."""
 
     slots: Sequence[str]
     background: str = ""
-    """Slot behind all other slots, such as a camera; "": none."""
+    """Slot behind all other slots, for example with a camera; "" without a background."""
     footprints: Mapping[str, Footprint] = NOTHING
 
 
@@ -104,7 +105,7 @@ def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[
 
 
 def mirrored(grid: Layout) -> Layout:
-    """Return the grid with the order of its columns reversed."""
+    """Return the grid with its columns in reverse order."""
     slots = tuple(
         slot._replace(column=grid.columns - slot.column - slot.column_span) for slot in grid.slots
     )
@@ -112,7 +113,7 @@ def mirrored(grid: Layout) -> Layout:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone in portrait shows a layout that differs from the designed layout."""
+    """Return whether a phone in portrait shows another layout than the designed one."""
     base = _placed(page.layouts, _Canvas(slots)).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
@@ -139,7 +140,7 @@ def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
 
 
 def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas, hand: str = "") -> str:
-    """Return the rules for each screen; `hand` restricts them to left-handed operators."""
+    """Return the rules for each screen; `hand` restricts them to left-handed layouts."""
     css = ""
     for screen, grid in grids.items():
         rules = hand.join(("", *_rules(place, grid, canvas, screen)))
@@ -166,7 +167,7 @@ def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[s
 
 
 def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
-    """Return the sizes of rows and columns."""
+    """Return the row and column sizes as CSS."""
     row = _LOW_ROW if screen == SHORT else _USED_ROW
     column, empty_row, empty_column = _USED_COLUMN, _MARGIN, _MARGIN
     if canvas.background:
@@ -175,7 +176,7 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
     used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
     if canvas.background and len(used_rows) == grid.rows:
-        used_rows = used_rows - {grid.rows // 2}  # no row is empty: the middle one grows
+        used_rows = used_rows - {grid.rows // 2}  # no row is empty, so the middle row grows
     sizes = _tracks(grid.rows, used_rows, row, empty_row)
     if canvas.background:
         window = _PHONE_WINDOW if screen == PHONE else empty_row
@@ -188,10 +189,10 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
 
 
 def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str]) -> list[str]:
-    """Return the sizes of rows over a background.
+    """Return the row sizes over a background.
 
-    Next to a slot of several rows, such as a stick, only the first row grows: the widgets next to
-    it are a pile. On a low screen, rows of views give way.
+    Next to a slot with several rows, such as a stick, only the first row grows. The widgets next to
+    it are therefore close together. On a low screen, rows of views shrink.
     """
     firm = _used((slot.row, slot.row_span) for slot in grid.slots if _is_firm(slot, canvas))
     lower = _used((slot.row + 1, slot.row_span - 1) for slot in grid.slots)
@@ -216,7 +217,7 @@ def _is_firm(slot: Slot, canvas: _Canvas) -> bool:
 
 
 def _corners(grid: Layout, canvas: _Canvas) -> dict[str, str]:
-    """Return the width of the widget in the lower left and in the lower right corner, as CSS."""
+    """Return the CSS widths of the widgets in the lower left and lower right corners."""
     found = {"start": "0px", "end": "0px"}
     for slot in grid.slots:
         if _is_corner(slot, grid, canvas):
@@ -226,7 +227,7 @@ def _corners(grid: Layout, canvas: _Canvas) -> dict[str, str]:
 
 
 def _is_corner(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
-    """Return whether a slot reaches down next to STOP."""
+    """Return whether a slot extends down next to STOP."""
     is_last = slot.row + slot.row_span == grid.rows
     is_edge = slot.column == 0 or slot.column + slot.column_span == grid.columns
     if not (is_last and is_edge and slot.column_span < grid.columns):
@@ -238,7 +239,7 @@ def _is_corner(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
 
 
 def _has_neighbour(slot: Slot, grid: Layout) -> bool:
-    """Return whether another slot of the last row touches a slot."""
+    """Return whether a slot is next to another slot of the last row."""
     ends = (slot.column, slot.column + slot.column_span)
     return any(
         other.row + other.row_span == grid.rows
@@ -248,7 +249,7 @@ def _has_neighbour(slot: Slot, grid: Layout) -> bool:
 
 
 def _drops(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
-    """Return whether a slot is lower by the height of the dock: a corner, or in a pile on one."""
+    """Return whether a slot is lowered by the dock's height, because it is in or above a corner."""
     if _is_corner(slot, grid, canvas):
         return True
     if not canvas.background or _down(slot, grid) != "end":
@@ -263,17 +264,17 @@ def _drops(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
 
 
 def _across(slot: Slot, grid: Layout) -> str:
-    """Return the side of the screen at which a slot is: its left, middle or right third."""
+    """Return a slot's horizontal position: the left, middle or right third of the screen."""
     return _SIDES[_third(slot.column, slot.column_span, grid.columns)]
 
 
 def _down(slot: Slot, grid: Layout) -> str:
-    """Return the end of the screen at which a slot is: its upper half, else its lower half."""
+    """Return the vertical position of a slot: the upper or lower half of the screen."""
     return "start" if 2 * slot.row + slot.row_span < grid.rows else "end"
 
 
 def _beside(slot: Slot, grid: Layout) -> bool:
-    """Return whether a slot of one row is next to a slot of several rows."""
+    """Return whether a one-row slot is next to a slot with several rows."""
     return slot.row_span == 1 and any(
         tall.row_span > 1 and tall.row <= slot.row < tall.row + tall.row_span for tall in grid.slots
     )
@@ -284,7 +285,7 @@ def _third(first: int, span: int, count: int) -> int:
 
 
 def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> str:
-    """Return the rules of one cell; `is_below` if the background has the first row."""
+    """Return the rules of one cell; with `is_below`, the background takes the first row."""
     if slot is None:
         return "display:none"
     row, column = slot.row + 1 + is_below, slot.column + 1
@@ -319,7 +320,7 @@ def _cropped(grid: Layout) -> Layout:
 
 
 def _stacked(grid: Layout) -> Layout:
-    """Return the slots in one column in reading order."""
+    """Return the slots in one column, in reading order."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
     slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered))
     return Layout(len(slots), 1, slots)

@@ -1,7 +1,7 @@
-"""The menu of all served robots and their settings, and the navigation between pages.
+"""The menu with all served robots and their settings, and the navigation between pages.
 
-Layer 5. Pure. The template `menu.html.j2` gets a `MenuPage`; all pages around the dashboard have a
-`Nav`.
+Layer 5. Pure. The template `menu.html.j2` receives a `MenuPage`; all other pages except robot pages
+have a `Nav`.
 """
 
 from collections.abc import Mapping
@@ -23,10 +23,10 @@ __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_pag
 
 @dataclass(frozen=True, slots=True)
 class NavigationLinks:
-    """The navigation links that this server offers."""
+    """The navigation links of this server."""
 
     has_managers: bool = False
-    """Whether the pages for drivers, interfaces, widgets and settings exist."""
+    """Whether the server has pages for drivers, interfaces, widgets and settings."""
     has_dev: bool = False
     has_audit: bool = False
     """Whether the server has an audit log."""
@@ -34,14 +34,14 @@ class NavigationLinks:
 
 @dataclass(frozen=True, slots=True)
 class Nav:
-    """Context of ``nav.html.j2``: the navigation bar of the pages around the dashboard."""
+    """Context of ``nav.html.j2``: the navigation bar."""
 
     current: str
     """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
-    ``audit``, ``people``, ``account``, or "" for any other page."""
+    ``audit``, ``people`` or ``account``. "" for any other page."""
     ways: NavigationLinks
     is_sheet: bool = False
-    """Whether a narrow screen shows the links behind a button."""
+    """Whether narrow screens show the links behind a button."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class SettingRow:
     title: str
     name: str
     value: str
-    """Value of the setting for display; "" without a value."""
+    """Displayed value of the setting; "" without a value."""
     description: str
     is_missing: bool
 
@@ -61,32 +61,32 @@ class Card:
     """One robot, as shown on the menu."""
 
     name: str
-    """Name of the robot in URLs."""
+    """Robot's name in URLs."""
     title: str
     summary: str
     url: str
     link: str
-    """URL of the robot's page, or of its settings while a setting is missing; "" without both."""
+    """URL of the robot's page, or of its settings while a setting is missing; "" without a URL."""
     link_label: str
-    """Name of the link for screen readers."""
+    """Link name for screen readers."""
     driver: str
-    """Name and version of the driver's package, or name of its file."""
+    """Name and version of the driver's package, or the driver's file name."""
     interface: str
     """Title of the robot's first interface."""
     tags: tuple[str, ...]
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
-    """Titles of missing settings, which prevent a connection."""
+    """Titles of missing required settings."""
     missing_names: tuple[str, ...]
-    """Names of the missing settings, for use on a command line."""
+    """Names of the missing settings, for use on the command line."""
     initials: str
-    """One or two letters, shown without an image."""
+    """One or two letters, shown in place of a missing image."""
     settings_url: str = ""
-    """URL of the robot's settings; "" if the settings are fixed."""
+    """URL of the robot's settings page; "" without such a page."""
     dev_url: str = ""
     """URL of the robot's developer page; "" for a robot without a developer page."""
     is_live: bool = False
-    """Whether the card shows the state and an image of the robot."""
+    """Whether the card shows the robot's state and image."""
     is_emulated: bool = False
     fault: str = ""
     """Reason why the robot cannot be used; "" if it can."""
@@ -104,7 +104,7 @@ class MenuPage:
     tags: tuple[str, ...]
     """All tags of the robots, in alphabetical order."""
     states: object
-    """State of the robots in the form of the call ``/api/v1/robots``."""
+    """States of the robots, in the format of the API call ``/api/v1/robots``."""
 
 
 def menu_page(
@@ -120,11 +120,11 @@ def menu_page(
 
     Args:
         head: data for the head of the page.
-        robots: the robots, by the name in their URL, in the order of the page.
-        states: state of the robots, in the form of the call ``/api/v1/robots``.
+        robots: the robots in display order, keyed by their names in URLs.
+        states: states of the robots, in the format of the API call ``/api/v1/robots``.
         ways: navigation links of this server.
-        drivers: installed package of each robot with its version, by name of the robot.
-        broken: robots that cannot be used, by name.
+        drivers: installed package and version of each robot, by robot name.
+        broken: unusable robots, by name.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
@@ -138,7 +138,7 @@ def menu_page(
 
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:
-    """Return a setting in readable form; the value of a secret is hidden."""
+    """Return a setting in readable form, with a secret's value hidden."""
     if value is None or value == "":
         shown = ""
     elif setting.is_secret:
@@ -191,7 +191,7 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
 
 
 def _initials(title: str) -> str:
-    """Return the first letters of the first two words."""
+    """Return the initials of the first two words."""
     words = title.replace("-", " ").split()
     return "".join(word[0] for word in words[:2]).upper()
 

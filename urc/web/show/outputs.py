@@ -1,4 +1,4 @@
-"""The bindings of a widget as JSON for ``cell.js``, ``output.js`` and ``input.js``.
+"""A widget's bindings as JSON for ``cell.js``, ``output.js`` and ``input.js``.
 
 Layer 5. Pure.
 """
@@ -21,7 +21,7 @@ _NOTHING_GIVEN = OutputBinding()
 
 
 def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return the signals of the inputs, and their conversions to the widget's units."""
+    """Return the inputs' signals, and their conversions to the widget's units."""
     bound: dict[str, str | list[str]] = {**use.inputs}
     bound |= {name: list(many) for name, many in use.lists.items()}
     found: dict[str, list[dict[str, object] | None]] = {}
@@ -71,7 +71,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
 def _moves(command: Command, given: OutputBinding) -> bool:
     """Return whether the command with these fixed arguments always starts autonomous motion.
 
-    If the motion depends on a value that the operator chooses, the server checks the value.
+    If the motion depends on the operator's choice of a value, the server checks the value.
     """
     condition = command.moves_if
     is_told = condition is None or condition.names <= given.fixed.keys()
@@ -99,7 +99,7 @@ def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return the confirmations that a command, or a single value of an argument, requires."""
+    """Return the required confirmations of a command, and of single argument values."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]
@@ -118,14 +118,14 @@ def asked_before(command: Command | None) -> list[dict[str, object]]:
 
 
 def motion_lines(driver: Driver) -> list[str]:
-    """Return the transports over which STOP reaches the robot, without duplicates."""
+    """Return the transports of commands that stop motion, without duplicates."""
     stopping = [one for one in driver.commands.values() if one.hold is not None or one.stops]
     lines = [one.transport for one in stopping]
     return list(dict.fromkeys(lines))
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport whose loss disables the command; "" for no such transport."""
+    """Return the transport whose loss disables the command; "" without such a transport."""
     line = command.transport if command else ""
     return "" if opens_on_demand(line, driver) else line
 
@@ -133,7 +133,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 def opens_on_demand(transport: str, driver: Driver) -> bool:
     """Return whether only a command opens the transport.
 
-    A lost one disables no control, because the next command opens it again.
+    Losing such a transport disables no controls, because the next command opens it again.
     """
     spec = driver.transports.get(transport)
     is_polled = any(poll.transport == transport for poll in driver.polls)
@@ -143,7 +143,7 @@ def opens_on_demand(transport: str, driver: Driver) -> bool:
 def _ranges(
     command: Command | None, port: WidgetPort, given: OutputBinding
 ) -> dict[str, dict[str, object]]:
-    """Return minimum, maximum and rest value of each argument set by a stick or slider."""
+    """Return the minimum, maximum and rest value of each argument set by a stick or slider."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -168,7 +168,7 @@ def _rest(command: Command, argument: Argument, least: float) -> float:
 
 
 def _neutral(command: Command | None, port: WidgetPort, given: OutputBinding) -> dict[str, Reading]:
-    """Return the argument values with which the command stops the motion of this output."""
+    """Return the argument values with which the command stops this output's motion."""
     if command is None:
         return {}
     release = _release_of(command)
@@ -182,13 +182,13 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function marks the text for the catalogues; the page translates the text.
+    The function marks the text for the catalogues; the page translates it.
     """
     return text
 
 
 def _step_words(step: sequence.Step) -> dict[str, str]:
-    """Return the name of a step as a catalogue key, and the value for its ``{what}``."""
+    """Return a step's name as a catalogue key, and the value for its ``{what}``."""
     match step:
         case sequence.RunStep(command):
             return {"text": mark("run {what}"), "what": command}

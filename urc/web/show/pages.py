@@ -1,8 +1,7 @@
-"""The pages of the dashboard: each Jinja template has one context, a dataclass.
+"""The pages of the dashboard. Each Jinja template has one dataclass as its context.
 
-Layer 5. Templates receive the dataclass as ``page``, and nothing else. Templates contain only
-``for`` and ``if``; all other logic is in this module, and `urc.web.show.cells` builds the cells of
-a page.
+Layer 5. Templates receive only the dataclass, as ``page``. Templates contain only ``for`` and
+``if``. All other logic is in this module, and `urc.web.show.cells` builds a page's cells.
 """
 
 import json
@@ -55,68 +54,69 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class PageHead:
-    """Data for the head of every page."""
+    """Data for the head element of every page."""
 
     nonce: str
-    """Nonce of the response, which every script and style element must carry."""
+    """Nonce of the response, required in every script and style element."""
     title: str
     import_map: Mapping[str, object] = field(default_factory=lambda: with_words({"imports": {}}))
     widget_styles: tuple[str, ...] = ()
-    """URLs of the widgets' style sheets."""
+    """URLs of widget style sheets."""
     grid_css: str = ""
-    """CSS rules that place the cells; the rules contain only numbers."""
+    """CSS rules for the positions of cells; the rules contain only numbers."""
     version: str = __version__
 
 
 @dataclass(frozen=True, slots=True)
 class RobotPage:
-    """Context of ``robot.html.j2``: one live interface of one robot."""
+    """Context of ``robot.html.j2``: a live interface of a robot."""
 
     head: PageHead
     title: str
     url: str
-    """Path of the page, for the way back from the sign-in page."""
+    """Path of the page, for the return from the sign-in page."""
     socket: str
     """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]
     """All interfaces of the robot."""
     tabs: tuple[PageTab, ...]
-    """Pages of the interface; empty if the interface has only one page."""
+    """Pages of the interface; empty for an interface with only one page."""
     number: int
-    """Number of the open page, from 0."""
+    """Number of the open page, counted from 0."""
     is_turned: bool
-    """Whether a phone shows the designed layout only in landscape."""
+    """Whether phones show the designed layout only in landscape."""
     is_part: bool
-    """Whether the script ``interfaces.js`` sent the request; this script uses only the grid and the
-    style of the grid."""
+    """Whether the script ``interfaces.js`` sent the request. The script uses only the grid and the
+    grid's style."""
     debug: DebugPart | None
-    """Content of the debug interface, in place of a grid; None for other interfaces."""
+    """Content of the debug interface, which replaces the grid; None for other interfaces."""
     cells: tuple[Cell, ...]
     stop_url: str
-    """URL for STOP requests while the socket is down."""
+    """URL for STOP requests without a working socket."""
     alarms_url: str
     """Path of the robot's alarms in the API."""
     may_act: bool
     """Whether the page may acknowledge and shelve alarms."""
     lines: str
-    """Transports over which STOP reaches the robot, as a JSON list."""
+    """Transports of commands that stop motion, as a JSON list."""
     can_move: bool
-    """Whether the page shows the controls and STOP."""
+    """Whether the page shows controls and STOP."""
     playback: str
-    """Path of the playback's state; "" without a playback."""
+    """API path of the playback; "" without a playback."""
     is_emulated: bool
     """Whether the robot is emulated."""
     settings_url: str
     """URL of the robot's settings; "" if the settings are fixed."""
     hints: str
-    """The driver's next steps for lost connections, by transport, as a JSON object."""
+    """The driver's hints for lost connections, by transport, as a JSON object."""
     on_demand: str
-    """Transports that only commands open, as a JSON list; the robot is not lost without them."""
+    """Transports that only commands open, as a JSON list. Without them, the robot does not count as
+    lost."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """Context of ``error.html.j2``: a message of one sentence, and a link back."""
+    """Context of ``error.html.j2``: a one-sentence message and a link back."""
 
     head: PageHead
     status: int
@@ -125,19 +125,19 @@ class ErrorPage:
 
 @dataclass(frozen=True, slots=True)
 class ServerParts:
-    """The parts that the pages of all robots of a server share."""
+    """The shared parts of all robot pages of a server."""
 
     modules: Mapping[str, object]
     """The import map."""
     trust: WidgetTrust = field(default_factory=WidgetTrust)
-    """Rule that distinguishes third-party widgets from trusted widgets."""
+    """Rule that identifies third-party widgets."""
     has_settings: bool = False
-    """Whether the server has pages for the settings of robots."""
+    """Whether the server has settings pages."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotPageRequest:
-    """The request of one visitor for the page of a robot."""
+    """A visitor's request for a robot's page."""
 
     nonce: str
     """Nonce of the response."""
@@ -146,11 +146,11 @@ class RobotPageRequest:
     is_watching: bool = False
     """Whether the page may only watch."""
     is_part: bool = False
-    """Whether an open page requests this page to replace its interface."""
+    """Whether an open page requests this page to switch its interface."""
     may_act: bool = True
     """Whether the visitor has the role ``drive`` at the robot."""
     dev_url: str = ""
-    """Path of the developer page; "" if the visitor may not use it."""
+    """Path of the developer page; "" if the visitor may not open it."""
 
 
 def robot_page(
@@ -162,14 +162,14 @@ def robot_page(
 ) -> str:
     """Return the page of one interface of a robot.
 
-    Another process renders third-party widgets; the call blocks until it has ended.
+    Another process renders third-party widgets; the call blocks until that process has ended.
 
     Args:
-        name: name of the robot in URLs.
-        robot: the robot, or a recording that plays in its place.
+        name: the robot's name in URLs.
+        robot: the robot or playback.
         interface: the interface to show.
-        server: the parts that all pages share.
-        request: the request of the visitor.
+        server: the shared parts of all pages.
+        request: the visitor's request.
     """
     profile, is_recorded = robot.profile, robot.playback is not None
     is_watching = request.is_watching or is_recorded
@@ -213,23 +213,23 @@ def robot_page(
 
 
 def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
-    """Return the import map with the catalogue of the user's language added."""
+    """Return the import map, including the catalogue of the user's language."""
     imports = cast("Mapping[str, str]", modules["imports"])
     return {"imports": {**imports, "urc/words": words.address(words.language.get())}}
 
 
 def error_page(nonce: str, status: int, message: str) -> str:
-    """Return an error page with a message of one sentence."""
+    """Return an error page with a one-sentence message."""
     return render("error.html.j2", ErrorPage(PageHead(nonce, f"{status}"), status, message))
 
 
 def render(template: str, page: object) -> str:
-    """Return the HTML of a page; `page` is the context of the template."""
+    """Return the HTML of a page; `page` is the template's context."""
     return _pages().get_template(template).render(page=page)
 
 
 def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
-    """Return the widget of each filled slot, in reading order."""
+    """Return the widgets of the filled slots, in reading order."""
     found = {
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }

@@ -23,11 +23,11 @@ __all__ = ["TEMPLATE", "fault_line", "markdown", "widget_environment", "widget_t
 
 
 FIRST_HEADING = 4
-"""HTML heading level for ``#`` in Markdown; the page and its cells use the higher levels."""
+"""HTML heading level for ``#`` in Markdown; the page and its cells use the levels above."""
 
 
 def markdown(text: str) -> Markup:
-    """Return the HTML of a CommonMark text, with support for tables and strikethrough."""
+    """Return a CommonMark text as HTML, with support for tables and strikethrough."""
     parser = _parser()
     tokens = parser.parse(text)
     _lower_headings(tokens)
@@ -42,7 +42,7 @@ def _lower_headings(tokens: Sequence["Token"]) -> None:
 
 
 def _open_links_elsewhere(tokens: Sequence["Token"]) -> None:
-    """Open links in a new tab, because leaving the page would end the control of the robot."""
+    """Open links in a new tab, because leaving the page would end control of the robot."""
     for token in tokens:
         for child in token.children or ():
             if child.type == "link_open":
@@ -60,7 +60,7 @@ def _parser() -> "MarkdownIt":
 
 TEMPLATE: Final = "template.html.j2"
 _CODE: Final = "<template>"
-"""File name that Jinja reports for a template given as text."""
+"""Jinja's file name for a template given as text."""
 
 
 @lru_cache(maxsize=1)
@@ -81,7 +81,7 @@ def widget_template(source: str) -> Template:
 
 
 def fault_line(fault: Exception) -> int:
-    """Return the line of the template at which the rendering failed, counted from 1."""
+    """Return the template line of a rendering failure, counted from 1."""
     if isinstance(fault, TemplateSyntaxError):
         return fault.lineno
     frames = traceback.extract_tb(fault.__traceback__)

@@ -1,7 +1,7 @@
-"""The visitor of a page, as the page shows it.
+"""A page's visitor, for display on the page.
 
-Layer 5. The access middleware sets it for each request; ``nav.html.j2`` and ``robot.html.j2`` show
-it.
+Layer 5. The access middleware sets the visitor for each request; ``nav.html.j2`` and
+``robot.html.j2`` show it.
 """
 
 from contextvars import ContextVar
@@ -11,15 +11,15 @@ __all__ = ["ShownVisitor", "shown_visitor"]
 
 
 class ShownVisitor(NamedTuple):
-    """The visitor of a page."""
+    """A page's visitor."""
 
     name: str = ""
     """Name of the person, device or guest; "" for an unknown visitor."""
     may_administer: bool = False
     may_sign_in: bool = False
-    """Whether the server keeps people, so that an unknown visitor can sign in."""
+    """Whether the server has a store of people, so that unknown visitors can sign in."""
     names_screen: bool = False
-    """Whether the visitor names its screen, because its sign-in has no name of its own."""
+    """Whether the visitor can name the screen, because the sign-in contains no name."""
 
 
 shown_visitor: Final[ContextVar[ShownVisitor]] = ContextVar(

@@ -1,6 +1,6 @@
-"""The page on this connection: the browser's features at this address, and trust in the authority.
+"""The connection page: the browser's features at this address, and trust in the authority.
 
-Layer 5. The page and the certificate contain no data about robots. Everyone may load them, even
+Layer 5. The page and the certificate contain no data about robots. Everyone may load both, even
 over plain HTTP, because a device needs them before it trusts the certificate.
 """
 
@@ -23,21 +23,21 @@ __all__ = ["AUTHORITY_PATH", "TRUST_PATH", "DeviceGuide", "TrustPage", "TrustPag
 TRUST_PATH = "/trust"
 AUTHORITY_PATH = "/trust/authority.crt"
 _CRT = "application/x-x509-ca-cert"
-"""Media type that Android, iOS, macOS, Windows and Firefox know as a certificate authority."""
+"""Media type that Android, iOS, macOS, Windows and Firefox accept for certificate authorities."""
 _HEADERS = {"cache-control": "no-store"}
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceGuide:
-    """The steps for one kind of device, after the download of the certificate."""
+    """A guide for one kind of device, after the download of the certificate."""
 
     name: str
-    """Name for scripts, such as ``ios``."""
+    """Identifier for scripts, such as ``ios``."""
     title: str
     steps: tuple[str, ...]
     """Steps after the download, in order."""
     removal: str
-    """Step that removes the certificate again."""
+    """Step to remove the certificate again."""
     command: str = ""
     """Command of the last step; "" without a command."""
     removal_command: str = ""
@@ -104,7 +104,7 @@ _GUIDES: Final = (
         phrase("Choose it in the same list, then “Delete or Distrust”."),
     ),
 )
-"""Guides in English, for translation. Names of menus are those of the systems."""
+"""Guides in English, for translation. Menu names are those of the systems."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,17 +113,17 @@ class TrustPage:
 
     head: PageHead
     fingerprint: tuple[str, ...]
-    """Groups of the fingerprint of the certificate to trust; empty for plain HTTP."""
+    """Fingerprint of the certificate to trust, in groups of digits; empty for plain HTTP."""
     has_authority: bool
-    """Whether the server has a local authority, which devices may trust."""
+    """Whether the server has a local authority for devices to trust."""
     certificate_url: str
     secure_url: str
-    """The same server by HTTPS; "" if the page came by HTTPS, or the server has no HTTPS."""
+    """HTTPS URL of this server; "" if the page came over HTTPS, or the server has no HTTPS."""
     guides: tuple[DeviceGuide, ...]
 
 
 class TrustPages:
-    """The routes of the page and of the authority's certificate."""
+    """The routes of the connection page and of the authority's certificate."""
 
     def __init__(self, certificates: Certificates | None) -> None:
         """Prepare. Without `certificates`, the server uses plain HTTP."""
@@ -164,6 +164,6 @@ def _secure_url(request: Request) -> str:
 
 
 def _translated(guide: DeviceGuide) -> DeviceGuide:
-    """Return a guide in the language of the request."""
+    """Return a guide in the request's language."""
     steps = tuple(map(spoken, guide.steps))
     return replace(guide, steps=steps, removal=spoken(guide.removal))

@@ -1,4 +1,4 @@
-"""Links of the navigation bar that only some visitors see.
+"""Navigation links that are visible only to some visitors.
 
 Layer 5. The access middleware sets the links for each request; ``nav.html.j2`` shows them.
 """
@@ -9,4 +9,4 @@ from typing import Final
 __all__ = ["sees_audit"]
 
 sees_audit: Final[ContextVar[bool]] = ContextVar("urc_sees_audit", default=False)
-"""Whether the visitor of the current request may open the audit log."""
+"""Whether the current request's visitor may open the audit log."""

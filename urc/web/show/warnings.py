@@ -1,4 +1,4 @@
-"""Warnings that every page of a server shows at its top, in red.
+"""Warnings for every page of a server, shown at the top in red.
 
 Layer 5. The access middleware sets the warnings for each request; the base template shows them.
 """

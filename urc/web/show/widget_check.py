@@ -1,7 +1,7 @@
 """The checks of a widget's template, module and demo, for `urc validate` and the pages.
 
-Layer 5. Each file is checked exactly as the dashboard loads it. The check runs no JavaScript, and
-only searches the text of the module.
+Layer 5. Each file is checked exactly as the dashboard loads it. The check searches the module's
+text, without running JavaScript.
 """
 
 import re
@@ -25,7 +25,7 @@ __all__ = ["FILES", "check_widget"]
 
 MODULE: Final = "widget.js"
 FILES: Final = (TEMPLATE, MODULE, "demo.yaml")
-"""Files of a widget in addition to its manifest."""
+"""Files of a widget, in addition to its manifest."""
 MOST_BYTES: Final = 1 << 20
 _EXPORT: Final = re.compile(
     r"(?:^|[;}])\s*export\s+(?:default\b|\{[^}]*\bdefault\b[^}]*\})", re.MULTILINE
@@ -38,7 +38,7 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
 
     Args:
         widget: the widget, from any source.
-        with_demo: whether to check the demo, which pages do not need.
+        with_demo: whether to check the demo; pages do not need the demo.
     """
     problems: list[Problem] = []
     if widget.name in OURS and WidgetTrust().is_foreign(widget):
@@ -71,7 +71,7 @@ def _text(widget: Widget, name: str) -> str:
 def _rendered(
     widget: Widget, states: list[WidgetState], template: "_TemplateCheck"
 ) -> list[Problem]:
-    """Return the first error from rendering the template in the states of the demo."""
+    """Return the first error from rendering the template in the demo states."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")
         try:
@@ -82,7 +82,7 @@ def _rendered(
 
 
 def _module(widget: Widget, text: str) -> list[Problem]:
-    """Return a problem if the text of the module has no default export."""
+    """Return a problem if the module's text has no default export."""
     if _EXPORT.search(text):
         return []
     nearest = _ANY.search(text)
@@ -99,7 +99,7 @@ def _module(widget: Widget, text: str) -> list[Problem]:
 
 
 class _TemplateCheck:
-    """The template of one widget, with its checks."""
+    """One widget's template, with its checks."""
 
     def __init__(self, widget: Widget, source: str) -> None:
         self._widget = widget
@@ -107,7 +107,7 @@ class _TemplateCheck:
         self._lines = source.splitlines()
 
     def problems(self) -> list[Problem]:
-        """Return the syntax error of the template, or its undefined names."""
+        """Return the template's syntax error or its undefined names."""
         environment = widget_environment()
         try:
             environment.from_string(self._source)
@@ -127,7 +127,7 @@ class _TemplateCheck:
         return sorted(dict.fromkeys(found), key=lambda one: (one.line, one.column))
 
     def fault(self, error: Exception, where: str) -> Problem:
-        """Return an exception from rendering as a problem with its line."""
+        """Return a rendering exception as a problem with its line."""
         text = str(error).partition("\n")[0] or type(error).__name__
         return self._problem("bad-template", f"{text}{where}", fault_line(error))
 
@@ -172,14 +172,14 @@ class _TemplateCheck:
 
 
 def _asked(tree: nodes.Template) -> set[int]:
-    """Return the nodes that the template tests for existence."""
+    """Return the template nodes in existence tests."""
     tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
     filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
     return {id(node) for node in (*tests, *filters)}
 
 
 def _key(node: nodes.Getattr | nodes.Getitem) -> str:
-    """Return the key of a look-up in a template; "" for a computed key."""
+    """Return the key of a look-up in the template; "" for a computed key."""
     if isinstance(node, nodes.Getattr):
         return node.attr
     key = node.arg.value if isinstance(node.arg, nodes.Const) else ""

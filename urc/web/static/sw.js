@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * The service worker: it keeps the last pages for times without a server.
+ * The service worker, which stores the last pages for times without a server.
  *
- * The server always comes first, so no old page is shown while it responds. Requests that move a robot
- * or concern one (`/api`, `/ws`, anything but GET) do not pass here. It has no timer and sends no
- * command.
+ * The server always takes precedence, so no old page is shown while it responds. Requests that move
+ * or concern a robot (`/api`, `/ws`, and all methods except GET) bypass the service worker. It has
+ * no timer and sends no command.
  */
 
 /**
@@ -16,7 +16,7 @@
 const worker = self;
 
 const CACHE = "urc-1";
-/** Files that are kept besides opened pages. */
+/** Files that are stored in addition to opened pages. */
 const FIRST = ["/", "/static/core/tokens.css", "/static/core/app.css", "/static/core/device.css", "/static/manage/menu.css", "/static/manage/card.css", "/static/manage/fleet.css", "/static/core/theme.js", "/static/core/handedness.js", "/static/favicon.svg"];
 const KEPT = /^\/(static|vendor|widgets|words)\/|^\/$|^\/robots\/[^/]+\/$|^\/app\.webmanifest$/;
 /** Polled by the pages of a widget in development; useless without the server. */
@@ -39,7 +39,7 @@ worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
   const { request } = event;
   const url = new URL(request.url);
   if (request.method !== "GET" || url.origin !== location.origin) return;
-  if (url.searchParams.has("key")) return; // a URL with a key is never kept
+  if (url.searchParams.has("key")) return; // URLs with a key are never stored
   if (!KEPT.test(url.pathname) || NEVER.test(url.pathname)) return;
   event.respondWith(answer(event, request));
 });
@@ -51,7 +51,7 @@ worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
 async function answer(event, request) {
   try {
     const found = await fetch(request);
-    // A redirect's response belongs to another URL, and no page opens from it.
+    // A redirect's response belongs to another URL and cannot open a page.
     if (found.status === 200 && !found.redirected) event.waitUntil(keep(request, found.clone()));
     return found;
   } catch (error) {

@@ -1,4 +1,4 @@
-"""Encoder of the alarms of a robot for pages.
+"""Encoder of a robot's alarms for pages.
 
 Layer 5. Pure.
 """
@@ -26,11 +26,11 @@ def encode_alarms(
 
     Args:
         records: changed alarms.
-        gone: signals whose alarm is normal now.
-        signals: signals of the robot, with causes and actions.
+        gone: signals whose alarm has become normal.
+        signals: the robot's signals, with causes and operator actions.
         now: UTC time in seconds since 1970.
-        is_full: whether `records` are all alarms.
-        is_flooded: whether the robot has a flood of alarms.
+        is_full: whether `records` contains all alarms.
+        is_flooded: whether the robot currently has an alarm flood.
     """
     rows = [alarm_row(one, signals) for one in records]
     return encoded(

@@ -37,7 +37,7 @@ def encode_ask(
     level: Literal["normal", "hazardous"],
     left_s: float,
 ) -> str:
-    """Return a question to the second person; the page of the first person gets a copy."""
+    """Return a question to the second person; the first person's page receives a copy."""
     return encoded(
         QuestionMessage(number, run, who, command, cut(text), level, milliseconds(left_s))
     )
@@ -49,12 +49,12 @@ def encode_asked(number: int) -> str:
 
 
 def encode_token(run: int, token: str) -> str:
-    """Return the message with the token that allows the command `run` once, for a short time."""
+    """Return the message with the token that permits the command `run` once, for a short time."""
     return encoded(TokenMessage(run, token))
 
 
 def encode_progress(all_progress: tuple[SequenceProgress, ...]) -> str:
-    """Return the message with the state of all sequences."""
+    """Return the message with the states of all sequences."""
     return encoded(
         ProgressMessage(
             [

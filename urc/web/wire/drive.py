@@ -47,15 +47,14 @@ __all__ = [
 
 
 decode_tick = msgspec.json.Decoder(Tick).decode
-"""Decoder for a text that is probably a tick; raises one of the exceptions in `NO_TICK` for any
-other text."""
+"""Decoder for probable ticks; raises one of the exceptions in `NO_TICK` for any other text."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
-"""First bytes of a page's tick; ticks in any other form are decoded more slowly."""
+"""First bytes of a page's tick; decoding ticks in any other form takes longer."""
 
 
 def command_of(data: bytes) -> str:
-    """Return the command of a tick, read from its first bytes; "" if they do not contain it."""
+    """Return a tick's command from its first bytes; "" if they do not contain the command."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 
@@ -63,7 +62,7 @@ def command_of(data: bytes) -> str:
 def encode_lease(
     state: LeaseState, you: Operator, *, left_s: float, is_confirmed: bool, spare: str = ""
 ) -> str:
-    """Return the lease message for a page; `spare` is the key for its redundant socket."""
+    """Return the lease message for a page; `spare` is the key for the page's redundant socket."""
     return encoded(
         LeaseMessage(
             you=you.id,
@@ -84,17 +83,17 @@ def encode_lease(
 
 
 def encode_beat(number: int) -> str:
-    """Return the message with a heartbeat number, which the page echoes."""
+    """Return the message with a heartbeat number, which the page must echo."""
     return encoded(HeartbeatMessage(number))
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
-    """Return the message that a control stopped before its release."""
+    """Return the message that a control was stopped before its release."""
     return encoded(StoppedMessage(command, reason))
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
-    """Return the message that a tick, or a request about the controls, was refused."""
+    """Return the message about the refusal of a tick or of a request about the controls."""
     return encoded(RefusedMessage(about, cut(message), command))
 
 

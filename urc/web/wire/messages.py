@@ -1,8 +1,8 @@
 """Encoders and decoders of the messages on a dashboard's WebSocket.
 
 Layer 5. `urc.wire` contains the shapes of the messages. Messages are JSON text in both directions.
-Times are in milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of
-encoding. Values are sent as arrays of indexes into the names in `HelloMessage`.
+Times are in milliseconds on the server's monotonic clock. Ages are in milliseconds at the time of
+encoding. Messages with values use indexes into the names in `HelloMessage`.
 
 Messages from the server to the page, listed by their tag ``t``::
 
@@ -28,9 +28,9 @@ Messages from the server to the page, listed by their tag ``t``::
 
 Images are sent as binary messages; see `urc.web.wire.picture`.
 
-Messages from the page to the server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``,
+Messages from the page to the server are ``ping``, ``run``, ``show``, ``agree``, ``prepare`` and
 ``steer``, and for the controls ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases and
-stops may also use a redundant socket, which begins with ``spare`` and receives heartbeats.
+stops may also use a redundant socket, which starts with ``spare`` and receives heartbeats.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -92,11 +92,11 @@ __all__ = [
 ]
 
 _AS_THEY_ARE = frozenset((float, bool, type(None)))
-_EXACT = 2**53 - 1  # a browser's numbers skip integers beyond it
+_EXACT = 2**53 - 1  # browsers cannot represent all integers above this limit
 
 
 class BadMessage(Exception):
-    """The error for an invalid message from a page; the error text names the expected form."""
+    """An invalid message from a page; the error text describes the expected form."""
 
 
 Inbound = ClientMessage
@@ -105,10 +105,10 @@ _Message = TypeVar("_Message")
 
 
 def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Message:
-    """Return the decoded message of a page.
+    """Return the decoded message from a page.
 
     Raises:
-        BadMessage: the message is too long, or matches no type of `decoder`.
+        BadMessage: the message is too long, or matches none of the decoder's types.
     """
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"the message is longer than {INBOUND_BYTES} bytes")
@@ -148,7 +148,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Indexes of signal names, with a cache of the last look-up."""
+    """Indexes of signal names, with a cache for the last look-up."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
@@ -170,12 +170,12 @@ class Indexes:
 def encode_values(
     samples: Iterable[Sample], indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
 ) -> bytes:
-    """Return one frame of readings; `firsts` has the number of each signal's first reading."""
+    """Return one frame of readings; `firsts` contains the number of each signal's first reading."""
     values: Sequence[object]
     names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]
     ages: int | list[int]
-    if times.count(first_s) == count:  # samples of one moment are equally old
+    if times.count(first_s) == count:  # samples with the same time have the same age
         ages = max(0, round((now_s - first_s) * 1000))
     else:
         ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
@@ -189,7 +189,7 @@ def encode_values(
 
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
-    """Return the message with the state of every transport."""
+    """Return the message with the states of all transports."""
     return encoded(
         LinksMessage(
             [
@@ -210,7 +210,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
 
 
 def encode_log(notes: Iterable[LogEntry], first: int, now_s: float) -> str:
-    """Return a message with log lines; `first` is the number of the first line in its session."""
+    """Return a message with log lines; `first` is the first line's number in its session."""
     lines = [
         LogRow(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
         for note in notes
@@ -225,7 +225,7 @@ def encode_reply(
     code: str = "",
     message: str = "",
 ) -> str:
-    """Return the reply to a command: its values, or the `code` and `message` of its failure."""
+    """Return the reply to a command, with its values, or with `code` and `message` of a failure."""
     if code:
         return encoded(ReplyMessage(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}
@@ -243,7 +243,7 @@ def encode_error(code: str, message: str) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return the value in a form that browsers can represent, with sizes in place of bytes."""
+    """Return the value in a form for browsers, with sizes in place of bytes."""
     if isinstance(value, str):
         return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:

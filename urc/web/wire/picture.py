@@ -3,8 +3,8 @@
 Layer 5. Pure. Each message contains one complete image. `urc.wire.picture` defines its layout, and
 ``frames.js`` decodes it.
 
-All clients get identical bytes, so the WebSocket frame is built only once (RFC 6455, section 5.2: a
-server does not mask).
+All clients receive identical bytes, so the WebSocket frame is built only once. According to RFC
+6455, section 5.2, a server does not mask.
 """
 
 from urc.images import media_type
@@ -15,8 +15,8 @@ __all__ = ["as_frame", "encode_picture"]
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
-"""Frame lengths below `_SHORT` take one byte, lengths below `_MEDIUM` take three bytes, and all
-other lengths take nine bytes."""
+"""Frame lengths below `_SHORT` need one byte, lengths below `_MEDIUM` need three bytes, and all
+other lengths need nine bytes."""
 
 
 def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
@@ -24,7 +24,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
 
     Args:
         index: index of the signal in the names of `HelloMessage`.
-        data: the image from the robot.
+        data: the robot's image.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.
     """
@@ -34,7 +34,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
-    """Return a message as one WebSocket frame that any client can receive."""
+    """Return a message as one WebSocket frame for any client."""
     return (_FINAL_TEXT if is_text else _FINAL_BINARY) + _length(len(message)) + message
 
 

@@ -1,4 +1,4 @@
-"""Encoding of messages to a page: their base type, and the repair of invalid texts.
+"""Encoding of messages to pages: base type, and repair of invalid texts.
 
 Layer 5.
 """
@@ -15,7 +15,7 @@ __all__ = [
 ]
 
 TEXT_CHARACTERS = 4096
-"""Maximum length of a text value, in characters; a longer text is cut, and an ellipsis is added."""
+"""Maximum length of a text value, in characters; longer texts are cut and end with an ellipsis."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -30,12 +30,12 @@ def encoded_bytes(message: msgspec.Struct) -> bytes:
     try:
         return _encode(message)
     except UnicodeEncodeError:
-        # A robot's text may hold a lone surrogate; all other values must still arrive.
+        # A robot's text may contain a lone surrogate; all other values must still arrive.
         return _encode(repaired(msgspec.to_builtins(message)))
 
 
 def repaired(tree: object) -> object:
-    """Return the tree of values with each lone surrogate replaced by a question mark."""
+    """Return a tree of values with each lone surrogate replaced by a question mark."""
     if isinstance(tree, str):
         return tree.encode("utf-8", "replace").decode()
     if isinstance(tree, (list, tuple)):

@@ -13,7 +13,7 @@ Piece = bytes | Template
 
 
 class Placed(NamedTuple):
-    """One piece of a frame, and its path under the form's key."""
+    """One piece of a frame with its path under the form's key."""
 
     piece: Piece
     path: tuple[int, ...] = ()
@@ -22,7 +22,7 @@ class Placed(NamedTuple):
 
 
 def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
-    """Return the declaration of a frame in the form `form` from its pieces."""
+    """Return the declaration of a frame in the form `form`, built from its pieces."""
     templates = [
         (path, _moved(one, offset)) for one, path, offset in pieces if isinstance(one, Template)
     ]
@@ -33,7 +33,7 @@ def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
 
 
 def _moved(template: Template, offset: int) -> Template:
-    """Return the expression with leading spaces, so that error positions stay correct."""
+    """Return the expression with leading spaces to keep error positions correct."""
     source = " " * offset + template.source
     return Template(source, template.python, template.names, template.settings)
 

@@ -1,8 +1,8 @@
 """The forms of message transports: `publish`, `call`, `goal` and `request`.
 
 An envelope has an address and a body. The address may contain templates, and the body has one of
-the other forms. With ``stamped``, the parser converts a ROS message to its stamped type, so the
-engine needs no special case.
+the other forms. With ``stamped``, the parser itself converts a ROS message to its stamped type, so
+the engine needs no special case.
 """
 
 from collections.abc import Iterable
@@ -32,11 +32,11 @@ _STAMPED: Final = {
     "Vector3": "vector",
     "Wrench": "wrench",
 }
-"""Name of the value field in stamped geometry_msgs types, by plain type (ROS common_interfaces)."""
+"""Name of a stamped geometry_msgs type's value field, by plain type (ROS common_interfaces)."""
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the envelope at `part`; the key of `part` is the envelope's verb."""
+    """Return the envelope at `part`; the key of `part`, such as ``publish``, is the verb."""
     body = body_form(part)
     spec = body[1].parse_write(body[0], problems, context) if body else None
     before = len(problems.problems)

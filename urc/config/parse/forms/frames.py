@@ -1,4 +1,4 @@
-"""Several frames of one command: a list under ``send:`` with a form for each item."""
+"""Several frames of one command: each item of a list under ``send:`` has a form."""
 
 from collections.abc import Iterable
 

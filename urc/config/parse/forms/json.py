@@ -39,7 +39,7 @@ def _path(part: Node, problems: Problems) -> object:
     text = part.data.strip()
     if _PLAIN.fullmatch(text):
         return _plain(text)
-    import jmespath  # 20 ms that most drivers do without
+    import jmespath  # takes 20 ms, and most drivers do not need it
     from jmespath.exceptions import JMESPathError
 
     try:

@@ -1,4 +1,4 @@
-"""The form ``pattern``: the text of a frame, with {name:kind} in place of each field."""
+"""The form ``pattern``: a frame's text with {name:kind} in place of each field."""
 
 import re
 from typing import Any, Final, cast, get_args
@@ -43,7 +43,7 @@ def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
 
 
 def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
-    """Return the fields with the literal text before each field, and the text after all fields."""
+    """Return the fields with the literal text before each field, and the text after the last."""
     holes: list[PatternField] = []
     literal, position = "", 0
     last = (0, 0)
@@ -56,7 +56,7 @@ def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
             hint = "write {{ or }} for a brace of the frame"
             raise _PatternFault(f"{piece[0]!r} has no matching brace", piece.start(), hint=hint)
         else:
-            # Before a field of fixed width, blanks are counted.
+            # Before a field of fixed width, the number of blanks is significant.
             is_fixed = piece[1].rpartition(":")[2].isdecimal()
             before = literal if is_fixed else _blanks(literal)
             _check_after(holes, before, last)
@@ -92,7 +92,7 @@ def _hole(inside: str, before: str, offset: int, holes: list[PatternField]) -> P
 
 
 def _check_after(holes: list[PatternField], literal: str, last: tuple[int, int]) -> None:
-    """Raise `_PatternFault` when the end of the last field is ambiguous."""
+    """Raise `_PatternFault` if the end of the last field is ambiguous."""
     if not holes or holes[-1].width:
         return
     kind, (start, end) = holes[-1].kind, last

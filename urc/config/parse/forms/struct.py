@@ -30,7 +30,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     before = len(problems.problems)
     parser = ItemParser(problems, context.types, context.enums, "read", context.encoding)
     items = parser.items(part)
-    if len(problems.problems) == before:  # the size of an unknown type is unknown
+    if len(problems.problems) == before:  # an unknown type has no known size
         _check_size(part, items, context.framing, problems)
     if len(problems.problems) > before:
         return None
@@ -65,7 +65,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 def _check_size(
     part: Node, items: tuple[Item, ...], framing: FramingSpec | None, problems: Problems
 ) -> None:
-    """Report items that are larger or smaller than the frames of the transport."""
+    """Report items that are too large or too small for the transport's frames."""
     if framing is None:
         return
     layout = framing.options.get("layout")

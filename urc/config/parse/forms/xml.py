@@ -17,7 +17,7 @@ _STEP = re.compile(
 _TEST = re.compile(rf"""\[@({_NAME})=(?:'([^']*)'|"([^"]*)")\]""")
 _ATTRIBUTE = re.compile(r"@([A-Za-z_][\w.:-]*)")
 _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
-"""Pattern of the text before the next slash outside brackets."""
+"""Pattern of the text up to the next slash outside brackets."""
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
@@ -75,7 +75,7 @@ def _piece(path: str, offset: int) -> str:
     """Return the path step at `offset`, including its brackets."""
     found = _PIECE.match(path, offset)
     end = found.end() if found else offset
-    # An unclosed bracket takes the rest as one step, which is then reported.
+    # After an unclosed bracket, the remaining text is one step, which the caller reports.
     return path[offset:end] if path[end : end + 1] in ("", "/") else path[offset:]
 
 

@@ -1,4 +1,4 @@
-"""Parser of the items of a struct or a reusable type: list → `Item` values.
+"""Parser for the items of a struct or a reusable type: list → `Item` values.
 
 An `ItemParser` reads the items of one scope; expressions can refer to all ids of their scope. The
 table `_KEYS` contains the keys of each kind of item. The module `numbers` checks numbers, constants
@@ -48,7 +48,7 @@ _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 class ItemParser:
-    """A parser for the items of one scope."""
+    """Parses the items of one scope."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class ItemParser:
         return tuple(item for item in found if item is not None)
 
     def _check_rest(self, part: Node, found: list[Item | None]) -> None:
-        """Report an item after an item that takes the rest of the frame."""
+        """Report an item after an item that extends to the end of the frame."""
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
             if any(extent is not None and extent.kind == "rest" for extent in extents):
@@ -108,7 +108,7 @@ class ItemParser:
         return item
 
     def _short(self, part: Node) -> Item | None:
-        """Return an item in short notation, such as ``u8 8``, ``i32be rpm`` or ``header``."""
+        """Parse an item in short notation, such as ``u8 8``, ``i32be rpm`` or ``header``."""
         word, _, rest = part.data.strip().partition(" ")
         rest = rest.strip()
         items = self.types.get(word)
@@ -135,7 +135,7 @@ class ItemParser:
         return Item(kind_of(number), "", number, const=constant)
 
     def _long(self, part: Node) -> Item | None:
-        """Return an item in the notation of a mapping."""
+        """Parse an item that is a mapping."""
         kind = self._kind(part)
         if kind is None:
             return None
@@ -237,7 +237,7 @@ class ItemParser:
         return item
 
     def _extent(self, part: Node | None) -> Extent | None:
-        """Return a size or count: a number, ``rest``, a preceding type, or an expression."""
+        """Parse a size or count: a number, ``rest``, a preceding type, or an expression."""
         if part is None:
             return None
         if not isinstance(part.data, str):
@@ -286,7 +286,7 @@ class ItemParser:
         return items
 
     def _check_case(self, part: Node, subject: Item | None) -> None:
-        """Report a case of a switch for a value that the switch's item can never have."""
+        """Report a switch case with an impossible value of the switch's item."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
             return
@@ -327,7 +327,7 @@ class ItemParser:
 
 
 def _without_rest(items: Items) -> Items:
-    """Return the items without a final padding of the size ``rest``."""
+    """Return the items without a final padding of size ``rest``."""
     is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
     return items[:-1] if is_rest and items[-1].kind == "padding" else items
 
@@ -346,7 +346,7 @@ _NOUNS: Final = {
 
 
 def _inner(item: Item) -> list[Items]:
-    """Return the lists of items inside an item."""
+    """Return the item lists inside an item."""
     if item.switch is None:
         return [item.items]
     return [*(case for _, case in item.switch.cases), item.switch.default or ()]

@@ -1,4 +1,4 @@
-"""Parsers of items without inner items: numbers, bits, packed arrays, text and bytes."""
+"""Parser for items without inner items: numbers, bits, packed arrays, text and bytes."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -18,7 +18,7 @@ def kind_of(number: Number) -> Literal["number", "coded"]:
 
 
 class LeafParser:
-    """A parser for items without inner items."""
+    """Parses items without inner items."""
 
     def __init__(
         self, problems: Problems, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
@@ -28,7 +28,7 @@ class LeafParser:
         self.scope = scope
 
     def number(self, part: Node, name: str, times: Extent | None) -> Item:
-        """Return a number, or an array of numbers."""
+        """Parse a number or an array of numbers."""
         parser = NumberParser(part, self.problems)
         number = number_of(part.text("type"))
         assert number is not None  # noqa: S101  # checked by `_kind`
@@ -46,7 +46,7 @@ class LeafParser:
         )
 
     def packed(self, part: Node, name: str, times: Extent | None) -> Item | None:
-        """Return an array of numbers that are not whole bytes, such as ``u11``."""
+        """Parse an array of numbers whose width is not a whole number of bytes, such as ``u11``."""
         parser, number, count = (
             NumberParser(part, self.problems),
             width_of(part.text("type")),
@@ -70,7 +70,7 @@ class LeafParser:
         )
 
     def bits(self, part: Node, name: str) -> Item | None:
-        """Return the bit fields of a whole number."""
+        """Parse the bit fields of a whole number."""
         named = part.must("type")
         number = number_of(named.data)
         if number is None or number.kind != "integer" or number.is_signed or number.is_coded:
@@ -112,7 +112,7 @@ class LeafParser:
 
 
 def parse_content(part: Node, item: Item, encoding: str, problems: Problems) -> Item | None:
-    """Return an item of text or bytes with its constant, padding and end."""
+    """Return an item of text or bytes with its constant, padding and end marker."""
     own = part.text("encoding")
     until = _bytes(part.get("until"), own or encoding, problems)
     const = _bytes(part.get("const"), own or encoding, problems)

@@ -1,4 +1,4 @@
-"""Parsers of a struct's numbers: widths, constants, enums and ranges."""
+"""Parsers for a struct's numbers: widths, constants, enums and ranges."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -26,7 +26,7 @@ _WORDS: Final[Mapping[str, int | float | bool]] = {"true": True, "false": False}
 
 
 def written_constant(text: str) -> int | float | bool | None:
-    """Return the constant in a short item, or None when the text is a name."""
+    """Return the constant in a short item; None if the text is a name."""
     if text in _WORDS:
         return _WORDS[text]
     try:
@@ -44,11 +44,11 @@ def written_constant(text: str) -> int | float | bool | None:
 _NUMBER_WORD: Final = re.compile(
     r"(?P<sign>u?)int(?P<bits>8|16|32|64)(?:_t)?_?(?P<order>be|le)?|(?P<word>byte|char|float|double)"
 )
-"""Numbers as C, Python and ROS write them."""
+"""Pattern of number type names in C, Python and ROS."""
 
 
 def _our_type(found: re.Match[str]) -> str:
-    """Return the type for a word of another language; small robots mostly are little-endian."""
+    """Return the type for another language's word; most small robots are little-endian."""
     if found["word"]:
         return {"byte": "u8", "char": "i8", "float": "f32le", "double": "f64le"}[found["word"]]
     name = ("u" if found["sign"] else "i") + found["bits"]
@@ -95,7 +95,7 @@ def check_fits(
 
 
 class NumberParser:
-    """A parser for the keys of one number."""
+    """Parses the keys of one number."""
 
     def __init__(self, part: Node, problems: Problems) -> None:
         self._part = part
@@ -110,7 +110,7 @@ class NumberParser:
         )
 
     def constant(self, number: Number) -> int | float | bool | None:
-        """Return the value under ``const``, or None."""
+        """Return the value under ``const``; None if the key is missing."""
         inner = self._part.get("const")
         if inner is None:
             return None
@@ -134,7 +134,7 @@ class NumberParser:
 
 
 def parse_valid(part: Node, problems: Problems) -> tuple[float, float] | None:
-    """Return the valid range under ``valid``, or None."""
+    """Return the range under ``valid``; None if the key is missing."""
     inner = part.get("valid")
     if inner is None:
         return None
@@ -152,7 +152,7 @@ def parse_enums(part: Node, problems: Problems) -> dict[str, Enum]:
 
 
 def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], problems: Problems) -> Enum:
-    """Return the enum of an item: an inline enum, or an enum of the driver."""
+    """Return an item's enum, which is an inline enum or an enum of the driver."""
     inner = part.get("enum")
     if inner is None:
         return ()

@@ -16,14 +16,14 @@ class Scope:
 
     def __init__(self, problems: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
-        """Items by name; None for a name without an item in this struct."""
+        """Items by name; None for a name whose item is not in this struct."""
         self.uses: list[tuple[Node, Template]] = []
         """Expressions that use arguments or settings, with their nodes."""
         self._problems = problems
         self._purpose = purpose
 
     def get(self, name: str) -> Item | None:
-        """Return the item with this name, or None."""
+        """Return the item with this name; None for an unknown name."""
         return self.known.get(name.strip())
 
     @staticmethod
@@ -35,7 +35,7 @@ class Scope:
         """Add an item to the scope; report a duplicate name at `part`."""
         own = {one.id: one for one in scope_of((item,)) if one.id}
         if item.switch is not None:
-            return  # its cases were added one by one
+            return  # the items of its cases were already added
         for name in self.names(item):
             self.know(part, name, own.get(name))
             if self._purpose == "send" and own.get(name, item).value is None:
@@ -73,7 +73,7 @@ class Scope:
         if part is None:
             return None
         if isinstance(part.data, str):
-            # A sent type may use names from outside; a received struct ignores 'value'.
+            # A sent type may use names outside the type; a received struct ignores 'value'.
             return self._expression(part, OUTER_NAMES if self._purpose == "type" else frozenset())
         from urc.expressions import compile_expression
 
@@ -107,7 +107,7 @@ class Scope:
 
 
 def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
-    """Yield the values of a type's items that use names outside the type."""
+    """Yield the item values of a type that use names outside the type."""
     for item in items:
         if item.value is not None and item.value.names & OUTER_NAMES:
             one = item.value

@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * Requests of an operator about alarms, over HTTP; the answer comes after the change is stored.
+ * An operator's requests about alarms, over HTTP. The server responds after it has stored the
+ * change.
  *
  * @typedef {import("./book.js").AlarmRow} AlarmRow
  * @typedef {{signals: string[], stored: boolean}} ActionAnswer
@@ -20,7 +21,7 @@
  */
 import { ask } from "../core/api_client.js";
 
-/** Choices for the time of a shelf, in minutes. */
+/** Choices for the duration of shelving, in minutes. */
 export const SHELF_MINUTES = Object.freeze([10, 60, 480, 1440]);
 
 export class AlarmActions {
@@ -30,7 +31,7 @@ export class AlarmActions {
   }
 
   /**
-   * Acknowledge alarms as the operator sees them.
+   * Acknowledge alarms in the state that the operator sees.
    *
    * @param {readonly Pick<AlarmRow, "signal" | "raised">[]} rows
    * @returns {Promise<ActionAnswer>}

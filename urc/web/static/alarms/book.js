@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The alarms of the robot, as the server lists them. It knows no DOM, no socket and no clock.
+ * The robot's alarms, as listed by the server. The module uses no DOM, socket or clock.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  *
@@ -12,9 +12,9 @@
  * @property {string} condition Exceeded limit, or alarm state.
  * @property {Priority} priority
  * @property {AlarmState} state
- * @property {number} number Number of the activation; the order of the numbers is first-out.
+ * @property {number} number Number of the activation; numbers increase in first-out order.
  * @property {number} group Number of the burst.
- * @property {number} raised Number that an acknowledgement must repeat.
+ * @property {number} raised Number of the alarm's last raise; an acknowledgement must repeat it.
  * @property {number} began
  * @property {string} value Value at the last change, as text.
  * @property {boolean} active
@@ -29,7 +29,7 @@
  * @property {string} action
  * @property {string} title Title of the signal.
  *
- * @typedef {Partial<AlarmRow> & Pick<AlarmRow, "signal">} SentRow The server leaves out default values.
+ * @typedef {Partial<AlarmRow> & Pick<AlarmRow, "signal">} SentRow The server omits default values.
  *
  * @typedef {object} AlarmsMessage
  * @property {number} now
@@ -57,15 +57,15 @@ export class AlarmBook {
     /** @type {Map<string, AlarmRow>} */
     this.rows = new Map();
     this.isFlooded = false;
-    /** Lead of the server's clock over this device's, in milliseconds. */
+    /** Offset from this device's clock to the server's clock, in milliseconds. */
     this.leadMs = 0;
-    /** Grows with each change. */
+    /** Increases with each change. */
     this.edition = 0;
     /** Last announced `raised` of each signal. @type {Map<string, number>} */
     this.announced = new Map();
   }
 
-  /** Forget the list: the next message has all alarms. */
+  /** Clear the list, because the next message contains all alarms. */
   clear() {
     this.rows.clear();
     this.isFlooded = false;
@@ -75,7 +75,7 @@ export class AlarmBook {
   /**
    * @param {AlarmsMessage} message
    * @param {number} nowMs time of day of this device
-   * @returns {AlarmRow[]} alarms that ask for an acknowledgement, and were not announced before
+   * @returns {AlarmRow[]} unacknowledged alarms that were not announced before
    */
   take(message, nowMs) {
     if (message.full) this.rows.clear();
@@ -91,7 +91,7 @@ export class AlarmBook {
     return fresh.sort(byUrgency);
   }
 
-  /** Alarms that operators must see, the most urgent first. */
+  /** Annunciated alarms, most urgent first. */
   listed() {
     return [...this.rows.values()].filter(({ state }) => state !== "shelved" && state !== "suppressed").sort(byUrgency);
   }
@@ -138,7 +138,7 @@ export function byFirstOut(one, other) {
 }
 
 /**
- * Return the alarm of a row as samples have it: the exceeded limit, or the severity of its state.
+ * Return a row's alarm in the form of samples: the exceeded limit, or the severity of its state.
  *
  * @param {Pick<AlarmRow, "condition" | "priority">} row
  * @returns {Alarm}
@@ -148,11 +148,11 @@ export function levelOf({ condition, priority }) {
   return priority === "high" ? "major" : "minor";
 }
 
-/** Fewest alarms of a burst that are grouped. */
+/** Minimum number of alarms in a burst for grouping. */
 const LEAST_GROUP = 3;
 
 /**
- * Group the alarms of each burst during a flood; otherwise each alarm stands alone.
+ * Group the alarms of each burst during a flood; otherwise, return single alarms.
  *
  * @param {AlarmRow[]} rows sorted
  * @param {boolean} isFlooded

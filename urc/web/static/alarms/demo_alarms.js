@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The alarms of a demo: the page judges the readings and plays the server.
+ * The alarms of a demo. The page derives alarms from the readings, in place of the server.
  *
  * @typedef {import("../core/types.js").Alert} Alert
  * @typedef {import("../live/store.js").Store} Store
@@ -18,7 +18,8 @@ const GRAVE = ["lolo", "hihi", "major"];
 export class DemoAlarms {
   /**
    * @param {Store} store
-   * @param {readonly Partial<Alert>[] | undefined} given alarms of the demo; without them the readings count
+   * @param {readonly Partial<Alert>[] | undefined} given alarms of the demo; by default, they
+   *   follow from the readings
    * @param {(text: string) => void} say
    * @param {() => void} wake
    */

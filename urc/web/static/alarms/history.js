@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The history of a robot's alarms: newest first, with a search, older events on demand.
+ * A robot's alarm history: newest events first, with a search, and older events on demand.
  *
  * @typedef {import("./actions.js").AlarmEvent} AlarmEvent
  */
@@ -11,14 +11,14 @@ import { write } from "../widgets/kit.js";
 import { conditionText, EVENTS, SIGNS } from "./phrases.js";
 
 const AT_ONCE = 50;
-/** Pause in typing after which the search starts. */
+/** Typing pause before the search starts. */
 const TYPING_MS = 300;
 
 export class AlarmHistory {
   /** @param {(query: {text: string, before: number, last: number}) => Promise<{events: AlarmEvent[], has_more: boolean, fault: string, lost: number}>} load */
   constructor(load) {
     this.load = load;
-    /** Number of the last request: it wins over earlier ones. */
+    /** Number of the last request; responses to earlier requests are ignored. */
     this.round = 0;
     this.oldest = 0;
     /** @type {number | undefined} */

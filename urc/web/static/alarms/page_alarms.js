@@ -1,7 +1,7 @@
 // @ts-check
 /**
  * The alarms of a robot's page: strip, sheet, sound, title of the document, and the announcement for
- * screen readers. Widgets follow the same list.
+ * screen readers. Widgets use the same list.
  *
  * @typedef {import("../core/types.js").Alert} Alert
  * @typedef {import("../core/types.js").Lease} Lease
@@ -18,7 +18,7 @@ import { AlarmSheet } from "./sheet.js";
 import { ALWAYS, AlarmSound } from "./sound.js";
 import { AlarmStrip } from "./strip.js";
 
-/** Shortest time between two announcements to a screen reader. */
+/** Minimum time between two announcements to a screen reader. */
 const SAY_EVERY_MS = 3000;
 const MAY_ACT = new Set(["drive", "maintain", "administer"]);
 
@@ -44,7 +44,7 @@ export class PageAlarms {
     this.actions = new AlarmActions(path);
     this.sound = new AlarmSound(storage());
     this.title = document.title;
-    /** New alarms that wait for their announcement. @type {Map<string, AlarmRow>} */
+    /** New alarms that have not been announced yet. @type {Map<string, AlarmRow>} */
     this.fresh = new Map();
     this.saidMs = -Infinity;
     /** @type {number | undefined} */
@@ -63,7 +63,7 @@ export class PageAlarms {
       acknowledge: (row) => void this.acknowledge([row]),
     });
     root.addEventListener("click", (event) => {
-      // A press in the sheet may change its order or open a burst.
+      // A press in the sheet may reorder the list or open a burst.
       if (event.target instanceof Node && this.sheet.el.contains(event.target)) wake();
     });
   }
@@ -79,12 +79,12 @@ export class PageAlarms {
     this.announce();
   }
 
-  /** A new connection sends the whole list again. */
+  /** After a reconnect, the server sends the whole list again. */
   clear() {
     this.book.clear();
   }
 
-  /** Announce new alarms in one sentence, and not more often than a voice can follow. */
+  /** Announce new alarms in one sentence, and only as often as a screen reader can speak. */
   announce() {
     clearTimeout(this.timer);
     const leftMs = this.saidMs + SAY_EVERY_MS - performance.now();
@@ -118,7 +118,7 @@ export class PageAlarms {
     this.sound.mute(minutes === Infinity ? ALWAYS : minutes > 0 ? Date.now() + 60_000 * minutes : 0);
   }
 
-  /** Whether this page may acknowledge and shelve; the lease has the role of the moment. */
+  /** Whether this page may acknowledge and shelve; the lease contains the current role. */
   get mayAct() {
     const lease = this.lease();
     return lease === null ? "mayAct" in this.strip.el.dataset : MAY_ACT.has(lease.role ?? "");

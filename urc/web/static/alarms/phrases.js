@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Texts of alarms: shape, word, value, and the state.
+ * Texts of alarms: shape, word, value and state.
  *
  * @typedef {import("./book.js").AlarmRow} AlarmRow
  * @typedef {import("../live/store.js").Store} Store
@@ -10,7 +10,7 @@ import { mark, t } from "../core/words.js";
 import { ALARMS } from "../widgets/kit.js";
 import { levelOf } from "./book.js";
 
-/** Shape of each priority: colour alone is not enough. */
+/** Shape of each priority, because colour alone is not enough. */
 export const SIGNS = Object.freeze({ high: "▲", medium: "◆", low: "■" });
 /** @type {Readonly<Record<string, string>>} */
 export const STATES = Object.freeze({
@@ -53,7 +53,7 @@ export function conditionText(condition) {
 }
 
 /**
- * Return an alarm state as words: many robots write PROTECTIVE_STOP.
+ * Return an alarm state as words, because many robots use names such as PROTECTIVE_STOP.
  *
  * @param {string} state
  */
@@ -75,14 +75,14 @@ export function titleOf(row, store) {
  * @param {AlarmRow} row
  * @param {Store} store
  * @param {number} nowMs on the page's clock
- * @param {boolean} [hasAge] whether the text has the age of a stale value
+ * @param {boolean} [hasAge] whether the text includes the age of a stale value
  */
 export function valueText(row, store, nowMs, hasAge = true) {
   const level = levelOf(row);
   const { text, unit, state, age } = store.reading(row.signal, nowMs);
   const isShown = state === "live" || state === "stale";
   if (!row.known && !isShown) return t("value unknown");
-  // An alarm state is its own value.
+  // An alarm state is also the value.
   if (level === "major" || level === "minor") return isShown && !row.active ? text : "";
   if (!isShown) return row.value;
   const value = unit ? `${text} ${unit}` : text;

@@ -24,7 +24,10 @@ import { byFirstOut, byUrgency, grouped } from "./book.js";
 import { AlarmHistory } from "./history.js";
 import { conditionText, leftText, lineOf, PRIORITIES, SIGNS, STATES, titleOf } from "./phrases.js";
 
-/** Most drawn alarms; the rest is counted. A flood must not slow the page down. */
+/**
+ * Limit on displayed alarms; further alarms are only counted, so that a flood does not slow the
+ * page down.
+ */
 const MOST_SHOWN = 100;
 
 export class AlarmSheet {
@@ -70,7 +73,7 @@ export class AlarmSheet {
       this.hiddenList,
       this.history.el,
     );
-    /** Unacknowledged alarms that are in sight. @type {AlarmRow[]} */
+    /** Visible unacknowledged alarms. @type {AlarmRow[]} */
     this.waiting = [];
     parent.append(this.el);
   }
@@ -111,7 +114,7 @@ export class AlarmSheet {
     const hidden = book.hidden();
     const serverMs = Date.now() + book.leadMs;
     this.say(book, listed.length);
-    // The buttons stay the same elements until something other than a value or a time changes.
+    // The button elements are replaced only if more than values and times have changed.
     const look = JSON.stringify([book.edition, this.isFirstOut, mayAct, [...this.opened]]);
     if (look !== this.drawn) {
       this.drawn = look;
@@ -154,7 +157,7 @@ export class AlarmSheet {
         continue;
       }
       const isOpen = this.opened.has(first?.group ?? -1);
-      sight.push(...group); // its line says how many they are
+      sight.push(...group); // its line contains their number
       items.push(this.burst(group, isOpen, store, mayAct));
       left -= 1;
       if (!isOpen) continue;

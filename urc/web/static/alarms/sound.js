@@ -1,16 +1,17 @@
 // @ts-check
 /**
- * The sound of new alarms, which can be muted for a time or on this device. The list never depends on it.
+ * The sound of new alarms, which can be muted for a time or on this device. The list does not
+ * depend on the sound.
  *
  * Browsers allow sound only after the first touch of the page.
  */
 
 const MUTED = "urc-alarms-muted";
 const TONE_S = 0.25;
-/** Shortest time between two sounds; during a flood, one sound for each burst is enough. */
+/** Minimum time between two sounds; during a flood, one sound per burst is enough. */
 const GAP_MS = 2000;
 const FLOOD_GAP_MS = 15_000;
-/** End of a mute without an end. */
+/** End time of an unlimited mute. */
 export const ALWAYS = Number.MAX_SAFE_INTEGER;
 
 export class AlarmSound {
@@ -51,7 +52,7 @@ export class AlarmSound {
   }
 
   /**
-   * Announce new alarms, at most once in a while.
+   * Announce new alarms, at a limited rate.
    *
    * @param {boolean} isUrgent whether one of them has high priority
    * @param {boolean} isFlooded

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The strip under the bar, only while there is an alarm: the most urgent one, its action, and the number
- * of all. A tap opens the list. It flashes until the alarms are acknowledged.
+ * The strip under the bar, shown only during alarms: the most urgent alarm, its action, and the
+ * number of all alarms. A tap opens the list. The strip flashes until the alarms are acknowledged.
  *
  * @typedef {import("./book.js").AlarmBook} AlarmBook
  * @typedef {import("./book.js").AlarmRow} AlarmRow
@@ -23,7 +23,11 @@ export class AlarmStrip {
     this.line = made("span", { class: "urc-alarm-line" });
     this.action = made("span", { class: "urc-alarm-action" });
     this.more = made("span", { class: "urc-alarm-more" });
-    /** The shown alarm: only this one is acknowledged here. @type {AlarmRow | undefined} */
+    /**
+     * The shown alarm, which is the only one that the strip acknowledges.
+     *
+     * @type {AlarmRow | undefined}
+     */
     this.shown = undefined;
     const see = () => this.shown && acknowledge(this.shown);
     this.seen = made(

@@ -1,25 +1,28 @@
 // @ts-check
 /**
- * Confirmations of commands, asked in the cell of the widget. They cover nothing else, so STOP stays
+ * Confirmations of commands, shown in the widget's cell. They cover nothing else, so STOP stays
  * reachable. No answer means no.
  *
- * For the two-person rule the server also asks the other pages; their questions are shown below the
- * heading of the page.
+ * For the two-person rule, the server also asks the other pages. Their questions are shown below
+ * the page's heading.
  *
  * @typedef {import("../core/types.js").Value} Value
  * @typedef {import("../core/types.js").Question} Question
  *
- * @typedef {object} Ticket A confirmation of the operator.
+ * @typedef {object} Ticket An operator's confirmation.
  * @property {(run: number) => void} began reports that the command is under way
  * @property {() => void} close
  */
 import { slide } from "./slide_to_confirm.js";
 import { t } from "../core/words.js";
 
-/** Time limit of a question, and of one about a hazard. */
+/** Time limits of normal questions and of questions about a hazard. */
 const ASK_MS = 10_000;
 const HAZARD_MS = 5000;
-/** Taps within this time of the first one do not count: the operator has not read the question yet. */
+/**
+ * Taps within this time after the first tap do not count, because the operator has not read the
+ * question yet.
+ */
 const READ_MS = 400;
 
 /**
@@ -34,7 +37,7 @@ export function questionsOf(asks, args) {
 }
 
 /**
- * Show the remaining time as an edge of the question that shrinks, from the whole again at each call.
+ * Show the remaining time as a shrinking edge of the question. Each call starts with the full edge.
  *
  * @param {HTMLElement} box
  * @param {number} limitMs
@@ -61,7 +64,7 @@ export class ConfirmDialog {
   }
 
   /**
-   * Ask in the cell; reject with an Error named "Cancelled" when the answer is no.
+   * Ask in the cell; reject with an Error named "Cancelled" if the answer is no.
    *
    * @param {HTMLElement} cell
    * @param {Question[]} questions
@@ -121,7 +124,7 @@ export class ConfirmDialog {
       no.addEventListener("click", () => refuse(t("Cancelled")), { signal: end.signal, once: true });
       box.addEventListener("keydown", (event) => {
         if (event.key !== "Escape") return;
-        event.preventDefault(); // Escape means no here, and not STOP
+        event.preventDefault(); // here, Escape means no instead of STOP
         no.click();
       }, { signal: end.signal });
       const isRead = () => performance.now() - askedMs > READ_MS;
@@ -212,7 +215,7 @@ export class ConfirmDialog {
     for (const refuse of [...this.standing]) refuse(why);
   }
 
-  /** Remove all questions after a loss of the server. */
+  /** Remove all questions after a loss of the connection to the server. */
   lost() {
     for (const box of this.others.values()) box.remove();
     this.others.clear();

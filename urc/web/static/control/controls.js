@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The control bar below the widgets of a robot that moves: the driving operator, and STOP.
+ * The control bar below the widgets of a robot with motion: the operator in control, and STOP.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("./drive.js").Verb} Verb
@@ -14,7 +14,7 @@ import { said, t } from "../core/words.js";
 
 /** @type {Verb[]} */
 const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
-/** Verbs after which the operator wants to drive. @type {ReadonlySet<Verb>} */
+/** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
 const BEFORE_DRIVING = new Set(["reset", "take", "ask", "force"]);
 
 export class Controls {
@@ -29,7 +29,7 @@ export class Controls {
     this.el = el;
     this.drive = drive;
     this.input = input;
-    /** Whether the next Tab from a held control goes to Reset. */
+    /** Whether the next Tab from a held control moves the focus to Reset. */
     this.isResetNext = false;
     this.who = part(el, "[data-who]");
     this.latched = part(root, "[data-latched]");
@@ -52,8 +52,9 @@ export class Controls {
   }
 
   /**
-   * Let the first Tab after STOP go from a held control to Reset: the way there is long, and STOP must not
-   * move the focus itself, because a second press of Space would then press Reset.
+   * Make the first Tab after STOP move the focus from a held control to Reset, which would
+   * otherwise take many Tabs. STOP must not move the focus itself, because a second press of Space
+   * would then press Reset.
    *
    * @param {KeyboardEvent} event
    */
@@ -67,7 +68,7 @@ export class Controls {
   }
 
   /**
-   * Move the focus of the keyboard from a button that disappears.
+   * Move the keyboard focus away from a button that disappears.
    *
    * @param {Verb} verb
    */

@@ -1,9 +1,10 @@
 // @ts-check
 /**
- * Dead-man controls: on a page that has one, held controls only count while one of them is active.
+ * Dead-man controls. On a page with dead-man controls, held controls count only while one of them
+ * is active.
  *
- * One that must be held is active while it is held. One that is switched on switches off after a time
- * without motion. Any event that releases held controls releases both kinds.
+ * A dead-man control for holding is active while it is held. A dead-man switch switches off after a
+ * time without motion. Any event that releases held controls releases both kinds.
  *
  * @typedef {import("../core/types.js").GateSpec} GateSpec
  *
@@ -15,7 +16,7 @@
 import { Control, HeldControl } from "./held_control.js";
 import { t } from "../core/words.js";
 
-/** A dead-man control has no command of its own. */
+/** A dead-man control has no command. */
 const NOTHING = {
   command: "", names: {}, fixed: {}, ranges: {}, neutral: {}, line: "", refusal: "", isHeld: true,
   leaseMs: 0, isAnswered: false,
@@ -31,11 +32,11 @@ export class DeadMan {
     this.spec = spec;
     this.isOpen = false;
     this.reason = "";
-    /** Time at which a switched-on control switches off. */
+    /** Time at which a dead-man switch switches off. */
     this.untilMs = 0;
     const { el, key, pad = "" } = spec;
     const keys = key ? [key, "Enter"] : ["Enter"];
-    /** The held control of one that must be held; it handles all kinds of release. */
+    /** The held control of a dead-man control for holding; it handles all kinds of release. */
     this.grip = new HeldControl(this, new Control(""), NOTHING, {
       el, keys, pad,
       ...(key && { page: () => /** @type {const} */ ("all") }),
@@ -44,7 +45,7 @@ export class DeadMan {
     });
   }
 
-  /** Whether it is held now. */
+  /** Whether it is currently held. */
   get isHeld() {
     return this.isOpen && this.grip.hand !== null;
   }

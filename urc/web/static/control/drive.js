@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The lease and STOP of this page. It knows the socket and no widget.
+ * The lease and STOP of this page. The module uses the socket, and no widgets.
  *
  * @typedef {import("../core/types.js").Lease} Lease
  * @typedef {import("../live/socket.js").Socket} Socket
@@ -11,25 +11,25 @@
 import { request } from "../core/server.js";
 import { RedundantSocket } from "./redundant_socket.js";
 
-/** Silence of the server after which STOP is also sent by HTTP. */
+/** Time without messages from the server after which STOP is also sent over HTTP. */
 const STOP_AGAIN_MS = 300;
 const POST_WITHIN_MS = 3000;
-/** Round-trip time above which packet loss costs too much time: see `RedundantSocket`. */
+/** Round-trip time above which packet loss takes too much time; see `RedundantSocket`. */
 const FAR_MS = 40;
-/** Interval of heartbeats that means loss or delay. */
+/** Interval between heartbeats that indicates loss or delay. */
 const LATE_BEAT_MS = 150;
 /** Time for which a link counts as lossy after a loss. */
 const LOSSY_MS = 5000;
 /**
- * Time after a tick in which the browser may not have reported that it was sent; another may follow
- * within it. Browsers report that at low priority, after painting.
+ * Time after a tick in which the browser may not have reported its sending yet, so another tick may
+ * follow. Browsers report sent data at low priority, after painting.
  */
 const LEAVING_MS = 8;
 
 export class Drive {
   /**
    * @param {Socket} socket
-   * @param {string} stopUrl URL of STOP while the socket is down
+   * @param {string} stopUrl URL for STOP requests without a working socket
    * @param {() => void} changed callback for changes of the display
    * @param {string} [spareUrl] URL of the redundant socket
    */
@@ -39,23 +39,27 @@ export class Drive {
     this.changed = changed;
     /** @type {Lease | null} */
     this.lease = null;
-    /** Number of STOPs in the server's last message; null before the first. @type {number | null} */
+    /**
+     * Number of STOPs in the server's last message; null before the first message.
+     *
+     * @type {number | null}
+     */
     this.stops = null;
-    /** Newest heartbeat number of the server; 0 before the first. */
+    /** Newest heartbeat number from the server; 0 before the first heartbeat. */
     this.beat = 0;
     this.beatMs = 0;
     /** Time of the last late heartbeat, on this page's clock. */
     this.lateMs = -Infinity;
     this.spare = new RedundantSocket(spareUrl, (message) => this.hear(message.n, performance.now()));
-    /** Time of the last tick that left an empty buffer. */
+    /** Time of the last tick that left the buffer empty. */
     this.freeMs = -Infinity;
     /** Counter of messages about held controls. */
     this.number = 0;
     /** @type {StopPhase} */
     this.phase = "";
-    /** Response to STOP by HTTP. @type {{latched: string, confirmed: boolean} | null} */
+    /** Response to STOP over HTTP. @type {{latched: string, confirmed: boolean} | null} */
     this.posted = null;
-    /** Why the last request about the controls was refused. */
+    /** Reason for refusing the last request about the controls. */
     this.refusal = "";
     /** Time at which the asking page gets the controls, on this page's clock. */
     this.handedMs = 0;
@@ -98,7 +102,7 @@ export class Drive {
   }
 
   /**
-   * Take a heartbeat number from either socket.
+   * Accept a heartbeat number from either socket.
    *
    * @param {number} beat
    * @param {number} nowMs
@@ -122,7 +126,7 @@ export class Drive {
     else if ((this.socket.tripMs ?? 0) > FAR_MS || this.isLossy) this.spare.want(this.lease?.spare ?? "");
   }
 
-  /** Whether a tick would be sent at once. */
+  /** Whether a tick would be sent immediately. */
   get isFree() {
     return this.isClear || this.spare.isFree;
   }
@@ -133,11 +137,11 @@ export class Drive {
   }
 
   /**
-   * Send a message about held controls on all sockets; a tick only into an empty buffer.
+   * Send a message about held controls on all sockets; send a tick only into an empty buffer.
    *
    * @param {Record<string, unknown>} message
    * @param {boolean} isTick
-   * @returns {boolean} whether the browser took it
+   * @returns {boolean} whether the browser accepted it
    */
   tell(message, isTick = false) {
     this.number += 1;
@@ -148,7 +152,7 @@ export class Drive {
     return this.spare.send(numbered) || isSent;
   }
 
-  /** Forget the lease after a loss of the server. */
+  /** Discard the lease after a loss of the connection to the server. */
   lost() {
     if (this.lease?.latched) {
       this.posted = { latched: this.lease.latched, confirmed: this.lease.confirmed };
@@ -167,14 +171,14 @@ export class Drive {
 
   /**
    * @param {Verb} verb
-   * @returns {boolean} whether the browser took it
+   * @returns {boolean} whether the browser accepted it
    */
   say(verb) {
     this.refusal = "";
     return this.socket.send({ t: "drive", verb });
   }
 
-  /** Stop the robot: at once by the socket, and by HTTP if the server does not react. */
+  /** Stop the robot: immediately over the socket, and over HTTP if the server does not react. */
   stop() {
     this.settle("sending");
     if (this.tell({ t: "stop" })) {

@@ -1,10 +1,11 @@
 // @ts-check
 // STOP before the modules of a page have loaded, and on a page without modules.
 //
-// A classic script in the head: it runs before the browser shows the first button. It handles each button
-// with `data-early-stop`, and Escape on the page of a robot. A module that arms a button removes
-// the attribute. The element around the button has the URL in `data-stop` and the texts for each phase
-// in `data-stop-words`. A module that listens to `urc-early-stop` on that element takes the press over.
+// This classic script in the head runs before the browser shows the first button. It handles each
+// button with `data-early-stop`, and Escape on the page of a robot. A module that arms a button
+// removes the attribute. The element around the button has the URL in `data-stop` and the texts for
+// each phase in `data-stop-words`. A module that listens to `urc-early-stop` on that element takes
+// over the press.
 {
   /** Time limit for the robot's acknowledgement. */
   const WITHIN_MS = 5000;
@@ -39,7 +40,7 @@
     } catch (error) {
       console.warn("URC: STOP could not be delivered:", error);
       show(button, place, "fault");
-      // The modules may have started meanwhile: then they repeat the press.
+      // The modules may have started meanwhile. If so, they repeat the press.
       place.dispatchEvent(new Event("urc-early-stop", { cancelable: true }));
     }
   };
@@ -48,7 +49,7 @@
   const pressed = (event) =>
     event.target instanceof Element ? (event.target.closest("[data-early-stop]") ?? undefined) : undefined;
 
-  /** The pointer whose touch has acted already: its click is the same press. */
+  /** The pointer whose touch has already acted; its click is the same press. */
   let counted = NaN;
   document.addEventListener("pointerdown", (event) => {
     const button = event.button === 0 ? pressed(event) : undefined;

@@ -1,17 +1,18 @@
 // @ts-check
 /**
- * Gamepads: a stick moves something only while the shoulder button of its side is held.
+ * Gamepads. A stick has an effect only while the shoulder button on its side is held.
  *
- * A press counts only if all sticks that hold nothing were at rest. A gamepad that vanishes, is replaced,
- * or sends unchanged deflections for too long releases its controls; plugging one in enables nothing.
- * Browsers know the layout of some gamepads ("standard"); others need a mapping stored on this device.
+ * A press of that button counts only if all sticks without a held control were at rest. A gamepad
+ * that disappears, is replaced, or sends unchanged deflections for too long releases its controls.
+ * Plugging in a gamepad enables nothing. Browsers know the layout of some gamepads ("standard");
+ * others need a mapping stored on this device.
  *
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  * @typedef {import("../core/types.js").Hand} Hand
  * @typedef {import("../core/types.js").PadView} PadView
  * @typedef {import("../widgets/gamepad_map.js").PadMap} PadMap
  *
- * @typedef {object} Held The part of a held control that a gamepad needs.
+ * @typedef {object} Held The interface of a held control for gamepads.
  * @property {HoldSpec} spec
  * @property {Hand | null} hand
  * @property {(kind: Hand["kind"]) => Hand} newHand
@@ -40,7 +41,7 @@ export class Gamepads {
     this.stampMs = 0;
     /** Held buttons for speed steps. @type {Set<string>} */
     this.down = new Set();
-    /** Name of a device → its mapping. @type {Map<string, PadMap | null>} */
+    /** Mapping by device name. @type {Map<string, PadMap | null>} */
     this.maps = new Map();
     addEventListener("gamepadconnected", () => {
       this.isConnected = true;
@@ -78,7 +79,7 @@ export class Gamepads {
 
   /**
    * Store the mapping of a device; null restores the browser's layout. Held controls are released,
-   * because the same deflection has another meaning now.
+   * because the mapping changes the meaning of deflections.
    *
    * @param {string} id
    * @param {PadMap | null} map
@@ -139,7 +140,7 @@ export class Gamepads {
    * @param {Gamepad} pad
    * @param {PadMap} map
    * @param {[number, number, number, number]} sticks
-   * @param {ReadonlySet<string>} ready sides that may begin in this frame
+   * @param {ReadonlySet<string>} ready sides on which a hold may begin in this frame
    */
   stepOne(grip, all, pad, map, sticks, ready) {
     const side = grip.spec.pad || "left";
@@ -150,7 +151,7 @@ export class Gamepads {
       this.ready.add(side);
       return;
     }
-    this.ready.delete(side); // each press counts once; off-centre it needs another press
+    this.ready.delete(side); // each press counts once; off-centre, press again
     if (grip.hand?.kind === "pad") {
       const buttons = pad.buttons.map(({ pressed }) => pressed);
       Object.assign(grip.hand, { axes: [across, along], sticks, buttons });
@@ -178,7 +179,7 @@ export class Gamepads {
    * @param {number} nowMs
    */
   isFrozen({ timestamp }, nowMs) {
-    if (timestamp === undefined) return false; // without timestamps a freeze cannot be detected
+    if (timestamp === undefined) return false; // a freeze cannot be detected without timestamps
     if (timestamp !== this.stamp) {
       this.stamp = timestamp;
       this.stampMs = nowMs;
@@ -188,7 +189,7 @@ export class Gamepads {
 }
 
 /**
- * Whether a press may count: all sticks that hold nothing are at rest.
+ * Whether a press may count, because all sticks without a held control are at rest.
  *
  * @param {Held} grip
  * @param {Held[]} all

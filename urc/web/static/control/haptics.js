@@ -1,7 +1,7 @@
 // @ts-check
 /**
  * Haptic feedback: one pulse for the start of a hold, one at the end of the travel, two for a refusal.
- * It is never the only feedback, because many devices have none.
+ * It is never the only feedback, because many devices do not support vibration.
  */
 
 const TICK_MS = 12;
@@ -20,7 +20,7 @@ const CALM = "(prefers-reduced-motion: reduce)";
 const last = new WeakMap();
 
 /**
- * Report the state of a control; changes are felt.
+ * Report the state of a control; changes cause haptic feedback.
  *
  * @param {object} control the same object in all calls
  * @param {boolean} isHeld
@@ -43,7 +43,7 @@ export function feel(control, isHeld, isSpent, values) {
 
 /** @param {number | number[]} pattern */
 function buzz(pattern) {
-  // Before the first touch browsers refuse vibration with a warning.
+  // Before the first touch, browsers refuse vibration with a warning.
   if (!("vibrate" in navigator) || !navigator.userActivation?.hasBeenActive) return;
   if (matchMedia(CALM).matches) return;
   navigator.vibrate(pattern);

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * A held control: its input by a pointer, keys or a gamepad, and its command.
+ * A held control, with input from a pointer, keys or a gamepad, and its command.
  *
- * One input at a time holds it. A lever may keep its position after the release of the pointer, while
- * another control holds the robot. The owner of all held controls decides about the effects.
+ * Only one input at a time holds it. A lever may keep its position after the release of the
+ * pointer, while another control is held. The owner of all held controls decides about the effects.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Hand} Hand
@@ -14,7 +14,8 @@
  * @typedef {object} Holder The owner of all held controls.
  * @property {(grip: HeldControl) => void} begin
  * @property {(grip: HeldControl) => void} moved The input has changed.
- * @property {(grip: HeldControl) => boolean} isGuarded Whether another control is held, so that it may stay.
+ * @property {(grip: HeldControl) => boolean} isGuarded Whether another control is held, so that
+ *   this one may keep its position.
  * @property {(grip: HeldControl) => void} end
  * @property {(grip: HeldControl) => void} forget
  */
@@ -25,12 +26,12 @@ import { argumentsOf } from "../widgets/output.js";
 import { MergedAxes } from "./merge_axes.js";
 import { t } from "../core/words.js";
 
-/** Every kind of input, to release all. @type {Hand["kind"][]} */
+/** All kinds of input, for releasing all. @type {Hand["kind"][]} */
 export const ANY = ["pointer", "keys", "pad", "stay"];
-/** Longest time step for a widget; a longer gap is not made up for. */
+/** Maximum time step for a widget; the excess of a longer gap is ignored. */
 const LONGEST_STEP_S = 0.1;
 
-/** One held command with its held controls: two sticks may share a command. */
+/** One held command with its held controls, for example two sticks with one command. */
 export class Control {
   /** @param {string} command */
   constructor(command) {
@@ -41,18 +42,18 @@ export class Control {
     /** @type {HoldPhase} */
     this.phase = "idle";
     this.reason = "";
-    /** Lease in which it was stopped: only a later one moves it again. */
+    /** Lease in which the command was stopped; only a later lease permits motion again. */
     this.closedEpoch = -1;
     this.epoch = 0;
     this.askedMs = 0;
-    /** Time of the last tick outside the animation frames. */
+    /** Time of the last tick outside an animation frame. */
     this.movedMs = -Infinity;
     this.sentMs = -Infinity;
     this.sent = "";
     this.isReleaseOwed = false;
   }
 
-  /** Time for which the motion outlives the last tick. */
+  /** Time for which motion continues after the last tick. */
   get leaseMs() {
     return Math.min(...[...this.grips].map((grip) => grip.output.leaseMs));
   }
@@ -91,7 +92,8 @@ export class HeldControl {
     el.addEventListener("pointerdown", (event) => this.down(event), options);
     // The canvas for early moves must not cover buttons inside the element.
     if (!this.spec.isFree && !el.querySelector("button, a, input, [tabindex]")) hurryMoves(el);
-    // Raw pointer events arrive before the animation frame, in secure contexts; others use moves.
+    // Raw pointer events arrive before the animation frame, but only in secure contexts; other
+    // contexts use moves.
     el.addEventListener("pointerrawupdate", (event) => this.move(/** @type {PointerEvent} */ (event)), options);
     el.addEventListener("pointermove", (event) => this.move(event), options);
     el.addEventListener("pointerup", (event) => this.up(event.pointerId, true), options);
@@ -117,7 +119,7 @@ export class HeldControl {
     this.spec.el.setPointerCapture(event.pointerId);
     const { clientX: x, clientY: y } = event;
     const hand = { ...this.newHand("pointer"), x, y, startX: x, startY: y };
-    if (this.hand) this.hand = hand; // it had kept its position: the gesture continues
+    if (this.hand) this.hand = hand; // it had kept its position, so the gesture continues
     else this.begin(hand);
   }
 
@@ -137,7 +139,7 @@ export class HeldControl {
 
   /**
    * @param {number} pointerId
-   * @param {boolean} isMeant whether the operator released it
+   * @param {boolean} isMeant whether the operator released it intentionally
    */
   up(pointerId, isMeant) {
     if (pointerId !== this.pointerId) return;
@@ -172,7 +174,7 @@ export class HeldControl {
   }
 
   /**
-   * Whether this control takes keys that go to an element.
+   * Whether this control accepts keys that are sent to an element.
    *
    * @param {EventTarget | null} target
    */
@@ -195,7 +197,11 @@ export class HeldControl {
     else if (this.hand?.kind === "keys") this.holder.moved(this);
   }
 
-  /** Release keys when the focus moves to an element that takes them. @param {EventTarget | null} target */
+  /**
+   * Release keys when the focus moves to an element that uses them.
+   *
+   * @param {EventTarget | null} target
+   */
   focusMoved(target) {
     if (this.spec.page && takesText(target)) this.drop(["keys"]);
   }
@@ -220,7 +226,7 @@ export class HeldControl {
   }
 
   /**
-   * Release, if one of these kinds of input holds it.
+   * Release the control if one of these kinds of input holds it.
    *
    * @param {Hand["kind"][]} kinds
    */
@@ -247,7 +253,7 @@ export class HeldControl {
    * Sample the widget for the present input.
    *
    * @param {number} nowMs
-   * @param {boolean} isNew whether the motion only begins now, from zero
+   * @param {boolean} isNew whether the motion begins now, from zero
    */
   take(nowMs, isNew = false) {
     if (!this.hand) return;
@@ -262,7 +268,7 @@ export class HeldControl {
   }
 
   /**
-   * Return the sampled values without arguments that another input gives.
+   * Return the sampled values without arguments that another input sets.
    *
    * @param {ReadonlySet<string>} lost arguments that belong to another input
    */
@@ -296,9 +302,9 @@ export class HeldControl {
 /**
  * Get pointer moves without the delay to the next animation frame.
  *
- * Raw pointer events exist only in secure contexts, and a dashboard on a local network has none. But
- * all browsers have desynchronized canvases, which deliver moves at once. So an empty canvas covers the
- * element. Without such canvases, moves arrive with the animation frames.
+ * Raw pointer events exist only in secure contexts, and a dashboard on a local network has none.
+ * But all browsers have desynchronized canvases, which deliver moves immediately. An empty canvas
+ * therefore covers the element. Without such canvases, moves arrive with the animation frames.
  *
  * @param {HTMLElement} el receives the pointer events of its children
  */

@@ -2,13 +2,13 @@
 /**
  * Held controls of a page: sampling on the main thread, and all kinds of release.
  *
- * A held control samples its widget when its input moves and in every animation frame. A change of the
- * values sends a tick at once; unchanged values repeat every 50 ms. No timer can outlive the page: a
- * hidden, frozen, blocked or closed page draws no frames and so sends nothing, and the server stops the
- * robot.
+ * A held control samples its widget when its input moves and in every animation frame. A change of
+ * the values sends a tick immediately; unchanged values are sent again every 50 ms. No timer sends
+ * ticks: a hidden, frozen, blocked or closed page draws no frames and therefore sends nothing, and
+ * the server stops the robot.
  *
- * Any other event of the page during a hold sets neutral and ends the gesture. After that, and after a
- * stop or a refusal, nothing is sent before a new gesture.
+ * Any other event of the page during a hold sends neutral values and ends the gesture. After that,
+ * and after a stop or a refusal, nothing is sent until a new gesture begins.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("../widgets/output.js").Output} Output
@@ -25,7 +25,7 @@ const ROLES = ["watch", "drive", "maintain", "administer"];
 const TICK_MS = 50;
 /** Time limit for the grant of the controls. */
 const ASK_MS = 1500;
-/** Shortest interval of early ticks of one control; moves in between wait for the frame. */
+/** Minimum interval between early ticks of one control; moves in between wait for the frame. */
 const SOONEST_MS = 4;
 
 export class Input {
@@ -50,7 +50,7 @@ export class Input {
     this.watch();
   }
 
-  /** Listen to all events of the page that release held controls. */
+  /** Listen for all page events that release held controls. */
   watch() {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
     addEventListener("blur", all(t("the window lost the focus")));
@@ -116,7 +116,7 @@ export class Input {
     return [...this.grips].some((grip) => grip.contains(target));
   }
 
-  /** Give the focus to the control that was held last, or else to the first one on the screen. */
+  /** Focus the last held control, or else the first one on the screen. */
   focus() {
     const found = [...(this.last ? [this.last] : []), ...this.grips].find(({ spec: { el } }) => {
       return el.tabIndex >= 0 && el.checkVisibility();
@@ -157,7 +157,7 @@ export class Input {
     if (refusal || !drive.say("take")) this.spend(control, refusal || t("no connection to URC"));
   }
 
-  /** Why nothing can be driven now; "" if the controls can be requested. */
+  /** Reason why driving is impossible now; "" if control can be requested. */
   refusal() {
     const refusal = this.against();
     if (refusal) return refusal;
@@ -166,7 +166,7 @@ export class Input {
     return isGated && !isOpen ? t("hold the dead-man control first") : "";
   }
 
-  /** Why this page may move nothing now. */
+  /** Reason why this page may not move the robot now. */
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
@@ -178,7 +178,7 @@ export class Input {
   }
 
   /**
-   * Why the role of this page is too low for a command; "" if it suffices, or is not known yet.
+   * Reason why this page's role is too low for a command; "" if it is sufficient or not known yet.
    *
    * @param {import("../core/types.js").Role} [needed]
    */
@@ -190,8 +190,8 @@ export class Input {
   }
 
   /**
-   * Why a single command cannot be given now: a watcher gives none, and autonomous motion does not start
-   * against STOP or against another operator.
+   * Reason why a single command cannot be sent now. Watchers send no commands, and autonomous
+   * motion does not start during STOP or while another operator drives.
    *
    * @param {boolean} moves
    */
@@ -201,7 +201,7 @@ export class Input {
   }
 
   /**
-   * Send a tick for a moved input at once, without waiting for the next frame.
+   * Send a tick for a moved input immediately, without waiting for the next frame.
    *
    * @param {HeldControl} grip
    */
@@ -223,7 +223,7 @@ export class Input {
       this.release(control);
       if (control.phase !== "spent") control.phase = "idle";
     }
-    // A lever that stays is released with the last control.
+    // A lever that keeps its position is released with the last held control.
     for (const other of [...control.grips]) other.check();
     grip.show();
   }
@@ -236,7 +236,7 @@ export class Input {
   }
 
   /**
-   * End the gesture: the control stays held without effect until it is released.
+   * End the gesture; the control has no effect until it is released and held again.
    *
    * @param {Control} control
    * @param {string} reason
@@ -274,8 +274,8 @@ export class Input {
   }
 
   /**
-   * Handle a stop or a refusal by the server. The first reason for the end of a gesture stays: ticks
-   * already sent are refused because of it.
+   * Handle a stop or a refusal by the server. The first reason for the end of a gesture stays,
+   * because it also causes the refusal of ticks already sent.
    *
    * @param {string} command
    * @param {string} reason
@@ -289,7 +289,7 @@ export class Input {
     if (control.grips.size === 0) this.release(control);
   }
 
-  /** Clear the reason of the last gesture after a change of the lease. */
+  /** Clear the last gesture's reason after a change of the lease. */
   leaseChanged() {
     for (const control of this.controls.values()) {
       if (control.phase !== "spent" || control.grips.size > 0 || this.drive.isLatched) continue;
@@ -305,7 +305,7 @@ export class Input {
     }
   }
 
-  /** Start sampling; it ends with the last hold. */
+  /** Start sampling, which ends with the last hold. */
   run() {
     if (this.isRunning) return;
     this.isRunning = true;
@@ -378,7 +378,7 @@ export class Input {
     const values = control.together.values(control.grips);
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
-    if (!drive.isFree) return; // wait for an empty buffer: the newest tick goes first
+    if (!drive.isFree) return; // wait for an empty buffer, so that the newest tick is sent first
     const { command, epoch } = control;
     const tick = { t: "tick", command, arguments: values, epoch, echo: drive.beat };
     control.isReleaseOwed = drive.tell(tick, true);

@@ -28,7 +28,7 @@ const SPACE = [
   ...["button", "switch", "checkbox", "radio", "tab", "option", "menuitem"].map((role) => `[role="${role}"]`),
 ].join();
 
-/** Whether the element takes text. @param {EventTarget | null} target */
+/** Whether the element accepts text. @param {EventTarget | null} target */
 export function takesText(target) {
   return target instanceof Element && target.closest(TEXT) !== null;
 }

@@ -1,15 +1,16 @@
 // @ts-check
 /**
- * The merged arguments of several inputs for one command: each argument belongs to the first input that
- * moved it.
+ * The merged arguments of several inputs for one command. Each argument belongs to the first input
+ * that moved it.
  *
- * An input at rest has no argument. An input that moves an argument of another one must first return to
- * rest. So a value never jumps from one input to another when a second one begins or the first one ends.
+ * An input at rest has no argument. An input that moves another input's argument must first return
+ * to rest. A value therefore never jumps between inputs when a second one begins or the first one
+ * ends.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {object} Giving A held control, as far as it matters here.
+ * @typedef {object} Giving The interface of a held control for merging.
  * @property {Pick<Output, "neutral" | "ranges">} output
  * @property {() => Record<string, Value>} given Its sampled values, by the names of the command.
  */
@@ -69,7 +70,7 @@ export class MergedAxes {
   }
 
   /**
-   * Whether an input owns an argument that it moves; a free one becomes its own.
+   * Whether an input owns an argument that it moves; it becomes the owner of a free argument.
    *
    * @param {Giving} grip
    * @param {string} name

@@ -7,14 +7,14 @@
  * @typedef {object} Grasp
  * @property {() => void} drop ends a hold, if there is one
  *
- * @typedef {"x" | "y" | "round"} Way direction of a drag: along an axis, or around a dial
+ * @typedef {"x" | "y" | "round"} Way drag direction: along an axis, or around a dial
  */
 
 /** Events that make a drag invalid. */
 const BREAKS = ["blur", "pagehide", "resize", "urc-let-go"];
-/** Distance below which a touch is no drag yet. */
+/** Distance below which a touch is not yet a drag. */
 const STILL_PX = 6;
-/** Time after which a resting finger on a dial counts as a drag, wherever it moves next. */
+/** Time after which a resting finger on a dial counts as a drag, regardless of its next move. */
 const REST_MS = 400;
 
 /**
@@ -28,7 +28,7 @@ export function isDown({ buttons }) {
 }
 
 /**
- * Whether a touch is a drag, and not a scroll of the page; null while that is open.
+ * Whether a touch is a drag and not a scroll of the page; null while undecided.
  *
  * @param {Way} way
  * @param {PointerEvent} from start of the touch
@@ -44,7 +44,7 @@ export function draws(way, from, to) {
 }
 
 /**
- * Let one pointer at a time hold an element.
+ * Allow one pointer at a time to hold an element.
  *
  * @param {HTMLElement} el
  * @param {object} spec
@@ -77,7 +77,7 @@ export function grasp(el, { take, move, release, cancel, isDrawing = false, way,
   const letGo = (/** @type {PointerEvent} */ event) => {
     if (event.pointerId === finger?.pointerId) hold(event); // a tap
     if (event.pointerId !== pointerId) return;
-    pointerId = -1; // first, so that the loss of capture that follows cancels nothing
+    pointerId = -1; // first, so that the subsequent loss of capture cancels nothing
     release(event);
   };
   el.addEventListener("pointerdown", (event) => {

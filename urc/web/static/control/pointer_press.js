@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * A press that acts on touch, not on release: STOP must not wait for the finger to lift.
+ * A press that acts on touch, not on release, because STOP must not wait until the finger lifts.
  */
 
 /**
@@ -13,7 +13,7 @@
  */
 export function whenPressed(el, act, signal) {
   const options = signal ? { signal } : {};
-  /** The pointer whose touch has acted already. */
+  /** The pointer whose touch has already acted. */
   let counted = NaN;
   el.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;

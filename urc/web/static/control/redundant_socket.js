@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The redundant socket of a page that drives over a lossy link.
+ * The redundant socket of a page in control over a lossy link.
  *
- * Packet loss delays all later data of a connection. Two connections rarely lose packets at the same
- * time, so messages about held controls go over both, and the first copy of each counts.
+ * Packet loss delays all later data of a connection. Two connections rarely lose packets at the
+ * same time, so messages about held controls are sent over both, and the first copy of each counts.
  */
 
 import { openSocket } from "../core/server.js";
@@ -13,7 +13,7 @@ const AGAIN_MS = 1000;
 export class RedundantSocket {
   /**
    * @param {string} url "" for no redundant socket
-   * @param {(message: any) => void} take handles messages of the server
+   * @param {(message: any) => void} take handles messages from the server
    */
   constructor(url, take) {
     this.url = url;
@@ -26,7 +26,7 @@ export class RedundantSocket {
     this.retry = undefined;
   }
 
-  /** Whether a message would be sent at once. */
+  /** Whether a message would be sent immediately. */
   get isFree() {
     return this.line?.readyState === WebSocket.OPEN && this.line.bufferedAmount === 0;
   }
@@ -66,7 +66,7 @@ export class RedundantSocket {
 
   /**
    * @param {object} message
-   * @returns {boolean} whether the browser took it into an empty buffer
+   * @returns {boolean} whether the browser accepted it into an empty buffer
    */
   send(message) {
     if (!this.isFree) return false;

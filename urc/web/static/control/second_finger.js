@@ -1,17 +1,17 @@
 // @ts-check
 /**
- * Taps of further fingers: while one finger holds a stick, another one taps a button.
+ * Taps by additional fingers, for example on a button while one finger holds a stick.
  *
- * Browsers make a click only for the first finger on the screen. This module makes it for the others, so
- * that speed steps, views and alarms react while the robot is driven.
+ * Browsers create clicks only for the first finger on the screen. This module creates them for
+ * other fingers, so that speed steps, views and alarms react during driving.
  */
 
 const PRESSED = "button, a[href], summary, label";
-/** Time for which a click of the browser for the same tap is ignored, in browsers that make one. */
+/** Time for which the browser's own click for the same tap is ignored, if there is one. */
 const SAME_MS = 500;
 
 export function tapWithAnyFinger() {
-  /** Pointer → the element under it when it went down. @type {Map<number, Element>} */
+  /** Element under each pointer at the start of its touch. @type {Map<number, Element>} */
   const down = new Map();
   /** @type {Element | null} */
   let clicked = null;
@@ -25,7 +25,7 @@ export function tapWithAnyFinger() {
   }, watch);
   addEventListener("touchstart", ({ defaultPrevented, target }) => {
     if (!defaultPrevented || !(target instanceof Node)) return;
-    // A held control takes no clicks: it has refused them for every finger.
+    // Held controls ignore clicks, from every finger.
     for (const [id, el] of down) if (el.contains(target)) down.delete(id);
   }, { passive: true });
   addEventListener("pointercancel", (event) => down.delete(event.pointerId), watch);
@@ -33,7 +33,7 @@ export function tapWithAnyFinger() {
     const el = down.get(event.pointerId);
     down.delete(event.pointerId);
     const { clientX, clientY } = event;
-    if (!el?.contains(document.elementFromPoint(clientX, clientY))) return; // it slid off
+    if (!el?.contains(document.elementFromPoint(clientX, clientY))) return; // the finger slid off
     const { pointerId, pointerType } = event;
     const click = { bubbles: true, cancelable: true, composed: true, clientX, clientY, pointerId, pointerType };
     el.dispatchEvent(new PointerEvent("click", click));

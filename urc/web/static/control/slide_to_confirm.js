@@ -11,8 +11,8 @@ const STILL_PX = 8;
 const WAY = 0.75;
 
 /**
- * Make an element a slide. It acts after a drag to its end with release, after a long press, or by the
- * arrow keys.
+ * Make an element a slide. It acts after a drag to its end and a release, after a long press, or on
+ * the arrow keys.
  *
  * @param {HTMLElement} el empty
  * @param {object} spec

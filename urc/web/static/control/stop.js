@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * STOP: the action of its buttons, and its state, for the bar and for widgets.
+ * STOP: the action of its buttons, and its state for the bar and for widgets.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("./input.js").Input} Input
@@ -26,7 +26,7 @@ export class StopButton {
     /** @type {Set<(state: StopState) => void>} */
     this.listeners = new Set();
     this.seen = "";
-    /** Called at each press, on this page or another. */
+    /** Called at each press on this or another page. */
     this.onPressed = () => {};
     if (hasKeys) {
       addEventListener("keydown", (event) => {
@@ -35,13 +35,13 @@ export class StopButton {
         event.preventDefault();
         this.press();
       });
-      // In the capture phase: during a hold both keys mean STOP, whatever has the focus.
+      // In the capture phase, because both keys mean STOP during a hold, regardless of the focus.
       addEventListener("keydown", (event) => this.space(event), { capture: true });
       addEventListener("keydown", (event) => this.escape(event), { capture: true });
     }
   }
 
-  /** Handle Escape: during a hold it means STOP alone. @param {KeyboardEvent} event */
+  /** Handle Escape, which means only STOP during a hold. @param {KeyboardEvent} event */
   escape(event) {
     if (event.key !== "Escape" || event.repeat || !this.input.isDriving()) return;
     event.preventDefault();
@@ -49,14 +49,18 @@ export class StopButton {
     this.press();
   }
 
-  /** Handle Space: STOP during a hold, else a press of the focused button. @param {KeyboardEvent} event */
+  /**
+   * Handle Space, which means STOP during a hold, and otherwise presses the focused button.
+   *
+   * @param {KeyboardEvent} event
+   */
   space(event) {
     if (event.code !== "Space" || event.ctrlKey || event.altKey || event.metaKey) return;
     if (takesText(event.target) || (takesSpace(event.target) && !this.input.isDriving())) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     if (event.repeat) return;
-    // Buttons act on key-up: swallow this one.
+    // Ignore this key-up, because buttons act on key-up.
     const end = new AbortController();
     const swallow = (/** @type {KeyboardEvent} */ up) => {
       if (up.code !== "Space") return;
@@ -74,7 +78,7 @@ export class StopButton {
   }
 
   /**
-   * Take the presses over from `early_stop.js`, and repeat one that it could not deliver.
+   * Take over presses from `early_stop.js`, and repeat a press that it could not deliver.
    *
    * @param {HTMLElement} root the element with the URL of STOP
    */
@@ -105,7 +109,7 @@ export class StopButton {
     return { phase, isLatched, isConfirmed, by, fault: this.fault() };
   }
 
-  /** Why STOP would not reach the robot now. */
+  /** Reason why STOP cannot reach the robot now. */
   fault() {
     if (!this.store.isUp && !this.drive.isConfirmed) return t("no connection to URC");
     const lost = this.lines.filter((line) => this.store.links.get(line)?.state === "lost");
@@ -113,14 +117,14 @@ export class StopButton {
   }
 
   /**
-   * Report a press on this page or another at once: a hidden page draws no frames, and the latch may be
-   * reset already.
+   * Report a press on this or another page immediately, because hidden pages draw no frames, and
+   * the latch may already be reset.
    */
   heard() {
     this.onPressed();
     const state = this.state();
     if (state.phase === "") for (const listener of this.listeners) listener({ ...state, phase: "latched" });
-    this.seen = ""; // reported again: each press ends autonomous motion
+    this.seen = ""; // reported again, because each press ends autonomous motion
     this.frame();
   }
 

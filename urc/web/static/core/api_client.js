@@ -1,11 +1,11 @@
 // @ts-check
 /**
- * Requests to this server's `/api/v1`, each with one reply or a reason of one line.
+ * Requests to this server's `/api/v1`, each with one reply or a one-line reason.
  */
 import { request } from "./server.js";
 import { t } from "./words.js";
 
-/** Time limit of a request; a test of a robot takes long. */
+/** Time limit of a request, long enough for the test of a robot. */
 const WITHIN_MS = 30_000;
 
 /**

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Entries of the audit log as text. It knows no DOM.
+ * Audit log entries as text. The module uses no DOM.
  *
  * @typedef {object} Entry
  * @property {number} id
@@ -24,7 +24,11 @@
  */
 import { mark } from "./words.js";
 
-/** A shape and a word each, because colour alone is not enough. @type {Readonly<Record<string, string>>} */
+/**
+ * Shape and word of each kind, because colour alone is not enough.
+ *
+ * @type {Readonly<Record<string, string>>}
+ */
 const SIGNS = {
   moved: mark("● moved"),
   stopped: mark("■ stopped"),
@@ -70,7 +74,8 @@ export function detailsOf({ command, arguments: given, outcome, times, lasted_s 
 }
 
 /**
- * Return arguments without the signs of JSON; a shortened text is no JSON and stays as it is.
+ * Return arguments without JSON punctuation; a shortened text is not valid JSON and stays
+ * unchanged.
  *
  * @param {string} given
  */

@@ -1,11 +1,15 @@
 // @ts-check
 /**
- * Causes of failed connections in the user's language, each with the next step. The server finds the
- * cause: see `urc.runtime.connection_cause`.
+ * Causes of failed connections in the user's language, each with a hint. The server determines the
+ * cause; see `urc.runtime.connection_cause`.
  */
 import { mark, t } from "./words.js";
 
-/** Program that a transport needs at the robot, by type of the transport. @type {Record<string, string>} */
+/**
+ * Program at the robot that a transport needs, by transport type.
+ *
+ * @type {Record<string, string>}
+ */
 const PROGRAMS = {
   ros: mark("Is rosbridge running?"),
   mqtt: mark("Is the MQTT broker running?"),
@@ -53,11 +57,11 @@ const CAUSES = {
 };
 
 /**
- * Return the cause of a failure and the next step.
+ * Return the cause of a failure and a hint.
  *
  * @param {string} cause name of the cause; "" if unknown
  * @param {string} address such as `ros 127.0.0.1:9090`
- * @param {string} detail message of the transport, for an unknown cause
+ * @param {string} detail the transport's message, for an unknown cause
  * @returns {{cause: string, step: string, isForeign: boolean}} `isForeign`: the cause is in English
  */
 export function causeWords(cause, address, detail) {
@@ -73,7 +77,7 @@ function typeOf(address) {
 }
 
 /**
- * Return an address without the type of its transport: `ros 127.0.0.1:9090` is `127.0.0.1:9090`.
+ * Return an address without its transport type, such as `127.0.0.1:9090` for `ros 127.0.0.1:9090`.
  *
  * @param {string} address
  */

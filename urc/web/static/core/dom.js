@@ -22,7 +22,7 @@ export function made(tag, is = {}, ...inside) {
 }
 
 /**
- * Replace the rows of a list; the focus stays by `data-key`.
+ * Replace the rows of a list; the focus stays on the element with the same `data-key`.
  *
  * @param {Element} list
  * @param {HTMLElement[]} rows
@@ -50,8 +50,8 @@ export function button(text, key, act, more = {}) {
 }
 
 /**
- * Enable the buttons of forms once their module has loaded. Before, the browser itself would submit the
- * form, which the page policy refuses.
+ * Enable the buttons of forms once their module has loaded. Before that, the browser itself would
+ * submit the form, which the page policy refuses.
  *
  * @param {ParentNode} root
  */

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Values and ages as text. It knows no store and no DOM.
+ * Values and ages as text. The module uses no store and no DOM.
  *
  * @typedef {import("./types.js").Held} Held
  * @typedef {import("./types.js").Signal} Signal
@@ -27,8 +27,8 @@ export function textOf(value, signal, factor) {
 }
 
 /**
- * Return the word for a value of a signal with `states`. A command takes the value as the robot sends
- * it.
+ * Return the word for a value of a signal with `states`. Commands use the values that the robot
+ * sends.
  *
  * @param {Pick<Signal, "states"> | undefined} signal
  * @param {unknown} value value from the robot, or a word
@@ -40,7 +40,7 @@ export function wordOf(signal, value) {
 }
 
 /**
- * Return short words in sequence; the line may only break between them.
+ * Return short words in sequence; lines may only break between words.
  *
  * @param {readonly string[]} words
  */

@@ -1,6 +1,6 @@
 // @ts-check
 // A classic script before the first paint, so that the grid does not jump. The device stores the
-// operator's hand; the rules of the grid have a layout for each.
+// operator's hand; the grid's rules have a layout for each hand.
 {
   const KEY = "urc-hand";
 
@@ -31,13 +31,13 @@
   else showChoice();
   document.addEventListener("change", ({ target }) => {
     if (!(target instanceof HTMLInputElement) || !target.matches("[data-hand-choice]")) return;
-    // Held controls are released before they move away under the finger.
+    // Release held controls before they move away from the finger.
     dispatchEvent(new CustomEvent("urc-let-go", { detail: "the layout was changed" }));
     show(target.value);
     try {
       localStorage.setItem(KEY, target.value);
     } catch {
-      // Private mode: the choice lasts until the page closes.
+      // In private mode, the choice lasts until the page closes.
     }
   });
 }

@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Makes the pages an installed app: they open without a server, with a message. It needs HTTPS or
- * localhost; elsewhere the pages work without it.
+ * Makes the pages an installed app, which opens with a message if the server is unavailable.
+ * Installation needs HTTPS or localhost; elsewhere, the pages work without it.
  */
 
 /** The only script that may become a service worker. */
 const WORKER = "/sw.js";
 
-/** @returns {string} the argument of `register` under a policy with trusted types */
+/** @returns {string} the argument for `register` under a policy with trusted types */
 function trusted() {
   const types = /** @type {any} */ (globalThis).trustedTypes;
   if (!types) return WORKER;

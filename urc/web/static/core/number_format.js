@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * Formatting of numbers: all significant digits, and no artefacts of floating point arithmetic. All
- * pages use it. Pure.
+ * Formatting of numbers with all significant digits, and without artefacts of floating-point
+ * arithmetic. All pages use it. Pure.
  */
 
 /** Significant digits without a declared precision. */
 const FIGURES = 4;
-/** Reliable digits of a number, as in a float of 32 bits: 73.0000019073486 is 73. */
+/** Reliable digits of a number, as in a 32-bit float, where 73.0000019073486 is 73. */
 const TRUSTED = 7;
-/** Most digits after the point. */
+/** Maximum number of digits after the point. */
 const MOST = 100;
 
 /**
@@ -33,8 +33,8 @@ export function rough(value) {
 }
 
 /**
- * Return the digits after the point in the displayed unit, for `digits` in the signal's unit: enough to
- * tell different values apart.
+ * Return the digits after the point in the displayed unit, for `digits` in the signal's unit, so
+ * that different values look different.
  *
  * @param {number | undefined} digits undefined is returned unchanged
  * @param {(value: number) => number} factor conversion to the displayed unit, as `unit` of the context
@@ -42,13 +42,14 @@ export function rough(value) {
 export function digitsIn(digits, factor) {
   if (digits === undefined) return undefined;
   const step = Math.abs(factor(1) - factor(0));
-  // An offset costs the step its last digits: a hundredth must still need two digits.
+  // An offset removes the last digits of the step, but a hundredth must still need two digits.
   const needed = Math.ceil(digits - Math.log10(step) - 1e-9);
   return Number.isFinite(needed) ? Math.min(MOST, Math.max(0, needed)) : digits;
 }
 
 /**
- * Return a signal's number in the displayed unit: by its precision, else with its own digits.
+ * Return a signal's number in the displayed unit, with the declared precision, or else with its own
+ * digits.
  *
  * @param {number} value in the signal's unit
  * @param {number | undefined} precision significant digits after the point, in the signal's unit
@@ -71,13 +72,17 @@ export function figure(value, precision, factor) {
 function asFine(value, shown, factor) {
   const came = digitsIn(placesOf(value), factor) ?? 0;
   const four = FIGURES - 1 - magnitude(shown);
-  // Near a large offset the last digits are artefacts of the arithmetic.
+  // Near a large offset, the last digits are arithmetic artefacts.
   const trusted = TRUSTED - 1 - magnitude(Math.max(Math.abs(shown), Math.abs(factor(0))));
   const digits = Math.max(0, Math.min(Math.max(came, four), trusted, MOST));
   return Number.isFinite(digits) ? exact(Number(shown.toFixed(digits))) : exact(shown);
 }
 
-/** The same, without rounding of the integer part. @param {number} value */
+/**
+ * Return a number with four significant digits, without rounding the integer part.
+ *
+ * @param {number} value
+ */
 function exact(value) {
   if (Number.isInteger(value)) return String(value);
   return String(Number(Math.abs(value) < 10 ** TRUSTED ? value.toPrecision(TRUSTED) : value.toFixed(0)));

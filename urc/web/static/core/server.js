@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The page's connections to its server. The playground replaces this module: there, the server is a
- * worker of the page.
+ * The page's connections to its server. The playground replaces this module, because its server is
+ * a worker of the page.
  */
 
 /** @param {string} url */
@@ -18,8 +18,8 @@ export function request(path, how) {
 }
 
 /**
- * Fetch a page as a document. Trusted types forbid a parser of text; this one is the browser's own, and
- * runs no script of the page.
+ * Fetch a page as a document. Trusted types forbid parsing text. This function uses the browser's
+ * own document parser, which runs no script of the page.
  *
  * @param {URL} address
  * @param {number} withinMs

@@ -1,6 +1,6 @@
 // @ts-check
-// A classic script before the first paint, so that colours do not flash. The device stores the choice;
-// without storage, the preference of the system counts.
+// A classic script before the first paint, so that colours do not flash. The device stores the
+// choice; without storage, the system's preference applies.
 {
   const KEY = "urc-theme";
   const UNITS_KEY = "urc-units"; // the same as in units.js
@@ -21,7 +21,7 @@
     try {
       localStorage.setItem(key, value);
     } catch {
-      // Private mode: the choice lasts until the page closes.
+      // In private mode, the choice lasts until the page closes.
     }
   };
 
@@ -52,7 +52,7 @@
   // The playground runs this script in a document that is already complete.
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", showChoices);
   else showChoices();
-  // On the document, so that a choice before the modules have loaded counts.
+  // On the document, so that a choice counts even before the modules have loaded.
   document.addEventListener("change", ({ target }) => {
     if (target instanceof HTMLInputElement && target.matches("[data-theme-choice]")) {
       show(target.value);
@@ -62,7 +62,7 @@
     if (!(target instanceof HTMLSelectElement)) return;
     if (target.matches("[data-units-choice]")) keep(UNITS_KEY, target.value);
     if (target.matches("[data-language-choice]")) {
-      // A cookie, since the server renders the texts of the page.
+      // A cookie, because the server renders the texts of the page.
       document.cookie = `urc-language=${target.value};path=/;max-age=${YEAR_S};samesite=strict`;
       location.reload();
     }

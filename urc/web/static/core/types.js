@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * Types of the page's modules, without code.
+ * Types of the page's modules. The file contains no code.
  *
- * @typedef {boolean | number | string | null} Value A plain value; null is "not available".
+ * @typedef {boolean | number | string | null} Value A plain value; null means "not available".
  * @typedef {Value | readonly Value[]} Given Value of a command's argument.
  * @typedef {Value | readonly Value[] | Readonly<Record<string, unknown>>} Held Value of a signal: a
  *   plain value, an array's elements, or an object's fields. An image or blob is an object with its
@@ -10,8 +10,8 @@
  * @typedef {"" | "lolo" | "low" | "high" | "hihi" | "minor" | "major"} Alarm The exceeded limit, or the
  *   severity of an alarm state.
  * @typedef {"live" | "stale" | "gone" | "none"} State
- *   live: recent. stale: old, or its link is down; shown grey with its age. gone: too old to be shown.
- *   none: never received, or not available according to the robot.
+ *   live: recent. stale: old, or its link is down; shown in grey with its age. gone: too old to be
+ *   shown. none: never received, or not available according to the robot.
  *
  * @typedef {object} Signal Declaration of a signal, from the server.
  * @property {string} name
@@ -29,23 +29,23 @@
  * @property {"FLU" | "FRD" | "ENU" | "NED" | "bearing"} [axes] Axis convention.
  * @property {number} [edition] Number of the server's state at the time of a conversion.
  *
- * @typedef {object} Reading Present value of one input of a widget.
- * @property {Held} value Value in the unit of the widget's manifest, else in the signal's; null in the
- *   states `gone` and `none`.
+ * @typedef {object} Reading Current value of one input of a widget.
+ * @property {Held} value Value in the unit of the widget's manifest, or else in the signal's unit;
+ *   null in the states `gone` and `none`.
  * @property {State} state
  * @property {Alarm} alarm
  * @property {string} text Value for people, in the displayed unit and precision; "—" without a value.
  * @property {string} unit Symbol of the unit of `text`, or "".
  * @property {string} age Age for people, such as "4 s"; "" while it is live.
  * @property {number} time Time of the measurement, in seconds on the page's own clock.
- * @property {number} serial Grows with each new reading, also with an equal value.
+ * @property {number} serial Increases with each new reading, even if the value is equal.
  * @property {Signal} signal
  * @property {Picture | null} image Newest image, for signals of type image or blob.
  *
  * @typedef {object} Picture An encoded image.
  * @property {Blob} blob
  * @property {string} type Media type, such as "image/jpeg".
- * @property {number} serial Grows with each new image.
+ * @property {number} serial Increases with each new image.
  *
  * @typedef {object} Conversion Conversion from a signal's unit to another: value · factor + offset.
  * @property {number} factor
@@ -53,10 +53,10 @@
  * @property {string} symbol Symbol of the target unit.
  *
  * @typedef {object} Outlet State of a widget's bound output.
- * @property {boolean} isReady Whether its command can be given now.
- * @property {string} reason Why not, for people; "" if it can.
- * @property {boolean} isAnswered Whether the robot acknowledges the command; else it ends with the
- *   sending.
+ * @property {boolean} isReady Whether its command can be sent now.
+ * @property {string} reason Displayed reason why the command cannot be sent; "" if it can.
+ * @property {boolean} isAnswered Whether the robot acknowledges the command; otherwise, it ends
+ *   once it is sent.
  *
  * @typedef {object} Argument One argument of a command, as the driver declares it.
  * @property {string} [name]
@@ -67,7 +67,7 @@
  * @property {number | null} max
  * @property {Value[]} choices
  * @property {Value} default
- * @property {boolean} allowsControl Whether a text may hold control characters.
+ * @property {boolean} allowsControl Whether a text may contain control characters.
  *
  * @typedef {object} Question Confirmation of a command.
  * @property {string} argument Argument whose value needs the confirmation; "" for any call.
@@ -79,8 +79,8 @@
  * @typedef {object} Described A bound command.
  * @property {string} command Its name.
  * @property {string} title Its title; "" if the driver has none.
- * @property {Readonly<Record<string, Argument>>} arguments Arguments that the binding does not fix, by
- *   the names of the widget's output if it has any, else by those of the command.
+ * @property {Readonly<Record<string, Argument>>} arguments Arguments without a fixed value in the
+ *   binding, by the names of the widget's output or else of the command.
  * @property {readonly Question[]} asks
  * @property {readonly {text: string, what: string}[]} steps Steps of a sequence, without nested ones:
  *   a translatable text, and its `{what}`.
@@ -90,10 +90,10 @@
  * @property {number} place Number of begun steps.
  * @property {number} of
  * @property {"idle" | "running" | "paused"} state
- * @property {string} reason Why it ended without success.
+ * @property {string} reason Reason for a failure.
  *
- * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} PendingValue Request of an operator
- *   about the controls.
+ * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} PendingValue An operator's
+ *   request about the controls.
  *
  * @typedef {object} Link
  * @property {string} transport
@@ -124,7 +124,7 @@
  * @property {number | number[]} a One number if all ages are equal.
  * @property {Alarm[]} [s]
  * @property {Record<number, number>} [e] Number of the first reading in this frame, by index, for
- *   signals whose every reading is sent.
+ *   signals for which every reading is sent.
  *
  * @typedef {object} Reply
  * @property {number} id
@@ -135,23 +135,23 @@
  *
  * @typedef {object} Lease The lease of the robot.
  * @property {string} you Identifier of this page.
- * @property {string} name Name of this page, as other pages show it.
+ * @property {string} name Name of this page on other pages.
  * @property {number} epoch
  * @property {{id: string, name: string} | null} holder
  * @property {{id: string, name: string} | null} asker
  * @property {number} left Time until the asking page gets the controls, in milliseconds.
  * @property {string} latched Name of the operator who pressed STOP; "" while nothing is latched.
  * @property {number} stops Number of STOPs so far.
- * @property {boolean} confirmed Whether the robot's transports have taken the stop.
+ * @property {boolean} confirmed Whether the robot's transports have accepted the stop.
  * @property {boolean} drives Whether this page may drive.
- * @property {boolean} forces Whether it may take the controls from another page.
- * @property {string} spare Key for the redundant socket; "" if it may have none.
+ * @property {boolean} forces Whether this page may take control from another page.
+ * @property {string} spare Key for the redundant socket; "" if the page may not open one.
  * @property {Role | null} role Role of this page at the robot.
  *
  * @typedef {"watch" | "drive" | "maintain" | "administer"} Role Rights at a robot; each role includes
  *   the rights of the previous roles.
  *
- * @typedef {object} Hand Present input of a held control.
+ * @typedef {object} Hand Current input of a held control.
  * @property {"pointer" | "keys" | "pad" | "stay"} kind stay: the pointer was released, and the control
  *   keeps its position, since another control is held.
  * @property {number} x Position of the pointer, in CSS pixels of the window.
@@ -160,33 +160,33 @@
  * @property {number} startY
  * @property {ReadonlySet<string>} keys Codes of the held keys, such as "ArrowUp".
  * @property {[number, number]} axes Stick of a gamepad: right and down are positive, -1 to 1.
- * @property {readonly [number, number, number, number]} [sticks] Both sticks, the left one first.
+ * @property {readonly [number, number, number, number]} [sticks] Both sticks, left stick first.
  * @property {readonly boolean[]} [buttons] Held state of its buttons.
  *
  * @typedef {"idle" | "asking" | "held" | "spent"} HoldPhase
- *   asking: held, but the controls are not granted yet. spent: stopped or refused; nothing is sent
- *   before a release and a new hold.
+ *   asking: held, but control is not granted yet. spent: stopped or refused; nothing is sent until
+ *   a release and a new hold.
  *
  * @typedef {object} HoldState
  * @property {HoldPhase} phase
- * @property {string} reason Why it is spent, or only partly effective, for people.
- * @property {Record<string, Value> | null} values Last sample, with 0 for arguments of another control;
- *   null while it is not held.
+ * @property {string} reason Displayed reason why the hold is spent or only partly effective.
+ * @property {Record<string, Value> | null} values Last sample, with 0 for arguments of another
+ *   control; null while not held.
  *
  * @typedef {object} HoldSpec
- * @property {HTMLElement} el The held element; it takes the focus.
- * @property {string[]} keys Codes of the keys that hold it while it has the focus.
- * @property {HTMLElement[]} [keysOn] Further elements that accept these keys.
- * @property {() => "none" | "free" | "all"} [page] Which of these keys work on the whole page now. all:
- *   all, except for typed text. free: those that the focused element does not need.
+ * @property {HTMLElement} el The held element, which receives the focus.
+ * @property {string[]} keys Codes of the keys that hold the element while it has the focus.
+ * @property {HTMLElement[]} [keysOn] Additional elements that accept these keys.
+ * @property {() => "none" | "free" | "all"} [page] Keys that currently work on the whole page. all:
+ *   all keys, except for typed text. free: keys that the focused element does not need.
  * @property {Record<string, () => void>} [taps] Codes of keys with a single action.
  * @property {(way: "slower" | "faster") => void} [pace] Handles a gamepad button for speed steps.
  * @property {boolean} [stays] Whether it keeps its position after the release of the pointer, while
  *   another control is held.
  * @property {(target: EventTarget | null) => boolean} [isFree] Whether a press on this element begins
  *   a hold.
- * @property {"" | "left" | "right"} [pad] Gamepad stick that moves it, while the shoulder button of that
- *   side is held.
+ * @property {"" | "left" | "right"} [pad] Gamepad stick that moves the control while the shoulder
+ *   button of that side is held.
  * @property {(hand: Hand, dtS: number) => Record<string, Value>} sample Returns the values by the names
  *   of the output's arguments. Called during a hold for each move of the input and in each animation
  *   frame; must be fast. `dtS` is the time since the last call, in seconds; 0 until motion may begin.
@@ -194,14 +194,15 @@
  *
  * @typedef {object} GateState
  * @property {boolean} isOpen Whether held controls count.
- * @property {number} leftS Seconds until it closes by itself; 0 for one that must be held.
- * @property {string} reason Why it closed by itself, for people, or "".
+ * @property {number} leftS Seconds until it closes automatically; 0 for a control that must be
+ *   held.
+ * @property {string} reason Displayed reason why it closed automatically, or "".
  *
  * @typedef {object} GateSpec
  * @property {HTMLElement} el The held or pressed element.
- * @property {boolean} isHeld Whether it must be held; else a press toggles it.
- * @property {number} timeoutMs Time without motion after which a pressed one closes.
- * @property {string} [key] Code of a key that holds it from anywhere on the page.
+ * @property {boolean} isHeld Whether it must be held; otherwise, a press toggles it.
+ * @property {number} timeoutMs Time without motion after which a toggled control closes.
+ * @property {string} [key] Code of a key that holds the control from anywhere on the page.
  * @property {"" | "left" | "right"} [pad] Shoulder button of a gamepad that holds it.
  * @property {(state: GateState) => void} show Called for each change of the state, and in each frame
  *   while it is open.
@@ -211,7 +212,7 @@
  * @property {number[]} axes
  * @property {boolean[]} buttons Held state of the buttons.
  * @property {import("../widgets/gamepad_map.js").PadMap | null} map Its mapping, or null if unknown.
- * @property {boolean} isStandard Whether the browser knows its layout.
+ * @property {boolean} isStandard Whether the browser knows the layout.
  * @property {boolean} isUsed Whether it is the gamepad in use.
  *
  * @typedef {object} PadDesk
@@ -225,18 +226,19 @@
  * @property {(input: string, listener: (reading: Reading) => void) => void} on
  *   Calls the listener in the animation frame after a change of that input.
  * @property {(input: string, listener: (reading: Reading, missed: number) => void) => void} each
- *   Calls the listener with the last reading, and then at once with each new one, also for a hidden
- *   cell. `missed` is the number of lost readings before it. For inputs with `each` in the manifest, of
- *   widgets in the page.
+ *   Calls the listener with the last reading, and then immediately with each new reading, also for
+ *   a hidden cell. `missed` is the number of lost readings before it. For inputs with `each` in the
+ *   manifest, of widgets in the page.
  * @property {(output: string, args?: Record<string, Given>) => Promise<Record<string, Value>>} send
  *   Runs the command bound to the output, with arguments by the names of the widget's manifest; rejects
  *   with an Error that has the reason of a failure.
  * @property {(output: string, spec: HoldSpec) => void} hold
- *   Makes an element the handle of a held command: the page samples it, releases it, and gives reasons.
+ *   Makes an element the handle of a held command. The page samples it, releases it, and reports
+ *   reasons.
  * @property {(spec: GateSpec) => void} gate
- *   Makes an element a dead-man control: held controls only count while one of them is open.
+ *   Makes an element a dead-man control. Held controls count only while a dead-man control is open.
  * @property {PadDesk} pads The gamepads and their mappings.
- * @property {() => void} stop Stops the robot, whoever drives it.
+ * @property {() => void} stop Stops the robot, regardless of the operator in control.
  * @property {(listener: (state: StopState) => void) => void} onStop Calls the listener now, and for
  *   each press of STOP and each change of its state. A widget must end its own repeated commands then.
  * @property {(output: string) => Described | null} command The command of an output, or null.
@@ -250,10 +252,11 @@
  *   Calls the listener in the next animation frame, and in one after every change, with data of the
  *   page besides signals.
  * @property {(input: string, listener: (bitmap: ImageBitmap, reading: Reading) => void) => void} picture
- *   Decodes the images of an input: the newest wins, late ones are dropped. The bitmap is closed
- *   when the next one comes, so draw it at once.
- * @property {(input: string, places: readonly number[]) => void} look Selects the visible images of an
- *   input by their indexes from 0; the server sends no others. By default, all.
+ *   Decodes the images of an input. Only the newest image counts; late images are dropped. The
+ *   bitmap is closed when the next one arrives, so draw it immediately.
+ * @property {(input: string, places: readonly number[]) => void} look Selects the visible images of
+ *   an input by their indexes from 0; the server sends only these. By default, all images are
+ *   visible.
  * @property {{may: () => boolean, acknowledge: (alerts: readonly Alert[]) => void, shelve: (alert: Alert, minutes: number) => void, open: () => void}} alarms
  *   Actions of the operator on alarms: whether they are allowed, acknowledge, shelve, and open the list.
  * @property {(text: string, names?: Record<string, string | number>) => string} t Returns the text in the
@@ -268,7 +271,8 @@
  * @property {{lines: readonly LogLine[], missing: number}} log The newest lines, oldest first, and
  *   the number of lines lost on their way to this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease The lease.
- * @property {readonly Alert[]} alarms All alarms of the robot that are not normal, the most urgent first.
+ * @property {readonly Alert[]} alarms All alarms of the robot outside the normal state, most urgent
+ *   first.
  * @property {{limited: number, known: number}} watched Number of signals with a limit, and of those with
  *   a recent value.
  * @property {{isUp: boolean, tripMs: number | null, failures: number, skewMs: number | null, messages: number, bytes: number}} latency
@@ -276,7 +280,7 @@
  *   since the opening of the page.
  * @property {Readonly<Record<string, Progress>>} sequences State of each sequence by its name, without
  *   sequences that never ran.
- * @property {{name: string}} theme Changes when the colours do.
+ * @property {{name: string}} theme Changes whenever the colours change.
  *
  * @typedef {object} LogLine
  * @property {number} number Number of the line in its session.
@@ -289,35 +293,36 @@
  * @property {string} signal Name of the signal.
  * @property {string} title Title of the signal.
  * @property {Alarm} alarm
- * @property {string} text The value for people.
+ * @property {string} text Displayed value.
  * @property {string} unit
  * @property {string} age Age of the value for people, such as "4 s"; "" while it is live.
- * @property {number} since Begin of the alarm, in seconds on the page's clock.
+ * @property {number} since Start of the alarm, in seconds on the page's clock.
  * @property {string} condition The exceeded limit, or the alarm state.
  * @property {"low" | "medium" | "high"} priority
  * @property {"unacknowledged" | "acknowledged" | "returned" | "shelved" | "suppressed"} state
  * @property {boolean} isActive Whether the value is abnormal.
- * @property {boolean} isKnown Whether the present value is known.
+ * @property {boolean} isKnown Whether the current value is known.
  * @property {number} raised Number of this alarm, for its acknowledgement.
- * @property {number} number Number of the activation; the order of the numbers is first-out.
+ * @property {number} number Number of the activation; numbers increase in first-out order.
  * @property {number} times Number of activations.
  * @property {string} cause
  * @property {string} action Operator action.
  * @property {string} who Name of the operator who acknowledged or shelved it.
- * @property {number} leftS Time until the end of its shelf, in seconds.
+ * @property {number} leftS Time until shelving ends, in seconds.
  *
  * @typedef {object} StopState
- * @property {"" | "sending" | "sent" | "confirmed" | "latched" | "failed"} phase Progress of STOP: sent,
- *   latched by the server, taken by the robot's transport. "" while the robot may be driven.
+ * @property {"" | "sending" | "sent" | "confirmed" | "latched" | "failed"} phase Progress of STOP:
+ *   sent, latched by the server, accepted by the robot's transports. "" while the robot may be
+ *   driven.
  * @property {boolean} isLatched
  * @property {boolean} isConfirmed
- * @property {string} by Name of the operator who pressed it.
- * @property {string} fault Why it could not reach the robot now, or "".
+ * @property {string} by Name of the operator who pressed STOP.
+ * @property {string} fault Reason why STOP cannot reach the robot now, or "".
  *
  * @typedef {object} Instance
  * @property {(readings: Readonly<Record<string, Reading>>, outputs: Readonly<Record<string, Outlet>>) => void} [update]
- *   Called in an animation frame after a change of any input or output, with all bound ones. An input of
- *   many signals is an array of readings: `many(readings.series)` of urc/kit.
+ *   Called in an animation frame after a change of any input or output, with all bound ones. A
+ *   multiple input is an array of readings; see `many(readings.series)` in urc/kit.
  * @property {(size: {width: number, height: number}) => void} [resize] The cell's size in CSS pixels.
  * @property {() => void} [destroy]
  *

@@ -2,7 +2,7 @@
 /**
  * Displayed units of values. Internally and in messages, values keep their declared unit.
  *
- * It knows no DOM but the select of the choice, and the storage of the device.
+ * The module uses only the select element of the choice, and the device's storage.
  *
  * @typedef {import("./types.js").Conversion} Conversion
  * @typedef {import("./types.js").Held} Held
@@ -10,7 +10,7 @@
 
 export const KEY = "urc-units";
 
-/** Symbols of units whose spelling in documents is for keyboards. */
+/** Symbols of units with a keyboard spelling in documents. */
 const SIGNS = { deg: "°", "deg/s": "°/s", degC: "°C", degF: "°F", "m/s2": "m/s²", "m/s^2": "m/s²", ohm: "Ω" };
 
 /**
@@ -114,14 +114,14 @@ export function chosenSystem() {
 }
 
 /**
- * Offer the unit systems in a select of the page; the device stores the choice.
+ * Offer the unit systems in a select element of the page; the device stores the choice.
  *
  * @param {(system: string) => void} use
  */
 export function offerSystems(use) {
   use(chosenSystem());
   const choice = document.querySelector("select[data-units-choice]");
-  // theme.js shows and keeps the choice on every page.
+  // theme.js shows and stores the choice on every page.
   if (choice instanceof HTMLSelectElement) choice.addEventListener("change", () => use(choice.value));
   addEventListener("storage", ({ key, newValue }) => {
     if (key !== KEY) return;
@@ -131,7 +131,7 @@ export function offerSystems(use) {
 }
 
 /**
- * Return the function of a conversion; undefined for the identity.
+ * Return the conversion function; undefined for the identity.
  *
  * @param {Conversion} conversion
  * @returns {((value: number) => number) | undefined}

@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * Texts of the page in the user's language. English is the key, and the fallback.
+ * Texts of the page in the user's language. English is the key and the fallback.
  *
- * The import map points `urc/words` at the table of the language that the server chose.
+ * The import map resolves `urc/words` to the table of the language chosen by the server.
  */
 import table from "urc/words";
 
@@ -22,8 +22,8 @@ export function t(text, names = {}) {
 }
 
 /**
- * Messages of the server about the controls. All pages get them in English; those with a fixed form are
- * translated here.
+ * Messages from the server about the controls. The server sends them in English; this module
+ * translates messages with a fixed form.
  */
 const SENTENCES = [
   mark("Stopped by {name}. Reset to drive again."),
@@ -71,7 +71,7 @@ function form(text) {
 }
 
 /**
- * Return a message of the server in the user's language, or unchanged if it has no fixed form.
+ * Return a message from the server in the user's language, or unchanged if it has no fixed form.
  *
  * @param {string} sentence
  * @returns {string}

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The commands of a robot: their arguments, the preview of their frames, and their results. It knows no
+ * The commands of a robot, with arguments, a preview of frames, and results. The module uses no
  * socket.
  *
  * @typedef {import("../core/types.js").Value} Value
@@ -28,7 +28,7 @@
  *
  * @typedef {{refusal: string, frames: Frame[], questions: string[], requires: string[]}} Shown
  *
- * @typedef {object} Desk Functions that send requests and commands.
+ * @typedef {object} Desk Functions for sending requests and commands.
  * @property {(message: object) => Promise<any>} ask
  * @property {(command: string, args: Record<string, unknown>, isConfirmed: boolean) => Promise<Record<string, unknown>>} run
  */

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The debug interface of every robot: all signals with their age, all commands with a form, and the
- * traffic log if the server offers it.
+ * The debug interface of every robot: all signals with their ages, a form for each command, and the
+ * traffic log if available.
  *
  * @typedef {import("./debug_commands.js").Doors} CommandDoors
  * @typedef {import("../live/store.js").Store} Store

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * All commands, each with a form. A form is made when it is first opened: a hundred of them would take a
- * second on a phone.
+ * All commands, each with a form. Each form is created when it is first opened, because a hundred
+ * forms would take a second on a phone.
  *
  * @typedef {import("./fields.js").Argument} Argument
  * @typedef {import("../widgets/cell.js").Doors} HostDoors
@@ -61,7 +61,7 @@ export class DebugCommands {
   form(command) {
     const form = document.createElement("form");
     form.className = "dev-form";
-    form.noValidate = true; // the server reports mistakes in words
+    form.noValidate = true; // the server reports errors as text
     const fields = element("div", "dev-tools");
     const inputs = command.arguments.map((argument) => field(argument));
     fields.append(...inputs.map(({ label, argument }) => withHelp(label, argument)));

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * All signals in a table. Hundreds of them cost little: only visible rows are written, at most ten times
- * a second, and only after a change.
+ * All signals in a table. Hundreds of signals need little time, because only visible rows are
+ * written, at most ten times a second, and only after a change.
  *
  * @typedef {import("../live/store.js").Store} Store
  * @typedef {import("../core/types.js").Reading} Reading
@@ -13,7 +13,7 @@
  * @property {HTMLElement} alarm
  * @property {HTMLElement} age
  * @property {HTMLCanvasElement | null} canvas
- * @property {(number | null)[]} past one value a second, oldest first
+ * @property {(number | null)[]} past one value per second, oldest first
  * @property {boolean} isVisible
  */
 import { ALARMS, DASH, attribute, t, write } from "urc/kit";
@@ -60,7 +60,7 @@ export class DebugSignals {
     for (const { el } of this.rows.values()) el.hidden = !(el.dataset["words"] ?? "").includes(wanted);
   }
 
-  /** Return the names of images in visible rows: the server sends only those. */
+  /** Return the names of images in visible rows, because the server sends only these. */
   pictures() {
     if (!this.store.hasPictures) return [];
     const seen = [...this.rows.values()].filter((row) => row.isVisible).map((row) => row.name);

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Starts the developer page with two sockets: one for values and commands, as on all pages, and one for
+ * Starts the developer page with two sockets: the usual socket for values and commands, and one for
  * the traffic, the profile and requests.
  *
  * @typedef {import("../core/types.js").Reading} Reading
@@ -78,7 +78,7 @@ function request(socket, message) {
   lastId += 1;
   const id = lastId;
   return new Promise((resolve, reject) => {
-    // The server always replies within its own limit; this limit is for a dead server.
+    // The server always replies within its own limit; this limit is for an unresponsive server.
     const patience = socket === values ? 4 * ANSWER_WITHIN_MS : ANSWER_WITHIN_MS;
     const alarm = setTimeout(() => settle(id, new Error("URC has not answered")), patience);
     const done = () => clearTimeout(alarm);
@@ -134,7 +134,8 @@ function take(message) {
   switch (message.t) {
     case "hello":
       log.restart();
-      // Only now: the robot connects for the first of the two sockets, and its first messages count.
+      // Opened last, because the robot connects for the first of the two sockets, and its first
+      // messages matter.
       if (!values.isWanted) values.open();
       break;
     case "rows":

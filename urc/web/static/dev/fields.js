@@ -87,7 +87,7 @@ function caption(argument) {
 }
 
 /**
- * Return the input as its type; invalid input goes to the server unchanged, which reports it.
+ * Return the input as its type; invalid input is sent unchanged, and the server reports it.
  *
  * @param {Argument} argument
  * @param {string} text

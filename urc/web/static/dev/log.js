@@ -35,7 +35,7 @@ export class WireLog {
     this.pauseButton = part(root, "[data-pause]");
     this.line = select(root, "[data-filter-line]");
     this.kind = select(root, "[data-filter-kind]");
-    /** Line → encoding of its text. @type {Map<string, string>} */
+    /** Text encoding by transport. @type {Map<string, string>} */
     this.encodings = new Map();
     /** @type {Row[]} */
     this.waiting = [];
@@ -64,7 +64,7 @@ export class WireLog {
     this.filter();
   }
 
-  /** Start again: the server counts from the beginning on each connection. */
+  /** Clear the log, because the server numbers rows from the beginning on each connection. */
   restart() {
     this.next = 0;
     this.skewMs = Infinity;
@@ -77,7 +77,8 @@ export class WireLog {
       rows = [{ n: first, time_s: 0, kind: "note", line: "URC", level: "warning", text }, ...rows];
     }
     this.next = first + rows.length - (first > this.next ? 1 : 0);
-    // The fastest message so far gives the best estimate of the offset; it keeps times in order.
+    // The fastest message so far provides the best estimate of the offset, and keeps times in
+    // order.
     this.skewMs = Math.min(this.skewMs, Date.now() - now);
     const nowMs = this.skewMs + now;
     const timed = rows.map((row) => ({ ...row, time_s: nowMs - row.time_s }));
@@ -92,7 +93,7 @@ export class WireLog {
     this.tell();
   }
 
-  /** @param {Row[]} rows rows with times of the page's own clock */
+  /** @param {Row[]} rows rows with times on the page's own clock */
   show(rows) {
     const list = this.list;
     const isAtEnd = list.scrollHeight - list.scrollTop - list.clientHeight < NEAR_PX;

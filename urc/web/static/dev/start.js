@@ -1,5 +1,5 @@
 // @ts-check
-/** The developer start page: its button reloads all documents, and opens the robot. */
+/** The developer start page, with a button that reloads all documents and opens the robot. */
 import { ask, reason } from "../core/api_client.js";
 import { part } from "../live/badge.js";
 

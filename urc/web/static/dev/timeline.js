@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Why did it move? The audit log of one robot, newest first, loaded on demand.
+ * The robot's audit log as an explanation of motion, newest first, loaded on demand.
  *
  * @typedef {import("../core/audit_entry.js").Entry} Entry
  */
@@ -24,7 +24,7 @@ export class Timeline {
     part(root, "[data-why-refresh]").addEventListener("click", () => this.refresh());
   }
 
-  /** Reload; the old entries stay until the response arrives. */
+  /** Reload the log; the old entries stay until the response arrives. */
   async refresh() {
     if (this.isAsking) return;
     this.isAsking = true;

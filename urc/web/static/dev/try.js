@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The try-out of the parser. It knows no socket.
+ * The try-out of the parser. The module uses no socket.
  *
  * @typedef {import("./commands.js").Desk} Desk
  * @typedef {{name: string, type: string, framing: string, encoding: string, messages: boolean}} Line

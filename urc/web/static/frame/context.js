@@ -16,7 +16,10 @@ import { Decoder } from "../widgets/image_decoder.js";
 import { loadStyle } from "../widgets/style.js";
 
 const MOST_KEPT = 20_000;
-/** Topics for frames. The log and the alarm statistics are missing: they concern the whole robot. */
+/**
+ * Topics for frames. The log and the alarm statistics are missing, because they concern the whole
+ * robot.
+ */
 const TOLD = ["links", "lease", "alarms", "latency", "sequences", "theme"];
 /** Requests about the controls that a third-party widget may send. */
 const WISHES = ["take", "ask", "leave"];

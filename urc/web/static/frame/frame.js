@@ -1,9 +1,10 @@
 // @ts-check
 /**
- * The code inside the frame of a third-party widget. It talks to the page through one port.
+ * The code inside the frame of a third-party widget. It communicates with the page through one
+ * port.
  *
- * The widget's code shares this document, so the page trusts nothing from here. This code gives
- * widgets the interface that they have in the page.
+ * The widget's code shares this document, so the page does not trust any message from the frame.
+ * This code provides widgets with the same interface as in the page.
  *
  * @typedef {import("../core/types.js").Instance} Instance
  * @typedef {import("../core/types.js").Outlet} Outlet
@@ -15,7 +16,7 @@ import { contextOf } from "./context.js";
 import { FrameHeldControls } from "./grips.js";
 import { part, t } from "../widgets/kit.js";
 
-/** Base URL of all code of the frame: a frame sends no cookies, so its path holds a secret. */
+/** Base URL of the frame's code. Frames send no cookies, so the path contains a secret. */
 const PLACE = new URL("../..", import.meta.url);
 
 /** @param {string} url URL of a module in our pages */
@@ -23,10 +24,10 @@ function below(url) {
   return new URL(url.replace(/^\//, ""), PLACE).href;
 }
 
-/** Interval of updates for a slow widget. */
+/** Interval between updates of a slow widget. */
 const SLOW_EVERY_MS = 1000;
 
-/** Policy for the markup that the server rendered; no second policy can be made. */
+/** Policy for the server's markup; a second policy cannot be created. */
 const markup = /** @type {any} */ (globalThis).trustedTypes?.createPolicy("urc", {
   createHTML: (/** @type {string} */ html) => html,
 });
@@ -34,7 +35,7 @@ const markup = /** @type {any} */ (globalThis).trustedTypes?.createPolicy("urc",
 export class Frame {
   /** @param {MessagePort} port */
   constructor(port) {
-    // Bound now: the widget may change the prototype later.
+    // Bound now, because the widget may change the prototype later.
     this.say = port.postMessage.bind(port);
     this.el = part(document, "[data-frame]");
     this.end = new AbortController();
@@ -250,7 +251,7 @@ function showTheme(name) {
 }
 
 /**
- * Replace URLs of files by those of the blobs that the page has sent.
+ * Replace file URLs by the URLs of the blobs from the page.
  *
  * @param {Record<string, unknown>} options
  * @param {Record<string, Blob>} files

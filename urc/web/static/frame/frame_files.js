@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Files in the options of a third-party widget. Its frame may load nothing of a robot, so the page
- * passes them in.
+ * Files in the options of a third-party widget. A frame may not load a robot's files, so the page
+ * passes them to the frame.
  */
 
 const FILE = /^\/robots\/[^/]+\/files\//;
@@ -19,7 +19,7 @@ function isFile(text) {
 }
 
 /**
- * Return URL → file, for each file in the options; missing ones are left out.
+ * Return the files in the options by URL, without missing files.
  *
  * @param {Readonly<Record<string, unknown>>} options
  * @param {AbortSignal} signal

@@ -1,11 +1,11 @@
 // @ts-check
 /**
  * Held controls of third-party widgets. The page handles the input itself. An overlay of the page covers
- * each control of the frame, and takes pointers, keys and gamepads like any held control. The widget
- * gets the input, and replies with values.
+ * each control of the frame, and takes pointers, keys and gamepads like any held control. The
+ * widget receives the input, and replies with values.
  *
- * So a frame cannot drive by itself: without input on the page nothing is sent, and during a hold only
- * while the widget replies.
+ * A frame therefore cannot drive by itself. Nothing is sent without input on the page, or while the
+ * widget does not reply during a hold.
  *
  * @typedef {import("./frame_protocol.js").Place} Place
  * @typedef {import("./frame_protocol.js").Said} Said
@@ -14,7 +14,7 @@
  * @typedef {import("./frame_host.js").FrameHost} FrameHost
  */
 
-/** Time limit for the widget's reply to an input; later its values no longer count. */
+/** Time limit for the widget's reply to an input; its values do not count after the limit. */
 const SILENT_MS = 150;
 const MOST_GRIPS = 16;
 
@@ -41,7 +41,7 @@ class Overlay {
     /** Number of the first request of this gesture. */
     this.first = 0;
     this.answered = 0;
-    /** Time of the oldest request without reply. */
+    /** Time of the oldest unanswered request. */
     this.owedMs = 0;
   }
 
@@ -110,7 +110,7 @@ export class Overlays {
     this.all = new Map();
   }
 
-  /** Whether a request waits for its reply. */
+  /** Whether a request is unanswered. */
   get isOwed() {
     return [...this.all.values()].some(({ asked, answered }) => asked > answered);
   }

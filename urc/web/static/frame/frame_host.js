@@ -1,10 +1,11 @@
 // @ts-check
 /**
- * The page's side of a third-party widget: its frame, and the messages in and out of it.
+ * The page's side of a third-party widget: its frame, and the frame's messages.
  *
- * The frame has no origin, so it cannot reach the page. It has one port, whose messages `frame_protocol.js`
- * checks. It gets the readings and outputs of its cell, and may run the bound commands. A frame that
- * throws, floods, navigates or stops responding is removed, and its cell shows a card.
+ * The frame has no origin, so it cannot access the page. It has one port, whose messages
+ * `frame_protocol.js` checks. It receives the readings and outputs of its cell, and may run the
+ * bound commands. A frame is removed if it throws an exception, floods the page, navigates or stops
+ * responding. Its cell then shows a card.
  *
  * @typedef {import("../widgets/cell.js").Doors} Doors
  * @typedef {import("../live/store.js").Store} Store
@@ -27,14 +28,17 @@ import { Overlays } from "./frame_held_controls.js";
 const COMING_MS = 20_000;
 const LOADING_MS = 5000;
 const PADS_EVERY_MS = 50;
-/** Presses of STOP a second; further ones have no use. */
+/** Maximum number of STOP presses per second; more presses have no effect. */
 const MOST_STOPS = 5;
-/** Messages a second to the page itself. Browser extensions may send some; widgets have a port. */
+/**
+ * Maximum number of messages per second to the page itself. Browser extensions may send some;
+ * widgets have a port.
+ */
 const MOST_ASIDE = 20;
 
 /** Frame hosts whose frames may send messages to the page. @type {Set<FrameHost>} */
 const wardens = new Set();
-// The first of all listeners, without a look at the content: a flood costs little.
+// The first of all listeners. It does not read the content, so a flood costs little time.
 addEventListener("message", (event) => {
   for (const warden of wardens) {
     if (event.source !== warden.frameEl?.contentWindow) continue;
@@ -65,18 +69,18 @@ export class FrameHost extends Cell {
     this.frameEl = null;
     /** @type {MessagePort | null} */
     this.port = null;
-    /** Ends with this frame; the cell may get another one. */
+    /** Ends with this frame; the cell may get another frame. */
     this.life = new AbortController();
     this.overlays = new Overlays(this);
     this.memory = memoryOf(this.config.slot);
-    /** Whether it has reported the start of work, and not the end. */
+    /** Whether the frame has reported the start of work without its end. */
     this.isAtWork = false;
     this.strikes = 0;
     /** Whether the operator has moved the focus here. */
     this.isUsed = false;
-    /** Whether the last update is not drawn yet. */
+    /** Whether the last update has not been drawn yet. */
     this.isFull = false;
-    /** Edition of the store at the last report of units. */
+    /** Edition of the store when the units were last sent. */
     this.toldEdition = -1;
     this.isUp = false;
     this.messages = new Rate(MOST_MESSAGES);
@@ -146,12 +150,12 @@ export class FrameHost extends Cell {
     const { port1, port2 } = new MessageChannel();
     this.port = port1;
     port1.addEventListener("message", (event) => {
-      // Counted before it is decoded: a flood costs little.
+      // Counted before decoding, so that a flood costs little time.
       if (this.messages.take(performance.now())) this.take(event.data);
       else this.fail(new Error(t("it floods the page with messages")));
     }, { signal: this.life.signal });
     port1.start();
-    // A frame without an origin cannot be addressed by name; this message has no secret.
+    // A frame without an origin cannot be addressed by name, but this message contains no secret.
     frame.contentWindow?.postMessage({ t: "port" }, "*", [port2]);
   }
 
@@ -258,9 +262,12 @@ export class FrameHost extends Cell {
     }
   }
 
-  /** Press STOP. The operator may do so any time; the widget by itself once, so that a reset holds. */
+  /**
+   * Press STOP. An operator's touch permits it at any time. The widget by itself may press STOP
+   * only once, so that it cannot undo a reset.
+   */
   stop() {
-    // Browsers do not count Escape as an activation; the operator's focus counts instead.
+    // Browsers do not count Escape as a user activation, so the operator's focus counts instead.
     const isByHand = this.isTouched() || (this.isUsed && document.activeElement === this.frameEl);
     if (!isByHand && this.hasStopped) return;
     if (!this.stops.take(performance.now())) return;
@@ -375,7 +382,7 @@ export class FrameHost extends Cell {
     try {
       this.memory.write(JSON.parse(text));
     } catch (error) {
-      console.info(`widget ${this.config.widget}:`, error); // the frame got the error, too
+      console.info(`widget ${this.config.widget}:`, error); // the frame received the error, too
     }
   }
 
@@ -395,7 +402,7 @@ export class FrameHost extends Cell {
     this.fail(new Error(t("it stopped answering")));
   }
 
-  /** Remove the frame; its held controls are released. */
+  /** Remove the frame and release its held controls. */
   leave() {
     watch.remove(this);
     wardens.delete(this);

@@ -1,9 +1,10 @@
 // @ts-check
 /**
- * The messages between the page and a third-party widget in its frame. It knows no DOM and no socket.
+ * The messages between the page and a third-party widget in its frame. The module uses no DOM and
+ * no socket.
  *
- * A frame runs third-party code: each of its messages is checked here before it has any effect, and the
- * page only sends it data of its own bindings.
+ * A frame runs third-party code. This module checks each of its messages before the message has any
+ * effect. The page sends a frame only data of the frame's own bindings.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Given} Given
@@ -12,12 +13,12 @@
  *
  * @typedef {{x: number, y: number, width: number, height: number}} Box Rectangle in CSS pixels of the frame.
  *
- * @typedef {object} Place Place of an element that can be held.
+ * @typedef {object} Place Place of an element for holding.
  * @property {number} id
  * @property {Box} box
- * @property {Box[]} holes Parts that stay with the frame: buttons.
+ * @property {Box[]} holes Parts that the overlay leaves uncovered, such as buttons.
  * @property {string} label
- * @property {string} said Its value in words, for screen readers.
+ * @property {string} said The element's value in words, for screen readers.
  * @property {boolean} isFocusable
  * @property {"none" | "free"} page Which of its keys work on the whole page.
  *
@@ -37,29 +38,29 @@
  *   | {t: "gate", id: number, isHeld: boolean, timeoutMs: number, key: string, pad: "" | "left" | "right"}
  *   | {t: "places", places: Place[]}
  *   | {t: "values", id: number, n: number, values: Record<string, Value>}
- * )} Said A valid message of a frame.
+ * )} Said A valid message from a frame.
  */
 
-/** Rate of messages a second above which a frame is a flood. */
+/** Number of messages per second above which a frame counts as a flood. */
 export const MOST_MESSAGES = 1000;
-/** Highest rate of commands a second. */
+/** Maximum number of commands per second. */
 export const MOST_COMMANDS = 20;
 const MOST_TEXT = 20_000;
 const MOST_NAMES = 64;
 const MOST_ITEMS = 10_000;
 const MOST_GRIPS = 16;
 const MOST_HOLES = 16;
-/** Most further elements that accept the keys of a held control. */
+/** Maximum number of additional elements that accept a held control's keys. */
 const MOST_MORE = 4;
-/** Keys that no widget may take: they leave it, or stop the robot. */
+/** Keys that no widget may use, because they leave the widget or stop the robot. */
 const NEVER_KEYS = new Set(["Escape", "Space", "Tab"]);
 const VERBS = new Set(["pause", "step", "resume", "abort"]);
-/** Requests that third-party widgets may send; force, handover and reset are not among them. */
+/** Permitted requests of third-party widgets; they do not include force, handover and reset. */
 const WISHES = new Set(["take", "ask", "leave"]);
 const TOPICS = new Set(["links", "lease", "alarms", "latency", "sequences", "theme"]);
 const PLAIN = new Set(["ready", "mounted", "in", "out", "more", "stop", "pads", "onstop"]);
 
-/** A limit on events a second. */
+/** A limit on events per second. */
 export class Rate {
   /** @param {number} most */
   constructor(most) {
@@ -162,7 +163,7 @@ function placeOf(place) {
 }
 
 /**
- * Return a message of a frame with its valid parts; null for an invalid one.
+ * Return a frame's message with its valid parts; null for an invalid message.
  *
  * @param {unknown} message
  * @param {Readonly<Record<string, Output>>} outputs bound outputs of its cell
@@ -214,7 +215,7 @@ export function heard(message, outputs) {
 }
 
 /**
- * The same, for messages about held controls.
+ * Return a message about held controls with its valid parts; null for an invalid message.
  *
  * @param {Record<string, unknown>} message
  * @param {Output | undefined} bound
@@ -247,7 +248,8 @@ function gripped(message, bound) {
 }
 
 /**
- * Return the part of a topic that a frame may know: only for its bindings, and without addresses.
+ * Return the part of a topic that a frame may receive, limited to its bindings and without
+ * addresses.
  *
  * @param {keyof Topics} what
  * @param {any} news

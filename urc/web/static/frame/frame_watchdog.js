@@ -1,16 +1,17 @@
 // @ts-check
 /**
- * The watchdog of frames: it finds frames that do not respond, and the one at fault. It knows no DOM.
+ * The watchdog for frames, which finds unresponsive frames and the frame at fault. The module uses
+ * no DOM.
  *
- * A browser may run all frames without an origin in one process. An endless loop in one of them then
- * blocks them all, and the process stays while any of them exists. So all are removed. The frame that
- * was at work ends, and the others start again.
+ * A browser may run all frames without an origin in one process. An endless loop in one frame then
+ * blocks all frames, and the process exists as long as any of them. All frames are therefore
+ * removed. The frame that was working ends, and the others restart.
  *
  * @typedef {object} Watched
- * @property {boolean} isBusy Whether it has reported the start of work, and not the end.
+ * @property {boolean} isBusy Whether the frame has reported the start of work without its end.
  * @property {boolean} isUp Whether it can respond.
  * @property {boolean} isMounted
- * @property {number} strikes Number of times that it was silent together with others.
+ * @property {number} strikes Number of times that the frame was silent together with others.
  * @property {(n: number) => void} ping
  * @property {() => void} accuse Ends it, because it stopped responding: its cell shows a card.
  * @property {() => void} leave Removes it for a restart.
@@ -22,23 +23,23 @@ export const TICK_MS = 250;
 const SILENT_TICKS = 8;
 /** Ticks without a response after which a frame counts as silent together with others. */
 const QUIET_TICKS = 4;
-/** Delay of the page itself above which a tick proves nothing. */
+/** Delay of the page itself above which a tick is not evidence. */
 const LATE_MS = 2 * TICK_MS;
-/** Number of times that a frame may be silent with others, without a culprit. */
+/** Number of times that a frame may be silent together with others without a known culprit. */
 const MOST_STRIKES = 3;
 /**
- * Pause before restarts. A browser may reuse a blocked process for a while, so the pause grows each time
- * that it was too short.
+ * Pause before restarts. A browser may reuse a blocked process for a while, so the pause increases
+ * whenever it was too short.
  */
 const PAUSE_TICKS = 12;
 const MOST_PAUSE_TICKS = 48;
-/** Ticks for one frame to load and mount, before the next one restarts. */
+/** Ticks for loading and mounting one frame before the next frame restarts. */
 const LOAD_TICKS = 40;
 const STAND_TICKS = 8;
 
 export class FrameWatchdog {
   constructor() {
-    /** Frame → ticks since its first unanswered ping. @type {Map<Watched, number>} */
+    /** Ticks since each frame's first unanswered ping. @type {Map<Watched, number>} */
     this.waiting = new Map();
     /** Frames that wait for a restart. @type {Watched[]} */
     this.queue = [];
@@ -89,7 +90,7 @@ export class FrameWatchdog {
     if ([...this.waiting.values()].some((ticks) => ticks > SILENT_TICKS)) this.judge();
   }
 
-  /** Restart the next frame, once the one before it is mounted. */
+  /** Restart the next frame once the previous frame is mounted. */
   turn() {
     this.turnTicks += 1;
     if (this.turnTicks < this.pauseTicks) return;
@@ -97,7 +98,7 @@ export class FrameWatchdog {
     if (coming && !coming.isMounted) {
       if (this.turnTicks < (coming.isUp ? STAND_TICKS : LOAD_TICKS)) return;
       if (!coming.isUp && this.empty <= MOST_PAUSE_TICKS) {
-        this.clear([]); // it landed in the blocked process
+        this.clear([]); // the browser put it into the blocked process
         return;
       }
     }
@@ -109,7 +110,7 @@ export class FrameWatchdog {
   }
 
   /**
-   * Remove all frames, and restart those without fault after a pause.
+   * Remove all frames, and restart the frames without fault after a pause.
    *
    * @param {Watched[]} guilty
    */
@@ -130,7 +131,7 @@ export class FrameWatchdog {
     if (guilty.length === 0) for (const one of silent) one.strikes += 1;
     guilty.push(...silent.filter((one) => one.strikes >= MOST_STRIKES && !guilty.includes(one)));
     for (const one of guilty) one.accuse();
-    // The others have responded, so it has a process of its own.
+    // The others have responded, so this frame has its own process.
     if (silent.length === 1 && all.every(([one]) => one === silent[0] || one.isUp)) return;
     this.clear(guilty);
   }

@@ -10,7 +10,7 @@
  */
 
 const LOOK_EVERY_MS = 250;
-/** Elements that stay clickable inside a held control, where the widget's `isFree` says so. */
+/** Elements that stay clickable inside a held control, if the widget's `isFree` permits it. */
 const PRESSED = "a, button, input, select, textarea, [role=button]";
 
 export class FrameHeldControls {
@@ -21,7 +21,11 @@ export class FrameHeldControls {
     this.holds = new Map();
     /** @type {Map<number, GateSpec>} */
     this.gates = new Map();
-    /** Further elements that accept the keys of a held control. @type {Map<number, {el: HTMLElement}>} */
+    /**
+     * Additional elements that accept a held control's keys.
+     *
+     * @type {Map<number, {el: HTMLElement}>}
+     */
     this.more = new Map();
     this.count = 0;
     this.placed = "";

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The link badge: one word about the state of the links, and the round-trip time.
+ * The link badge: the links' state in one word, and the round-trip time.
  *
  * @typedef {import("../core/types.js").Link} Link
  * @typedef {import("./store.js").Store} Store
@@ -13,9 +13,9 @@ import { t } from "../core/words.js";
 
 const CAUTION_MS = 100;
 const POOR_MS = 250;
-/** From here on in seconds: more digits are wider than their place. */
+/** Times from here on are shown in seconds, because more digits would be too wide. */
 const SECONDS_FROM_MS = 2000;
-/** Link states from worst to best: the worst link decides. @type {Link["state"][]} */
+/** Link states from worst to best; the worst link determines the badge. @type {Link["state"][]} */
 const WORST_FIRST = ["lost", "silent", "connecting", "idle", "live"];
 
 export class Badge {

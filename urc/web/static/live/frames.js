@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * Binary messages of the server: one image, or bytes of a signal. See `urc/web/wire/picture.py`.
+ * Binary messages from the server, each with one image or a signal's bytes. See
+ * `urc/web/wire/picture.py`.
  *
  *     0  u8   1: an image             4  u32  its age in milliseconds at the moment of sending
  *     1  u8   length of the type      8  f64  the server's clock then, in milliseconds

@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * The background of a page, and the views over it: a tap on a view swaps it with the background. With the
- * focus on a held control, V swaps the next view. Held controls stay held; the choice is stored on the
- * device.
+ * The background of a page, and the views over it. A tap on a view swaps it with the background.
+ * With the focus on a held control, the key V swaps the next view. Held controls stay held. The
+ * device stores the choice.
  */
 import { t } from "../core/words.js";
 
@@ -25,7 +25,7 @@ export function swapViews(stage) {
 }
 
 /**
- * Swap the background with the next view: the keyboard's way while a key holds a stick.
+ * Swap the background with the next view, from the keyboard while a key holds a stick.
  *
  * @param {HTMLElement} stage
  */
@@ -83,7 +83,7 @@ function mark(views) {
   for (const view of views) view.classList.toggle("urc-pip", view.dataset["place"] !== "ground");
 }
 
-/** The key of the page and its interface. */
+/** Storage key of the page and its interface. */
 function key() {
   const choice = document.querySelector("[data-interface-choice]");
   return `${KEY}${location.pathname}${choice instanceof HTMLSelectElement ? choice.value : ""}`;
@@ -102,6 +102,6 @@ function store(cell) {
   try {
     localStorage.setItem(key(), cell);
   } catch {
-    // The browser forbids storage: the choice lasts until the page closes.
+    // The browser forbids storage, so the choice lasts until the page closes.
   }
 }

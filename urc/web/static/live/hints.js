@@ -1,14 +1,15 @@
 // @ts-check
 /**
- * Hints for the first visit with a touch screen: how to drive, stop, and swap views. They are shown once
- * per device, below the bar, cover nothing, and end with the first tap on their button.
+ * Hints about driving, stopping and swapping views, for the first visit with a touch screen. They
+ * are shown once per device, below the bar, without covering anything. A tap on their button ends
+ * them.
  */
 import { t } from "../core/words.js";
 
 const KEY = "urc-hints";
 
 /**
- * Show the hints if this device has a touch screen and has not seen them.
+ * Show the hints if this device has a touch screen and has not shown them yet.
  *
  * @param {HTMLElement} root the page
  */
@@ -42,7 +43,7 @@ function wasSeen() {
   try {
     return localStorage.getItem(KEY) !== null;
   } catch {
-    return true; // the browser forbids storage: better no hint than one at each visit
+    return true; // without storage, show no hints, because they would appear at each visit
   }
 }
 

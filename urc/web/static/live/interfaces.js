@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * Switches to another interface of the robot without a reload: the connection stays, with all values.
- * Held controls are released first.
+ * Switches to another interface of the robot without a reload, so the connection and all values
+ * stay. Held controls are released first.
  *
- * The server renders each interface as a whole page; this module extracts its grid. So a URL gives the
- * same interface, opened or switched to.
+ * The server renders each interface as a whole page; this module extracts its grid. A URL therefore
+ * shows the same interface, whether opened directly or by a switch.
  *
  * @typedef {object} Doors
  * @property {(reason: string) => void} letGo
- * @property {() => void} leave ends the present interface
+ * @property {() => void} leave ends the current interface
  * @property {() => void} enter starts the new interface
  */
 import { fetchPage } from "../core/server.js";
@@ -16,7 +16,7 @@ import { t } from "urc/kit";
 import { part } from "./badge.js";
 
 const FETCH_MS = 10_000;
-/** Time limit for the styles of widgets; after it the page is shown without them. */
+/** Time limit for loading widget styles; after the limit, the page is shown without them. */
 const STYLES_MS = 3000;
 const KEPT_S = 365 * 24 * 3600;
 
@@ -35,17 +35,17 @@ export class Interfaces {
     this.current = choice.value;
     /** URL of the page at the last switch, without the fragment. */
     this.address = addressed();
-    /** Number of the last request: it wins over earlier ones. */
+    /** Number of the last request; responses to earlier requests are ignored. */
     this.round = 0;
     keep(this.current);
-    // The page's own URL may name no interface; the history entry then stores the present one.
+    // If the page's own URL contains no interface, the history entry stores the current interface.
     history.replaceState({ url: this.url }, "");
     choice.addEventListener("change", () => void this.open(this.url, true));
     addEventListener("popstate", ({ state }) => this.moved(state?.url));
   }
 
   /**
-   * Handle a step in the history; a link within the page also makes one.
+   * Handle a step in the history; links within the page also cause steps.
    *
    * @param {string | undefined} url URL in the entry
    */
@@ -54,7 +54,7 @@ export class Interfaces {
     else if (!url) history.replaceState({ url: this.urlOf(this.current) }, ""); // as above
   }
 
-  /** URL of the present interface. */
+  /** URL of the current interface. */
   get url() {
     return this.urlOf(this.choice.value);
   }

@@ -1,19 +1,22 @@
 // @ts-check
 /**
- * Back: release and stop all motion, give back the controls, then leave the page. The robot disconnects
- * a moment later, unless another page watches it.
+ * The Back link: stop all motion, release control, then leave the page. The robot disconnects a
+ * moment later, unless another page watches it.
  *
- * The link also works without this module: the server stops the robot of a page that is gone. With it,
- * the operator still sees the stop.
+ * The link also works without this module, because the server stops the robot when its page closes.
+ * With the module, the operator sees the stop before leaving.
  *
  * @typedef {object} Doors
  * @property {() => void} letGo releases all held controls
  * @property {() => boolean} isMine whether this page has the controls
- * @property {() => void} leave gives back the controls, which first stops the robot
+ * @property {() => void} leave releases control, which first stops the robot
  * @property {() => void} close closes the page's socket
  */
 
-/** Time limit for the server's reply; the page leaves without it, and the server stops the robot. */
+/**
+ * Time limit for the server's reply; without a reply, the page is left anyway, and the server stops
+ * the robot.
+ */
 const WITHIN_MS = 600;
 const LOOK_MS = 20;
 

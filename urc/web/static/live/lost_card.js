@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The card in the middle of the page of a robot that cannot be reached: cause, next step, and buttons.
- * Meanwhile the widgets keep quiet: the card says it once for all of them.
+ * The card in the middle of an unreachable robot's page, with the cause, a hint, and buttons.
+ * Meanwhile, the widgets show no messages, because the card replaces them.
  *
  * @typedef {import("../core/types.js").Link} Link
  * @typedef {import("./store.js").Store} Store
@@ -10,9 +10,9 @@ import { part } from "./badge.js";
 import { causeWords } from "../core/connection_causes.js";
 import { said, t } from "../core/words.js";
 
-/** Time after the loss of a good connection until the card covers the page. */
+/** Time from the loss of a good connection until the card covers the page. */
 const GRACE_MS = 3000;
-/** Reason of a socket that closed itself. */
+/** Reason for a socket that closed itself. */
 const SILENT = "no answer";
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
@@ -33,9 +33,9 @@ export class LostCard {
     this.shown = "";
     /** Transports that only commands open. @type {string[]} */
     this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
-    /** Whether a connection was good since the page was opened. */
+    /** Whether any connection has been good since the page was opened. */
     this.wasGood = false;
-    /** Time of the present loss; 0 without one. */
+    /** Time of the current loss; 0 without a loss. */
     this.lostMs = 0;
     this.again.addEventListener("click", () => {
       tryNow();
@@ -48,7 +48,7 @@ export class LostCard {
    * @param {Store} store
    * @param {import("./socket.js").Socket} socket
    * @param {number} nowMs
-   * @param {boolean} isReplay whether a recording plays, which has no robot to lose
+   * @param {boolean} isReplay whether a recording plays, which cannot lose a robot
    */
   frame(store, socket, nowMs, isReplay) {
     const found = lossOf(store, socket, this.onDemand);
@@ -76,7 +76,7 @@ export class LostCard {
     this.step.textContent = (loss.of === "robot" && this.hint(loss.transport)) || step;
   }
 
-  /** Return the driver's own next step for a transport. @param {string} transport */
+  /** Return the driver's hint for a transport. @param {string} transport */
   hint(transport) {
     const hints = JSON.parse(this.el.dataset["hints"] ?? "{}");
     return Object.hasOwn(hints, transport) ? String(hints[transport]) : "";
@@ -107,11 +107,13 @@ export function wordsOf(loss, title) {
 }
 
 /**
- * Return what is lost: the server, the robot's session, or the whole robot. A robot with one good connection is not lost.
+ * Return the kind of loss: the server, the robot's session, or the whole robot. A robot with at
+ * least one good connection is not lost.
  *
  * @param {Store} store
  * @param {import("./socket.js").Socket} socket
- * @param {readonly string[]} onDemand transports that only commands open: a lost one is no loss
+ * @param {readonly string[]} onDemand transports that only commands open, which do not count as
+ *   lost
  * @returns {Loss | null}
  */
 export function lossOf(store, socket, onDemand = []) {

@@ -28,12 +28,12 @@ import { Store } from "./store.js";
 import { offerSystems } from "../core/units.js";
 import { said, t } from "../core/words.js";
 
-/** Reasons of stops without an operator. @type {Record<string, string>} */
+/** Reasons for stops without an operator's action. @type {Record<string, string>} */
 const STOPPED = {
   expired: t("No input from this page for too long"),
   revoked: t("Lost contact while driving"),
 };
-/** Time for which a confirmation waits for the server. */
+/** Maximum time for which a confirmation waits for the server. */
 const MEANT_MS = 5000;
 /** Interval for checking ages without new data. */
 const AGE_EVERY_MS = 250;
@@ -45,11 +45,11 @@ const panel = new Panel(part(root, "[data-panel]"));
 
 /** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
 const waiting = new Map();
-/** Confirmed commands that wait for their tokens. @type {Map<number, {atMs: number, said: object}>} */
+/** Confirmed commands without a token yet. @type {Map<number, {atMs: number, said: object}>} */
 const meant = new Map();
 let lastId = 0;
 let isFrameDue = false;
-/** Whether the next frame must draw more than widgets. */
+/** Whether the next frame must draw more than the widgets. */
 let isAllDue = false;
 let session = "";
 
@@ -150,16 +150,19 @@ const lost = new LostCard(part(root, "[data-lost]"), root, () => {
 const screenName = new ScreenName((message) => socket.send(message));
 const wakeLock = new WakeLock(tell);
 const stage = new ViewSwitch(root, { store, run, input, asks, host, wake });
-/** Images that the server sends, as JSON. */
+/** JSON list of the images that the server sends. */
 let shown = "";
 
-/** Request the animation frame in which everything is drawn. */
+/** Request an animation frame that draws everything. */
 function wake() {
   isAllDue = true;
   wakeWidgets();
 }
 
-/** Request it for new readings alone, the usual case: no other part of the page shows them. */
+/**
+ * Request an animation frame only for new readings, which is the usual case. Only widgets show
+ * readings.
+ */
 function wakeWidgets() {
   if (isFrameDue) return;
   isFrameDue = true;
@@ -189,7 +192,7 @@ function shows(name) {
   return stage.debug !== null || host.shows(name);
 }
 
-/** Request the visible images, and no others. */
+/** Request only the visible images. */
 function askPictures() {
   const signals = [...host.pictures(), ...stage.pictures()];
   const wanted = JSON.stringify(signals);
@@ -331,7 +334,10 @@ function settle(reply) {
   else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("it was not done"))));
 }
 
-/** Fail pending commands: after the loss of the socket no reply can come. Nothing is ever repeated. */
+/**
+ * Fail pending commands, because no reply can arrive after the loss of the socket. Commands are
+ * never repeated.
+ */
 function giveUpCommands() {
   for (const { reject } of waiting.values()) {
     reject(new Error(t("Connection to URC lost: the result is unknown")));

@@ -1,15 +1,15 @@
 // @ts-check
 /**
- * Data of the page besides signals, for its followers: at once, and after every change, always in an
- * animation frame. Topics without followers cost nothing.
+ * Page data other than signals, for followers: immediately and after every change, always in an
+ * animation frame. Topics without followers cost no time.
  *
  * @typedef {import("../core/types.js").Line} Line
  * @typedef {import("../core/types.js").LogLine} LogLine
  * @typedef {import("../core/types.js").Topics} Topics
  * @typedef {import("./store.js").Store} Store
  *
- * @typedef {{[T in keyof Topics]: () => {look: string, value: Topics[T]}}} Sources Each returns the
- *   present value, and a text that changes with it.
+ * @typedef {{[T in keyof Topics]: () => {look: string, value: Topics[T]}}} Sources Each function
+ *   returns the current value, and a text that changes with it.
  */
 
 export class PageTopics {
@@ -69,7 +69,7 @@ export class Log {
    * Add lines; known lines, which the server repeats after a reconnect, are skipped.
    *
    * @param {readonly Line[]} lines
-   * @param {number} first number of the first one in its session, from 0
+   * @param {number} first number of the first line in its session, from 0
    * @param {string} session
    */
   add(lines, first, session) {
@@ -97,8 +97,8 @@ export class Log {
 }
 
 /**
- * Return the number of signals with a limit, and of those with a known value. The others may be beyond
- * their limit.
+ * Return the number of signals with a limit, and of those with a known value. Signals without a
+ * known value may exceed their limits.
  *
  * @param {Store} store
  * @param {number} nowMs
@@ -110,7 +110,7 @@ export function watched(store, nowMs) {
   return { look: JSON.stringify(value), value };
 }
 
-/** Reports changes of the page's colours: by choice, or by the system. */
+/** Reports changes of the page's colours, by the user's choice or by the system. */
 export class Themes {
   /** @param {() => void} wake */
   constructor(wake) {

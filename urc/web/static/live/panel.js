@@ -44,7 +44,7 @@ export class Panel {
 
   /**
    * @param {Store} store
-   * @param {string} reason why there is no connection, from the server
+   * @param {string} reason the server's reason for the missing connection
    */
   frame(store, reason) {
     const links = [...store.links.values()];
@@ -59,8 +59,8 @@ export class Panel {
   }
 
   /**
-   * Add lines of the log, newest last. After a reconnect the server repeats the latest lines; known ones
-   * are skipped by their number.
+   * Add lines of the log, newest last. After a reconnect the server repeats the latest lines; known
+   * lines are recognized by their number and skipped.
    *
    * @param {Line[]} lines
    * @param {number} first number of the first line in its session, from 0

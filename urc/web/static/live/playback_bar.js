@@ -2,7 +2,7 @@
 /**
  * The playback bar of a recording: play, pause and position.
  *
- * The server keeps the position for all pages, and each page polls it. A drag of the slider is sent once
+ * The server stores the position for all pages, and each page polls it. A slider drag is sent once
  * the slider rests, so that the server does not read the recording for each pixel.
  *
  * @typedef {{beganS: number, lengthS: number, positionS: number, isPlaying: boolean, speed: number}} State
@@ -29,7 +29,7 @@ const said = note.textContent ?? "";
 let isPlaying = false;
 /** Whether the operator holds the slider; then the server's position does not move it. */
 let isHeld = false;
-/** Number of the newest request: older responses do not count. */
+/** Number of the newest request; older responses do not count. */
 let number = 0;
 /** @type {number | undefined} */
 let resting;

@@ -1,22 +1,22 @@
 // @ts-check
 /**
- * Signals whose every reading is sent: new readings, number of lost ones, and listeners.
+ * Signals for which every reading is sent: new readings, numbers of lost readings, and listeners.
  *
- * The server numbers their readings. After a reconnect it repeats the newest one, which its number shows;
- * a gap in the numbers means loss. It knows no page.
+ * The server numbers the readings. After a reconnect, it repeats the newest reading, which the page
+ * recognizes by its number. A gap in the numbers means loss. The module does not depend on a page.
  */
 
 export class SampleHistory {
   constructor() {
     this.session = "";
-    /** Signal → number of its newest reading. @type {Map<string, number>} */
+    /** Number of each signal's newest reading. @type {Map<string, number>} */
     this.known = new Map();
     /** @type {Map<string, Set<(missed: number) => void>>} */
     this.listeners = new Map();
   }
 
   /**
-   * Start a session of the robot; in a new one the numbers begin again.
+   * Start a session of the robot; in a new session, the numbers start again.
    *
    * @param {string} session
    */
@@ -44,10 +44,11 @@ export class SampleHistory {
   }
 
   /**
-   * Call a listener for each new reading of a signal, as soon as the page has it.
+   * Call a listener for each new reading of a signal, as soon as it arrives.
    *
    * @param {string} name
-   * @param {(missed: number) => void} listener gets the number of lost readings before it
+   * @param {(missed: number) => void} listener receives the number of lost readings before the new
+   *   one
    * @param {AbortSignal} signal
    */
   listen(name, listener, signal) {

@@ -4,7 +4,7 @@
  */
 import { t } from "urc/kit";
 
-/** The button for fullscreen mode; hidden where the browser has none. */
+/** The button for fullscreen mode; hidden in browsers without this mode. */
 export class FullScreen {
   /**
    * @param {HTMLElement | null} button
@@ -28,8 +28,8 @@ export class FullScreen {
 }
 
 /**
- * Keeps the screen on while this page has the controls. A browser revokes the lock whenever the page is
- * hidden, so the page requests it again when it returns.
+ * Keeps the screen on while this page is in control. A browser revokes the lock whenever the page
+ * is hidden, so the page requests it again when it returns.
  */
 export class WakeLock {
   /** @param {(text: string) => void} tell called once if the screen may go dark */
@@ -60,7 +60,7 @@ export class WakeLock {
       if (!("wakeLock" in navigator)) throw new Error("no wake lock");
       this.lock = await navigator.wakeLock.request("screen");
     } catch {
-      // Browsers refuse without HTTPS and on a weak battery. Driving goes on either way.
+      // Browsers refuse the lock without HTTPS or on a low battery. Driving continues in any case.
       if (!this.wasTold) this.tell(t("The screen may go dark while you drive: this browser does not keep it on."));
       this.wasTold = true;
     } finally {

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The name of this screen, which other operators see. theme.js keeps it in the field and on the device; a
- * screen whose sign-in has a name has no field.
+ * The name of this screen, which other operators see. theme.js stores it in the field and on the
+ * device. The field is missing if the sign-in contains a name.
  */
 
 const LENGTH = 40;
@@ -10,13 +10,13 @@ export class ScreenName {
   /** @param {(message: object) => boolean} send */
   constructor(send) {
     this.send = send;
-    /** Whether the server knows a name of this screen. */
+    /** Whether the server has a name of this screen. */
     this.isTold = false;
     this.field = document.querySelector("[data-screen-name]");
     this.field?.addEventListener("change", () => this.tell());
   }
 
-  /** Tell the server; also after each reconnect, as it keeps no names. */
+  /** Send the name to the server, also after each reconnect, because the server stores no names. */
   tell() {
     if (!(this.field instanceof HTMLInputElement)) return;
     const name = this.field.value.trim();

@@ -1,11 +1,12 @@
 // @ts-check
 /**
- * The page's WebSocket: it reconnects by itself, and measures the round-trip time.
+ * The page's WebSocket, which reconnects automatically and measures the round-trip time.
  *
- * A connection only counts as up while its pings get replies: a pulled cable causes no event.
+ * A connection counts as up only while its pings get replies, because an unplugged cable causes no
+ * event.
  *
  * @typedef {object} Listener
- * @property {(message: any) => void} message Handles a message of the server, in order.
+ * @property {(message: any) => void} message Handles messages from the server, in order.
  * @property {(data: ArrayBuffer) => void} [picture] Handles a binary message.
  * @property {(isUp: boolean) => void} state Called on every change of `isUp`.
  * @property {() => void} trip Called after each measurement of the round trip.
@@ -16,10 +17,12 @@ import { openSocket } from "../core/server.js";
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 const PING_EVERY_MS = 1000;
-/** Ticks without a reply after which the connection is lost: three seconds of a running page. A page
- * that was blocked has had one tick only, and then reads the messages that arrived meanwhile. */
+/**
+ * Ticks without a reply after which the connection counts as lost, about three seconds on a running
+ * page. A blocked page has only one tick, and then reads the messages that have arrived meanwhile.
+ */
 const SILENT_TICKS = 3;
-/** Close code of a restarted server: it knows no earlier browser. */
+/** Close code of a restarted server, which does not know browsers from earlier starts. */
 const NOT_LET_IN = 4401;
 
 export class Socket {
@@ -32,14 +35,18 @@ export class Socket {
     this.listener = listener;
     /** Round-trip time in milliseconds; null while unknown. @type {number | null} */
     this.tripMs = null;
-    /** Messages since the opening of the page. */
+    /** Messages since the page was opened. */
     this.messages = 0;
     this.bytes = 0;
-    /** Lead of this device's clock over URC's, in milliseconds; null while unknown. @type {number | null} */
+    /**
+     * Offset from URC's clock to this device's clock, in milliseconds; null while unknown.
+     *
+     * @type {number | null}
+     */
     this.skewMs = null;
     /** Lost connections and failed attempts since the last good connection. */
     this.failures = 0;
-    /** The server's reason for closing. */
+    /** The server's reason for closing the socket. */
     this.reason = "";
     this.isUp = false;
     /** Whether the user must first open the printed address. */
@@ -48,7 +55,7 @@ export class Socket {
     this.line = null;
     this.waitMs = FIRST_WAIT_MS;
     this.isWanted = false;
-    /** Time of the pending ping; 0 without one. */
+    /** Time of the pending ping; 0 without a pending ping. */
     this.pingedMs = 0;
     /** Ticks since the pending ping. */
     this.silent = 0;
@@ -69,17 +76,17 @@ export class Socket {
     this.lose("");
   }
 
-  /** Skip the backoff: the network or the page is back. */
+  /** Skip the backoff, because the network or the page is available again. */
   hurry() {
     if (this.isWanted && !this.line) this.connect();
   }
 
   /**
    * @param {object} message
-   * @returns {boolean} whether the browser took it
+   * @returns {boolean} whether the browser accepted it
    */
   send(message) {
-    // The browser may know that the socket is closing before its event.
+    // The browser may know that the socket is closing before the close event.
     if (!this.isUp || !this.line || this.line.readyState !== WebSocket.OPEN) return false;
     this.line.send(JSON.stringify(message));
     return true;
@@ -124,7 +131,7 @@ export class Socket {
       this.pingedMs = 0;
       this.isUp = true;
       this.listener.state(true);
-      // The first ping waits for `tick`: the page is slow at its start.
+      // The first ping waits for `tick`, because the page is slow at its start.
       this.listener.message(message);
     } else if (message.t === "pong") {
       this.tripMs = performance.now() - message.c;

@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * The latest value of every signal, and its age. It knows no DOM and no socket.
+ * The latest value of every signal, and its age. The module uses no DOM and no socket.
  *
- * Ages count on the page's own clock from the time of the measurement. The server sends the age at the
- * moment of sending. The extra delay of a message is found from the fastest message so far, so a value
- * that waited in a full buffer gets its true age.
+ * Ages are counted on the page's own clock, from the time of the measurement. The server sends the
+ * age at the time of sending. A message's extra delay is computed relative to the fastest message
+ * so far, so a value that waited in a full buffer gets its true age.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Conversion} Conversion
@@ -30,13 +30,16 @@ export { ageText, DASH } from "../core/formatting.js";
 /** Multiple of the largest age after which a value is no longer shown. */
 const GONE_AFTER = 10;
 /**
- * Time after which a value of a lost link is no longer shown, whatever its `stale_after`: it may have
- * changed meanwhile.
+ * Time after which a value from a lost link is no longer shown, regardless of its `stale_after`,
+ * because it may have changed meanwhile.
  */
 const CUT_OFF_MS = 60_000;
-/** Age up to which an equal value is not drawn: the page draws all ages in this interval anyway. */
+/**
+ * Age up to which an equal value is not redrawn, because the page draws all ages at this interval
+ * anyway.
+ */
 const STEADY_MS = 250;
-/** Largest drift between two good clocks. */
+/** Maximum drift between two good clocks. */
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
 const LONG_LAG_MS = 1000;
@@ -58,26 +61,26 @@ export class Store {
     /** Time of the loss of each lost link. @type {Map<string, number>} */
     this.downMs = new Map();
     this.isUp = false;
-    /** Whether every link is connected: a shortcut for the check of each. */
+    /** Whether every link is connected, as a shortcut for checking each link. */
     this.isAllUp = false;
     /** Time of the loss of the connection to URC. */
     this.lostMs = 0;
     this.serial = 0;
-    /** Grows with each new declaration of signals by the server. */
+    /** Increases with each new declaration of signals by the server. */
     this.edition = 0;
-    /** Whether any signal is an image: a shortcut for the search in each frame. */
+    /** Whether any signal is an image, as a shortcut for the search in each frame. */
     this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
     this.each = new SampleHistory();
     this.units = new Units();
-    /** Signals in the units that inputs ask for. @type {WeakMap<Conversion, Signal>} */
+    /** Signals in the units of inputs. @type {WeakMap<Conversion, Signal>} */
     this.wanted = new WeakMap();
   }
 
   /**
-   * Take the declarations of the server. Values stay with their age. Values of removed signals go, because
-   * they would never become stale.
+   * Apply the server's declarations. Values stay with their ages. Values of removed signals are
+   * deleted, because they would never become stale.
    *
    * @param {Hello} hello
    * @param {number} nowMs
@@ -116,7 +119,8 @@ export class Store {
    * @param {Values} frame
    * @param {number} nowMs
    * @param {(name: string) => boolean} [shows] whether the page shows a signal
-   * @returns {boolean} whether to draw them at once; equal values of a robot at rest only have a new age
+   * @returns {boolean} whether to draw them immediately; equal values of a robot at rest only have
+   *   a new age
    */
   values(frame, nowMs, shows = () => true) {
     const sentMs = nowMs - this.lagMs(frame.n, nowMs);
@@ -143,7 +147,7 @@ export class Store {
   }
 
   /**
-   * Take an image, or bytes of a signal.
+   * Store an image or bytes of a signal.
    *
    * @param {import("./frames.js").BinaryFrame} frame
    * @param {number} nowMs
@@ -176,15 +180,15 @@ export class Store {
     this.links = new Map(links.map((link) => [link.transport, link]));
     for (const { transport, state, since } of links) {
       if (isConnected(state)) this.downMs.delete(transport);
-      // Lost, connecting, lost again: the first loss counts.
+      // If a link is lost again while connecting, the first loss counts.
       else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
     }
     this.countLinks();
   }
 
   /**
-   * A quick round trip proves empty buffers: if messages still seem late, a clock has jumped, for example
-   * after sleep.
+   * A quick round trip proves that buffers are empty. If messages still seem late, a clock has
+   * jumped, for example after sleep.
    *
    * @param {number} serverMs
    * @param {number} nowMs
@@ -198,8 +202,8 @@ export class Store {
   }
 
   /**
-   * Return a value that changes whenever the reading must be drawn. It is called for each signal in each
-   * frame, so for a live one it is only its serial number.
+   * Return a value that changes whenever the reading must be drawn. It is called for each signal in
+   * each frame, so for a live signal it is only the serial number.
    *
    * @param {string} name
    * @param {number} nowMs
@@ -226,7 +230,7 @@ export class Store {
   /**
    * @param {string} name
    * @param {number} nowMs
-   * @param {Conversion} [conversion] conversion to the unit that the input asks for
+   * @param {Conversion} [conversion] conversion to the unit of the input
    * @returns {Reading}
    */
   reading(name, nowMs, conversion) {
@@ -242,7 +246,7 @@ export class Store {
       value,
       state,
       alarm: isShown ? sample.alarm : "",
-      // Lazy: a scan has a thousand numbers that are rarely read as text.
+      // Computed on demand, because a scan has a thousand numbers that are rarely read as text.
       get text() {
         return textOf(value, signal, factorOf(shown));
       },
@@ -296,8 +300,8 @@ export class Store {
   }
 
   /**
-   * Return the time for which the page or all links of a signal have been down, in milliseconds; -1 while
-   * one is up.
+   * Return the time for which the page or all links of a signal have been down, in milliseconds; -1
+   * while a link is up.
    *
    * @param {Signal} signal
    * @param {number} nowMs
@@ -308,7 +312,7 @@ export class Store {
     const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
     const states = sources.map((source) => this.links.get(source)?.state);
     if (this.isUp && (states.length === 0 || states.some(isConnected))) return -1;
-    // The last link that went down counts; without URC no later state is known.
+    // The link lost last counts; without a connection to URC, no later state is known.
     const downMs = sources.map((source) => this.downMs.get(source) ?? Infinity);
     const sinceMs = Math.max(-Infinity, ...downMs);
     const isKnown = Number.isFinite(sinceMs);
@@ -317,10 +321,10 @@ export class Store {
   }
 
   /**
-   * Why a command cannot be given now; "" if it can be tried.
+   * Reason why a command cannot be sent now; "" if it can be tried.
    *
-   * @param {string} transport transport that must be up; "" if it is opened for each command
-   * @param {boolean} isMotion whether it is motion, which does not wait for a connection
+   * @param {string} transport required transport; "" if it is opened for each command
+   * @param {boolean} isMotion whether the command is motion, which does not wait for a connection
    */
   hindrance(transport, isMotion = false) {
     if (!this.isUp) return t("no connection to URC");
@@ -330,7 +334,7 @@ export class Store {
   }
 
   /**
-   * Return the extra delay of this message over the fastest one, in milliseconds.
+   * Return the extra delay of this message compared with the fastest message, in milliseconds.
    *
    * @param {number} serverMs
    * @param {number} nowMs

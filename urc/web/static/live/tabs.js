@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The pages of one interface: a bar of tabs, one of which is open.
+ * The pages of one interface, with a bar of tabs. One page is open.
  *
- * The pages share their cells, so a camera in two of them keeps running; the rules of the grid place and
- * hide the cells by the number of the page. Hidden cells get no data.
+ * The pages share their cells, so a camera on two pages keeps running. The grid's rules place and
+ * hide the cells by page number. Hidden cells get no data.
  */
 import { part } from "./badge.js";
 
@@ -65,7 +65,7 @@ export class Tabs {
 }
 
 /**
- * Return the tabs of the present interface; null if it has none.
+ * Return the tabs of the current interface; null if it has no tabs.
  *
  * @param {ParentNode} root
  * @param {() => void} leave

@@ -33,7 +33,7 @@ export class ViewSwitch {
       leave: () => this.leave(),
       enter: () => this.enter(),
     });
-    // On the window: controls that use the key themselves come first.
+    // On the window, so that controls that use the key themselves take precedence.
     addEventListener("keydown", (event) => {
       if (event.code !== "KeyV" || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
       if (!event.defaultPrevented && doors.input.owns(event.target)) nextView(this.el);
@@ -43,7 +43,7 @@ export class ViewSwitch {
     });
   }
 
-  /** Return the names of visible images that belong to no widget. */
+  /** Return the names of visible images outside widgets. */
   pictures() {
     return this.debug?.pictures() ?? [];
   }
@@ -53,7 +53,7 @@ export class ViewSwitch {
     this.debug?.frame(nowMs);
   }
 
-  /** Start the present interface. */
+  /** Start the current interface. */
   enter() {
     const { host, input, wake } = this.doors;
     swapViews(this.el);
@@ -72,7 +72,7 @@ export class ViewSwitch {
     this.doors.wake();
   }
 
-  /** End the present interface. */
+  /** End the current interface. */
   leave() {
     const { host } = this.doors;
     this.debug?.end();

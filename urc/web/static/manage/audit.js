@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The page of the audit log: search fields, and a table that loads older entries on demand. The address of
- * the page keeps the search, so that it can be shared and reloaded.
+ * The audit log page, with search fields and a table that loads older entries on demand. The page's
+ * address contains the search, so that the search can be shared and reloaded.
  *
  * @typedef {import("../core/audit_entry.js").Entry} Entry
  */
@@ -12,7 +12,7 @@ import { mark, t } from "../core/words.js";
 import { part } from "../live/badge.js";
 
 const AT_ONCE = 100;
-/** Pause in typing after which the search starts. */
+/** Typing pause before the search starts. */
 const TYPING_MS = 300;
 /** @type {Readonly<Record<string, string>>} */
 const WAYS = {
@@ -44,7 +44,7 @@ const list = part(root, "[data-entries]");
 const more = /** @type {HTMLButtonElement} */ (part(root, "[data-more]"));
 const clear = /** @type {HTMLButtonElement} */ (part(root, "[data-clear]"));
 
-/** Number of the last request: it wins over earlier ones. */
+/** Number of the last request; responses to earlier requests are ignored. */
 let round = 0;
 /** Number of the oldest shown entry. */
 let oldest = 0;
@@ -65,7 +65,7 @@ function filled() {
     .filter(([, value]) => value !== "");
 }
 
-/** @returns {URLSearchParams} the search as the server takes it */
+/** @returns {URLSearchParams} the search in the server's format */
 function query() {
   const asked = new URLSearchParams({ last: String(AT_ONCE) });
   for (const [name, value] of filled()) {
@@ -139,7 +139,7 @@ function right({ way, role, place }) {
   return parts.length ? made("small", {}, parts.join(" · ")) : null;
 }
 
-/** Keep the search in the address of the page, and show that it narrows the list. */
+/** Store the search in the page's address, and show that it restricts the list. */
 function remember() {
   const asked = new URLSearchParams(filled());
   const text = asked.toString();
@@ -175,7 +175,7 @@ part(root, "[data-refresh]").addEventListener("click", () => void load(false));
 clear.addEventListener("click", () => {
   fill(new URLSearchParams());
   search();
-  part(root, "[data-refresh]").focus(); // this button is hidden now
+  part(root, "[data-refresh]").focus(); // this button is now hidden
 });
 fill(new URLSearchParams(location.search));
 filters.open = window.matchMedia("(width >= 60rem)").matches;

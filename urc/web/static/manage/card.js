@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Live images on the cards of the menu. Only visible cards are polled, one after the other and each at
- * most twice a second, so that thirty cards cost the server no more than eight.
+ * Live images on the cards of the menu. Only visible cards are polled, one after the other and each
+ * at most twice a second, so that thirty cards cause no more load on the server than eight.
  */
 
 const EVERY_MS = 500;
 /** Interval for polling a robot without data. */
 const QUIET_MS = 5000;
-/** Shortest interval of two requests: eight a second on the whole page. */
+/** Minimum interval between two requests, for eight requests per second on the whole page. */
 const PACE_MS = 125;
 
 /**
@@ -41,7 +41,7 @@ export function watchPictures() {
 async function go(looks) {
   for (;;) {
     const nowMs = performance.now();
-    // The card with the oldest due time is next; a hidden page polls none.
+    // The card with the oldest due time is next; hidden pages poll no cards.
     const due = looks.filter((look) => look.isSeen && look.dueMs <= nowMs);
     const next = due.sort((one, other) => one.dueMs - other.dueMs)[0];
     if (next && !document.hidden) {
@@ -63,7 +63,7 @@ async function renew(look) {
     else if (answer.headers.get("content-type")?.startsWith("image/")) await show(look, await answer.blob());
     else list(look, await answer.json());
   } catch {
-    look.dueMs += QUIET_MS; // the server is away, or the image is invalid: the last one stays
+    look.dueMs += QUIET_MS; // without a server or with an invalid image, the last image stays
   }
 }
 

@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * The state of a robot in words, for its card. It knows no DOM.
+ * A robot's state in words, for its card. The module uses no DOM.
  *
  * @typedef {object} Battery
  * @property {number} value
  * @property {string} unit
  * @property {string} alarm exceeded limit; "" if normal
  *
- * @typedef {object} Summary A robot in the answer of `/api/v1/robots`.
+ * @typedef {object} Summary A robot in the response of `/api/v1/robots`.
  * @property {string} name
  * @property {"idle" | "connecting" | "live" | "silent" | "lost"} state
  * @property {boolean} connected whether a page or program uses the robot
@@ -23,7 +23,7 @@ import { ageText } from "../core/formatting.js";
 import { said, t } from "../core/words.js";
 
 const DAY_S = 24 * 3600;
-/** Hours up to this number stay hours. */
+/** Maximum age that is shown in hours, in seconds. */
 const LONGEST_HOURS_S = 48 * 3600;
 
 /**
@@ -71,7 +71,7 @@ export function batteryWords({ battery }) {
 }
 
 /**
- * Return the operator who drives, or who stopped the robot.
+ * Return the name of the operator who drives or has stopped the robot.
  *
  * @param {Summary} robot
  * @returns {Said | null}

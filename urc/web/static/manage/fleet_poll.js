@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The state of all robots, asked for while the page is visible. One small answer has all robots, and none
- * of them is connected for it.
+ * The state of all robots, polled while the page is visible. One small response contains all
+ * robots, and the request connects no robot.
  *
  * @typedef {import("./card_words.js").Summary} Summary
  * @typedef {{robots: Summary[], time: number}} RobotList
@@ -14,7 +14,7 @@ const EVERY_MS = 2000;
 const FAILED_MS = 5000;
 
 /**
- * Call `take` with each answer, and with null after a failure.
+ * Call `take` with each response, and with null after a failure.
  *
  * @param {(list: RobotList | null) => void} take
  */
@@ -25,7 +25,7 @@ export function followRobots(take) {
 
   async function go() {
     clearTimeout(timer);
-    if (document.hidden || isAsking) return; // `visibilitychange` asks again
+    if (document.hidden || isAsking) return; // `visibilitychange` polls again
     isAsking = true;
     let isWell = true;
     try {
@@ -40,5 +40,5 @@ export function followRobots(take) {
 
   document.addEventListener("visibilitychange", () => void go());
   addEventListener("online", () => void go());
-  timer = setTimeout(go, EVERY_MS); // the page itself has the first answer
+  timer = setTimeout(go, EVERY_MS); // the page itself contains the first response
 }

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The install job in a dialog: the download, the permissions, the approval, and the result. Closing the
- * dialog cancels a job without approval.
+ * The installation job in a dialog: download, permissions, approval and result. Closing the dialog
+ * cancels an unapproved job.
  *
  * @typedef {import("./rows.js").Job} Job
  */
@@ -92,7 +92,10 @@ export class JobDialog {
     if (again instanceof HTMLElement) again.focus();
   }
 
-  /** Close the dialog. The button that opened it may have been redrawn, so the focus goes to its key. */
+  /**
+   * Close the dialog. The button that opened it may have been redrawn, so the focus moves to the
+   * element with the same key.
+   */
   close() {
     this.number = null;
     this.drawn = "";
@@ -171,7 +174,7 @@ export class JobDialog {
   }
 
   /**
-   * Access of a package to this machine, with an approval of its own.
+   * A package's access to this machine, with a separate approval.
    *
    * @param {Job} job
    */
@@ -186,7 +189,7 @@ export class JobDialog {
   }
 
   /**
-   * Packages without a signature: refused, unless each package is accepted by name.
+   * Unsigned packages, which are refused unless the user accepts each package by name.
    *
    * @param {Job} job
    */
@@ -208,7 +211,7 @@ export class JobDialog {
   }
 
   /**
-   * A required approval: the main button stays disabled until all approvals are checked.
+   * A required approval. The main button stays disabled until all approvals are checked.
    *
    * @param {string} key
    * @returns {HTMLInputElement}
@@ -238,7 +241,7 @@ export class JobDialog {
   }
 }
 
-/** @param {Job} job @returns {boolean} whether it replaces the version in use */
+/** @param {Job} job @returns {boolean} whether the job replaces the version in use */
 function isSwap({ isUpdate, stays }) {
   return isUpdate && stays === "";
 }
@@ -253,7 +256,7 @@ function heading(text) {
   return made("h3", { class: "urc-row-title" }, text);
 }
 
-/** @param {string[]} lines texts of the server about documents */
+/** @param {string[]} lines the server's texts about documents */
 function list(lines) {
   if (lines.length === 0) return null;
   return made("ul", { class: "urc-list" }, ...lines.map((one) => made("li", {}, one)));

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * A manager's page: repositories, installed packages and available packages. It shows the lists of the
- * server, and polls them while a job or a refresh is under way.
+ * A manager page with repositories, installed packages and available packages. It shows the
+ * server's lists, and polls them during a job or a refresh.
  *
  * @typedef {import("./rows.js").Shelf} Shelf
  */
@@ -13,7 +13,7 @@ import { availableRow, installedRow, placeRow, row } from "./rows.js";
 import { t } from "../core/words.js";
 
 const BUSY_MS = 400;
-/** Pause in typing after which the search starts. */
+/** Typing pause before the search starts. */
 const TYPING_MS = 200;
 
 const root = part(document, "[data-manage]");
@@ -30,7 +30,7 @@ const dialog = new JobDialog(
   (path, body) => act(path, body),
 );
 
-/** Number of the last request: it wins over earlier ones. */
+/** Number of the last request; responses to earlier requests are ignored. */
 let round = 0;
 /** @type {number | undefined} */
 let again;
@@ -42,7 +42,7 @@ function say(text, kind = "") {
   said.classList.toggle("urc-bad", kind === "bad");
 }
 
-/** @param {boolean} [force] whether to refresh from the repositories, whatever the age of their lists */
+/** @param {boolean} [force] whether to refresh from the repositories, regardless of their lists' age */
 async function look(force = false) {
   try {
     await ask("/api/v1/repositories/ask", { force });
@@ -75,7 +75,7 @@ function show(shelf) {
   dialog.show(shelf.job);
   const { job, ...rest } = shelf;
   const look = JSON.stringify(rest);
-  if (look === looks) return; // unchanged: a redraw could move a button under a finger
+  if (look === looks) return; // a redraw could move a button under a finger
   looks = look;
   const doing = shelf.mayManage ? act : null;
   const { installed, available, repositories } = shelf;
@@ -99,7 +99,7 @@ function countText({ total, available, isAsking, repositories }) {
 }
 
 /**
- * Perform an action, show its result, and update the page.
+ * Perform an action, show the result, and update the page.
  *
  * @param {string} path
  * @param {object | Blob} body
@@ -121,7 +121,7 @@ async function act(path, body) {
 }
 
 /**
- * List the packages that a removal removes, and remove them after a confirmation.
+ * List the packages affected by a removal, and remove them after a confirmation.
  *
  * @param {string} wish
  */

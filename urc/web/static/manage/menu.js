@@ -13,7 +13,10 @@ import { fits } from "./search.js";
 import { placeSheets } from "./sheets.js";
 import { t } from "../core/words.js";
 
-/** Time without input after which cards may change places, so that none moves away under a finger. */
+/**
+ * Time without input after which cards may change places, so that no card moves away under a
+ * finger.
+ */
 const CALM_MS = 3000;
 const KEPT = "urc-menu-filter";
 
@@ -34,7 +37,7 @@ let touchedMs = -CALM_MS;
 /** @param {RobotList | null} news */
 function take(news) {
   if (root instanceof HTMLElement) root.dataset["stale"] = String(news === null);
-  if (news === null) return; // the server is away: the last states stay, greyed
+  if (news === null) return; // without a server, the last states stay, greyed out
   for (const robot of news.robots) {
     const card = byName.get(robot.name);
     if (card && "live" in card.dataset) show(card, robot, news.time);
@@ -96,7 +99,7 @@ function hasAlarm(card) {
   return Number(card.dataset["alarms"] ?? 0) > 0;
 }
 
-/** Show the cards that fit the typed words, the filter and the tag. */
+/** Show the cards that match the typed words, the filter and the tag. */
 function find() {
   const typed = field instanceof HTMLInputElement ? field.value : "";
   const filter = pressed(filters)?.dataset["filter"] ?? "";
@@ -116,7 +119,7 @@ function find() {
   if (none instanceof HTMLElement) none.hidden = found > 0;
 }
 
-/** Put the cards in their order, unless someone uses the page just now. */
+/** Sort the cards, unless the page is currently in use. */
 function sort() {
   if (!list || performance.now() - touchedMs < CALM_MS) return;
   if (list.contains(document.activeElement) || document.querySelector("[data-more]:popover-open")) return;
@@ -133,7 +136,7 @@ function pressed(buttons) {
 /**
  * @param {HTMLElement[]} buttons
  * @param {HTMLElement} chosen
- * @param {boolean} isOptional whether a second press takes the choice back
+ * @param {boolean} isOptional whether a second press undoes the choice
  */
 function choose(buttons, chosen, isOptional) {
   const isBack = isOptional && chosen === pressed(buttons);
@@ -142,13 +145,13 @@ function choose(buttons, chosen, isOptional) {
   find();
 }
 
-/** Keep the filter for the way back from a robot. */
+/** Store the filter for the return from a robot's page. */
 function keep() {
   const kept = { filter: pressed(filters)?.dataset["filter"], tag: pressed(tags)?.dataset["tag"] };
   try {
     sessionStorage.setItem(KEPT, JSON.stringify(kept));
   } catch {
-    // Private mode: the filter lasts until the page closes.
+    // In private mode, the filter lasts until the page closes.
   }
 }
 
@@ -160,7 +163,7 @@ function restore() {
     if (filter) choose(filters, filter, false);
     if (tag) choose(tags, tag, false);
   } catch {
-    // Nothing is kept, or it is damaged: all robots are shown.
+    // If no valid filter is stored, all robots are shown.
   }
 }
 

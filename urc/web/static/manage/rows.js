@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Rows of a manager's page: repositories, installed packages and available packages.
+ * Rows of a manager page: repositories, installed packages and available packages.
  *
  * @typedef {object} Job
  * @property {number} number
@@ -65,7 +65,8 @@
  * @property {boolean} mayManage
  * @property {Job | null} job
  *
- * @typedef {((path: string, body: object) => Promise<any>) | null} Act null: no action is allowed
+ * @typedef {((path: string, body: object) => Promise<any>) | null} Act null if no action is
+ *   permitted
  */
 import { button, made } from "../core/dom.js";
 import { mark, t } from "../core/words.js";

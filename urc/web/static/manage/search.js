@@ -2,8 +2,8 @@
 /** Full-text search in the lists of a page. */
 
 /**
- * Return whether the text has each of the typed words, in any place. Case and accents are ignored; an
- * empty search fits everything.
+ * Return whether the text contains all typed words, at any position. Case and accents are ignored;
+ * an empty search matches everything.
  *
  * @param {string} text
  * @param {string} typed

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The settings of a robot: sent as text, tested by the server, and marked where they are invalid. Unsaved
- * input stays in the fields.
+ * A robot's settings. The page sends them as text, the server tests them, and the page marks
+ * invalid fields. Unsaved input stays in the fields.
  *
  * @typedef {object} Line
  * @property {string} transport
@@ -112,7 +112,7 @@ function offerAnyway() {
 
 function saved() {
   forgotten.clear();
-  // The interface chosen here becomes the device's own choice.
+  // The interface chosen here becomes the device's choice.
   const path = root.dataset["robot"] ?? "/";
   const name = encodeURIComponent(chosen("interface"));
   if (name) document.cookie = `urc-interface=${name}; path=${path}; max-age=${KEPT_S}; samesite=strict`;
@@ -140,7 +140,7 @@ function mistakes(faults) {
 }
 
 /**
- * Show a failed test at the field that most likely caused it.
+ * Show a failed test at the most likely field.
  *
  * @param {Line[]} some
  */

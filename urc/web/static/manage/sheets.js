@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The place of the sheets behind "…": next to their button on a wide screen, at the lower edge of a phone,
- * where the style sheet puts them.
+ * The position of the sheets behind "…". On wide screens, they are next to their button. On phones,
+ * the style sheet puts them at the lower edge.
  */
 
 const GAP = 8;

@@ -1,12 +1,12 @@
 // @ts-check
 /**
- * The page on this connection: tests the features that depend on the address, and opens the guide of
+ * The connection page, which tests the features that depend on the address, and opens the guide for
  * this device.
  *
  * @typedef {object} Feature
  * @property {string} title
  * @property {boolean} isThere
- * @property {string} why reason for a missing feature; "" for an existing one
+ * @property {string} why reason for a missing feature; "" for an available feature
  */
 import { made, put } from "../core/dom.js";
 import { mark, t } from "../core/words.js";
@@ -81,7 +81,7 @@ function device() {
   const agent = navigator.userAgent;
   if (/Firefox/.test(agent) && !/Android/.test(agent)) return "firefox";
   if (/Android/.test(agent)) return "android";
-  // An iPad presents itself as a Mac, but has a touch screen.
+  // An iPad identifies itself as a Mac, but has a touch screen.
   if (/iPhone|iPad/.test(agent) || (/Macintosh/.test(agent) && navigator.maxTouchPoints > 1)) return "ios";
   if (/Windows/.test(agent)) return "windows";
   if (/Macintosh/.test(agent)) return "macos";

@@ -1,5 +1,5 @@
 // @ts-check
-/** One's own account: sign-out, passphrase, devices and sign-ins. */
+/** The visitor's own account: sign-out, passphrase, devices and sign-ins. */
 import { ask, reason } from "../core/api_client.js";
 import { button, put, ready } from "../core/dom.js";
 import { t } from "../core/words.js";

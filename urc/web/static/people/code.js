@@ -1,5 +1,5 @@
 // @ts-check
-/** Parts of the pages for links with a code, and of the pages about people. */
+/** Common parts of the pages for links with a code and of the pages about people. */
 import { part } from "../live/badge.js";
 import { mark, t } from "../core/words.js";
 

@@ -1,10 +1,10 @@
 // @ts-check
-/** Dialogs of the pages about people: a question, a secret that is shown once, and a pairing. */
+/** Dialogs of the pages about people: a question, a secret shown once, and a pairing. */
 import { ask, reason } from "../core/api_client.js";
 import { button, made } from "../core/dom.js";
 import { t } from "../core/words.js";
 
-/** Interval for asking whether the device has paired. */
+/** Polling interval for the pairing of the device. */
 const LOOK_MS = 700;
 
 export class PeopleDialog {
@@ -29,7 +29,7 @@ export class PeopleDialog {
   }
 
   /**
-   * Ask once before an action that cannot be undone.
+   * Ask for confirmation of an action that cannot be undone.
    *
    * @param {string} title
    * @param {string} text
@@ -61,14 +61,14 @@ export class PeopleDialog {
         () => (said.textContent = t("copied")),
         () => select(value),
       );
-      if (!navigator.clipboard) select(value); // browsers offer the clipboard over HTTPS only
+      if (!navigator.clipboard) select(value); // browsers offer the clipboard only over HTTPS
     });
     this.show(title, made("p", {}, text), qr && picture(qr), value,
       made("div", { class: "urc-ways" }, copy, button(t("Done"), "done", () => this.close()), said));
   }
 
   /**
-   * Show a pairing code until a device has paired, or the code has ended.
+   * Show a pairing code until a device has paired or the code has expired.
    *
    * @param {{id: string, link: string, qr: string, code: string, fingerprint: string, isReachable: boolean, lastsS: number}} code
    * @param {{again: () => void, changed: () => void, remove: (device: string, name: string) => void}} acts

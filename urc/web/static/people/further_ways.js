@@ -1,5 +1,5 @@
 // @ts-check
-/** The buttons of the sign-in page for a passkey and for an identity provider. */
+/** The buttons on the sign-in page for passkeys and for an identity provider. */
 import { reason } from "../core/api_client.js";
 import { ready } from "../core/dom.js";
 import { t } from "../core/words.js";
@@ -31,7 +31,7 @@ function connect(selector, go) {
 
 connect("[data-passkey]", async () => {
   await signInWithPasskey();
-  // Not a reload: after a link from another site, a reload would send no cookie either.
+  // Not a reload, because after a link from another site, a reload would send no cookie either.
   location.replace(root.dataset["to"] ?? "/");
 });
 connect("[data-provider]", signInWithProvider);

@@ -1,5 +1,5 @@
 // @ts-check
-/** A guest opens the robot of a link. */
+/** A guest opens the robot of a guest link. */
 import { ask, reason } from "../core/api_client.js";
 import { ready } from "../core/dom.js";
 import { t } from "../core/words.js";

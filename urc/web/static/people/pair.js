@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The pairing of this device: the code comes from the fragment, or is entered.
+ * The pairing of this device, with the code from the fragment or from input.
  *
  * @typedef {object} Info
  * @property {string} kind
@@ -86,7 +86,7 @@ named.addEventListener("submit", (event) => {
   event.preventDefault();
   void pair();
 });
-// The camera may open the link in a tab that shows this page already.
+// The camera may open the link in a tab that already shows this page.
 addEventListener("hashchange", () => {
   const next = takenCode();
   if (next) code = next;

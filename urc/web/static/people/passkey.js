@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Sign-in with a passkey or with an identity provider, and adding a passkey. Pages call these functions
- * after a press; each one throws an error with one line for people.
+ * Sign-in with a passkey or an identity provider, and adding a passkey. Pages call these functions
+ * after a press. Each function throws an error with a one-line message for people.
  */
 import { ask } from "../core/api_client.js";
 import { t } from "../core/words.js";
@@ -9,7 +9,8 @@ import { t } from "../core/words.js";
 const ADDRESS = /^(?:\[.*\]|[0-9.]+)$/;
 
 /**
- * Return why this browser offers no passkeys on this page, in the user's language; "" if it does.
+ * Return the reason why this browser offers no passkeys on this page, in the user's language; "" if
+ * it does.
  *
  * @returns {string}
  */
@@ -23,7 +24,7 @@ export function obstacle() {
 }
 
 /**
- * Sign in with a passkey of this device.
+ * Sign in with a passkey on this device.
  *
  * @returns {Promise<string>} name of the person
  */
@@ -43,9 +44,9 @@ export async function signInWithPasskey() {
 }
 
 /**
- * Add a passkey of this device to the signed-in person.
+ * Add a passkey on this device for the signed-in person.
  *
- * @param {string} name name of the passkey for people
+ * @param {string} name displayed name of the passkey
  * @returns {Promise<import("./types.js").Passkey>}
  */
 export async function addPasskey(name) {
@@ -91,7 +92,7 @@ export async function removePasskey(id) {
   return (await ask("/account/passkeys/remove", { id })).passkeys;
 }
 
-/** Leave this page for that of the identity provider, which leads back. */
+/** Open the identity provider's page, which redirects back here. */
 export async function signInWithProvider() {
   location.assign((await ask("/sign-in/oidc", {})).url);
 }
@@ -127,7 +128,7 @@ function credential(made, response) {
 }
 
 /**
- * Return the bytes of base64url; older browsers have no method for it.
+ * Return the bytes of a base64url text; older browsers have no method for this.
  *
  * @param {string} said
  */

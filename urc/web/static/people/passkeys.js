@@ -1,5 +1,5 @@
 // @ts-check
-/** The part “Passkeys” on the page of one's own account: the list, and a new passkey. */
+/** The section “Passkeys” on the account page: the list, and adding a passkey. */
 import { reason } from "../core/api_client.js";
 import { button, made, put, ready } from "../core/dom.js";
 import { t } from "../core/words.js";
@@ -14,9 +14,9 @@ import { quiet, time } from "./rows.js";
  */
 
 /**
- * Fill the part for a signed-in person.
+ * Fill the section for a signed-in person.
  *
- * @param {HTMLElement} root element of the part
+ * @param {HTMLElement} root element of the section
  * @param {Questions} questions
  * @param {Say} say
  */
@@ -84,7 +84,7 @@ export function passkeysPart(root, questions, say) {
   void act(ownPasskeys, "");
 }
 
-/** Return a suggested name of a passkey, such as “Android”; it is better than no name. */
+/** Return a suggested name for a passkey, such as “Android”. */
 function thisDevice() {
   const brands = /** @type {{ userAgentData?: { platform?: string } }} */ (navigator).userAgentData;
   return brands?.platform ?? "";

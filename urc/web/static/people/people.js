@@ -30,7 +30,7 @@ const dialog = new PeopleDialog(/** @type {HTMLDialogElement} */ (part(root, "[d
 const owners = /** @type {HTMLSelectElement} */ (part(root, "[data-owners]"));
 const roleFields = /** @type {HTMLTemplateElement} */ (part(root, "[data-role-fields]"));
 
-/** Number of the last update: it wins over earlier ones. */
+/** Number of the last update; responses to earlier updates are ignored. */
 let round = 0;
 let shown = "";
 
@@ -88,7 +88,7 @@ function buttonsOf(one) {
 }
 
 /**
- * Perform a change, show its result, and update the lists.
+ * Perform a change, show the result, and update the lists.
  *
  * @param {string} path
  * @param {object} body
@@ -188,7 +188,7 @@ function endSignIn({ id, name, way }) {
 /** @param {Element} fields @returns {string} */
 function grantIn(fields) {
   const [role, scope] = ["role", "scope"].map((name) => /** @type {HTMLSelectElement} */ (part(fields, `[name=${name}]`)).value);
-  return role === "administer" ? role : `${role}${scope}`; // it is for all robots
+  return role === "administer" ? role : `${role}${scope}`; // the role is for all robots
 }
 
 /** @param {string} kind @param {(form: HTMLFormElement, data: FormData) => Promise<any>} send */
@@ -229,7 +229,7 @@ async function pair(wish) {
   return code;
 }
 
-/** Hide the roles of a device that has those of its owner. */
+/** Hide the roles of a device with an owner, because the device has its owner's roles. */
 function showRoles() {
   for (const field of owners.form?.querySelectorAll("[data-role-field]") ?? []) {
     if (field instanceof HTMLElement) field.hidden = owners.value !== "";

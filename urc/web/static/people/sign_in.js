@@ -1,5 +1,5 @@
 // @ts-check
-/** The sign-in with name and passphrase. */
+/** Sign-in with name and passphrase. */
 import { ask, reason } from "../core/api_client.js";
 import { ready } from "../core/dom.js";
 import { t } from "../core/words.js";
@@ -29,7 +29,7 @@ async function signIn() {
   try {
     await ask("/api/v1/sign-in", { name: name.value, passphrase: passphrase.value });
     passphrase.value = "";
-    // Not a reload: after a link from another site, a reload would send no cookie either.
+    // Not a reload, because after a link from another site, a reload would send no cookie either.
     location.replace(form.dataset["to"] ?? "/");
   } catch (error) {
     say(reason(error), "bad");

@@ -5,7 +5,7 @@
  * @typedef {object} Passkey
  * @property {string} id
  * @property {string} name
- * @property {string} host host name for which browsers offer it
+ * @property {string} host host name at which browsers offer the passkey
  * @property {number} created_at UTC time in seconds since 1970
  * @property {number | null} used_at UTC time of the last sign-in; null before the first
  */

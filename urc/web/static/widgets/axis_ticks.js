@@ -2,7 +2,7 @@
 /**
  * Arithmetic of scales: `import { ticks } from "urc/axis_ticks"`.
  *
- * Pure: it knows no page, so tests need none.
+ * Pure, so tests need no page.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Signal} Signal
@@ -30,19 +30,19 @@ export function share(value, least, most) {
 }
 
 /**
- * Return round values of a scale, with its ends if they are round.
+ * Return round values of a scale, including round ends.
  *
  * @param {number} least
  * @param {number} most
  * @param {number} count approximate number; never more than twice as many
- * @returns {number[]} in rising order
+ * @returns {number[]} in ascending order
  */
 export function ticks(least, most, count) {
   if (!(most > least) || !Number.isFinite(most - least)) return [];
   const rough = (most - least) / Math.max(1, count);
   const decade = 10 ** Math.floor(Math.log10(rough));
   const step = decade * (STEPS.find((each) => each * decade >= rough * 0.999) ?? 10);
-  // Multiplied, not added up: adding 0.1 ten times does not give 1.
+  // Multiplied, not added up, because the sum of ten times 0.1 is not exactly 1.
   const places = wholes(Math.ceil(least / step - 1e-9), Math.floor(most / step + 1e-9));
   return places.map((place) => Number((place * step).toPrecision(12)) + 0);
 }
@@ -52,7 +52,7 @@ export function ticks(least, most, count) {
  *
  * @param {number} first
  * @param {number} last
- * @returns {number[]} in rising order
+ * @returns {number[]} in ascending order
  */
 export function wholes(first, last) {
   if (!Number.isSafeInteger(first) || !Number.isSafeInteger(last)) return [];
@@ -60,7 +60,7 @@ export function wholes(first, last) {
 }
 
 /**
- * Return the digits after the point that round values need.
+ * Return the number of digits after the point for round values.
  *
  * @param {readonly number[]} values
  */
@@ -74,8 +74,8 @@ export function digitsOf(values) {
 }
 
 /**
- * Return the ends of a scale: those of the options, else of the signal, else 0 to 100 for percent and 0
- * to 1 for other units.
+ * Return the ends of a scale, from the options or else from the signal. The default is 0 to 100 for
+ * percent, and 0 to 1 for other units.
  *
  * @param {Pick<Signal, "min" | "max" | "unit">} signal
  * @param {{min?: unknown, max?: unknown}} wanted
@@ -112,17 +112,17 @@ export function bands(limits, least, most) {
 }
 
 /**
- * Return the range of a drawing that shows all values, and the limits near them.
+ * Return the range of a drawing with all values and the limits near them.
  *
  * @param {number} least smallest value
  * @param {number} most largest value
- * @param {readonly number[]} limits limits farther away than three times the height are left out
+ * @param {readonly number[]} limits limits farther away than three times the height are omitted
  * @returns {[number, number]}
  */
 export function spanOf(least, most, limits) {
   if (!(most >= least)) return [0, 1];
   let [bottom, top] = [least, most];
-  // Too close together for ticks between them: treated as one value.
+  // Values too close together for ticks between them are treated as one value.
   if (top - bottom <= Math.max(Math.abs(top), Math.abs(bottom)) * NEAREST) {
     const room = Math.abs(top) / 10 || 1;
     [bottom, top] = [bottom - room, top + room];

@@ -2,8 +2,8 @@
 /**
  * One widget in its cell: its context, its frames, and its failures.
  *
- * A widget that throws only loses its own cell, which then shows a card; so does one that takes too much
- * of the page's time. Hidden cells get no data.
+ * A widget that throws an exception or needs too much of the page's time only loses its own cell,
+ * which then shows a card. Hidden cells get no data.
  *
  * @typedef {import("../core/types.js").Conversion} Conversion
  * @typedef {import("../core/types.js").Instance} Instance
@@ -22,7 +22,7 @@
  * @property {string} title
  * @property {Record<string, string | string[]>} inputs Input → its signal, or its signals.
  * @property {Record<string, (Conversion | null)[]>} conversions Input → conversion of each of its
- *   signals to the unit of the input; left out if none is needed.
+ *   signals to the unit of the input; omitted if no conversion is needed.
  * @property {Record<string, Output>} outputs
  * @property {Record<string, unknown>} options
  * @property {boolean} [deadMan] Whether it is a dead-man control.
@@ -35,7 +35,7 @@
  * @property {(command: string, verb: string) => void} steer
  * @property {(wish: import("../core/types.js").PendingValue) => void} drive
  * @property {() => void} wake requests an animation frame
- * @property {() => void} again requests one for widgets alone
+ * @property {() => void} again requests an animation frame only for widgets
  * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
@@ -47,7 +47,7 @@ import { contextOf } from "./context.js";
 import { t } from "./kit.js";
 import { PICTURES } from "../live/store.js";
 
-/** Time limit for loading; a later widget shows a note. */
+/** Time limit for loading; after the limit, the cell shows a note. */
 const LOADING_MS = 5000;
 
 /** @type {readonly string[]} */
@@ -85,15 +85,23 @@ export class Cell {
     this.budget = new RenderBudget();
     /** @type {Map<string, ((reading: Reading) => void)[]>} */
     this.listeners = new Map();
-    /** State of the outputs at the widget's last call; null before the first. @type {string | null} */
+    /**
+     * State of the outputs at the widget's last call; null before the first call.
+     *
+     * @type {string | null}
+     */
     this.seenOutlets = null;
-    /** Edition of the store that was last drawn completely. */
+    /** Edition of the store at the last complete drawing. */
     this.edition = -1;
     /** Whether it is a third-party widget. */
     this.isForeign = false;
     /** Its image inputs. @type {{edition: number, names: readonly string[]}} */
     this.images = { edition: -1, names: NONE };
-    /** Indexes of the visible images, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */
+    /**
+     * Indexes of the visible images, by input; without an entry, all images are visible.
+     *
+     * @type {Map<string, ReadonlySet<number>>}
+     */
     this.looks = new Map();
     /** Cached units of the context. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
     this.shownIn = new Map();
@@ -141,7 +149,7 @@ export class Cell {
   }
 
   /**
-   * Return the listener, with its exceptions limited to this cell.
+   * Return the listener in a wrapper that limits its exceptions to this cell.
    *
    * @template T
    * @param {(news: T) => void} listener
@@ -201,14 +209,14 @@ export class Cell {
     return this.images.names;
   }
 
-  /** Whether a signal is one of its inputs. @param {string} name */
+  /** Whether a signal is one of the widget's inputs. @param {string} name */
   shows(name) {
     return this.inputs.some(({ signals }) => signals.includes(name));
   }
 
   /**
-   * Return the urgency of a call: 0 none, 1 new values, 2 a change that must not wait (a size, an output,
-   * a value that is no longer live, the start or end of an alarm).
+   * Return the urgency of a call: 0 for no change, 1 for new values, and 2 for a change that must
+   * not wait (a size, an output, a value that is no longer live, the start or end of an alarm).
    *
    * @param {Store} store
    * @param {number} nowMs
@@ -239,7 +247,7 @@ export class Cell {
   }
 
   /**
-   * Pass changes to the widget, if there are any. Called in an animation frame.
+   * Pass changes to the widget, if any. Called in an animation frame.
    *
    * @param {Store} store
    * @param {number} nowMs
@@ -249,7 +257,7 @@ export class Cell {
   }
 
   /**
-   * Pass the changes since its last call to the widget.
+   * Pass the changes since the last call to the widget.
    *
    * @param {Store} store
    * @param {number} nowMs

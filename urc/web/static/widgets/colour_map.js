@@ -2,9 +2,9 @@
 /**
  * Colour maps for measured fields: `import { palette } from "urc/colour_map"`.
  *
- * Cividis looks nearly the same with and without red-green blindness, and its brightness rises from end
- * to end, so it also works in grey. The map is that of Nuñez, Anderton and Renslow (2018), at every
- * eighth step, with linear interpolation. It knows no DOM.
+ * Cividis looks nearly the same with and without red-green blindness, and its brightness increases
+ * from end to end, so it also works in grey. The map is from Nuñez, Anderton and Renslow (2018), at
+ * every eighth step, with linear interpolation. The module uses no DOM.
  */
 
 const CIVIDIS =
@@ -38,7 +38,7 @@ export function colour(share, name = "cividis") {
 }
 
 /**
- * Return the map in 256 steps, each a pixel of `ImageData` as one 32-bit number.
+ * Return the map in 256 steps, each as a pixel of `ImageData` in one 32-bit number.
  *
  * @param {Palette} [name]
  */

@@ -2,7 +2,7 @@
 /**
  * The toolkit for widgets with commands: `import { CommandState, slide } from "urc/command_kit"`.
  *
- * It knows no socket and no store; a widget passes its own `send`.
+ * The toolkit uses no socket and no store; a widget passes its own `send`.
  */
 
 export { boundsOf, keyed, snapped } from "./number_bounds.js";

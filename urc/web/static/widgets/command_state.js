@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * One command of a widget, with its state. It knows no socket and no store.
+ * One command of a widget, with its state. The module uses no socket and no store.
  *
  * @typedef {import("../core/types.js").Outlet} Outlet
  * @typedef {import("../core/types.js").StopState} StopState
@@ -12,7 +12,7 @@
 /** Time for which a result is shown. */
 const TELL_MS = 4000;
 
-/** One command: sent, pending, done or failed. */
+/** One command, which is pending, done or failed. */
 export class CommandState {
   /**
    * @param {object} spec
@@ -70,7 +70,7 @@ export class CommandState {
   }
 
   /**
-   * Send the command, unless it is pending already.
+   * Send the command, unless it is already pending.
    *
    * @param {Record<string, Value>} [args]
    * @returns {Promise<boolean>} whether it succeeded
@@ -93,7 +93,7 @@ export class CommandState {
   }
 
   /**
-   * Send the command as soon as possible; a newer one replaces one that still waits.
+   * Send the command as soon as possible; a newer command replaces a waiting one.
    *
    * @param {Record<string, Value>} args
    */
@@ -121,7 +121,7 @@ export class CommandState {
   /**
    * @param {Phase} phase
    * @param {string} outcome
-   * @param {number} forMs time for which it is shown; 0: until the next change
+   * @param {number} forMs display time; 0 shows it until the next change
    */
   become(phase, outcome = "", forMs = 0) {
     if (this.isOver) return;

@@ -88,7 +88,8 @@ export async function give(cell, output, given) {
   const args = argumentsOf(bound, given);
   const questions = questionsOf(bound.asks ?? [], args);
   if (questions.length === 0) {
-    // Third-party code cannot prove a user's action: the operator confirms before anything moves.
+    // Third-party code cannot prove a user's action, so the operator must confirm before anything
+    // moves.
     if (cell.isForeign && bound.mayMove) await agreed(cell, bound.title || command);
     return cell.doors.run(command, args);
   }
@@ -101,7 +102,8 @@ export async function give(cell, output, given) {
 }
 
 /**
- * Ask whether a third-party widget may run a command that moves the robot; reject on a no.
+ * Ask whether a third-party widget may run a command that moves the robot; reject if the answer is
+ * no.
  *
  * @param {Pick<Cell, "doors" | "el" | "end">} cell
  * @param {string} title title of the command
@@ -124,7 +126,7 @@ function each(cell, input, listener) {
   const bound = cell.inputs.find((one) => one.input === input);
   bound?.signals.forEach((name, place) => {
     const hear = (/** @type {number} */ missed) => {
-      // With the state at its measurement: a late reading still counts.
+      // With the state at the time of measurement, because a late reading still counts.
       const reading = cell.reading(bound, place, store, store.samples.get(name)?.timeMs ?? 0);
       cell.measured(performance.now(), () => listener(reading, missed));
     };

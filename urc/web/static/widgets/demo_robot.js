@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * One widget in one state of its demo: the page plays its robot.
+ * One widget in one state of its demo. The page simulates its robot.
  *
  * Held controls run through the same modules as on the live page; only the socket is a stub.
  *
@@ -28,8 +28,8 @@
  * @property {Record<string, [number, Held][]>} history Signal → older readings, oldest first, each with
  *   its age in seconds.
  * @property {Partial<Topics> & {stop?: StopState}} follow
- * @property {Record<string, string | Record<string, Value>>} replies Command or output → its values, or
- *   the reason of its failure.
+ * @property {Record<string, string | Record<string, Value>>} replies Values or failure reason of
+ *   each command or output.
  */
 import { ConfirmDialog } from "../control/confirm_dialog.js";
 import { Drive } from "../control/drive.js";
@@ -69,7 +69,7 @@ const FREE = {
   spare: "",
 };
 
-/** A stub of the socket; it grants the controls on request. */
+/** A stub of the socket, which grants control on request. */
 class PlayedSocket {
   /** @param {(text: string) => void} tell */
   constructor(tell) {
@@ -214,12 +214,12 @@ export class DemoRobot {
         return { look: JSON.stringify([lease, refusal]), value: { lease, isMine, refusal } };
       };
     }
-    made.theme = () => this.themes.news(); // the page's own colours, in any state
+    made.theme = () => this.themes.news(); // the page's own colours in all states
     return made;
   }
 
   /**
-   * Start the widget; resolves when it is mounted, or shows a card with the reason.
+   * Start the widget; resolves when the widget is mounted or shows a card with the reason.
    *
    * @param {string} system unit system
    */
@@ -237,7 +237,7 @@ export class DemoRobot {
     await this.host.mountAll(this.el.parentNode ?? document);
   }
 
-  /** Play the older readings one after the other, then the present ones. */
+  /** Play the older readings one after the other, then the current readings. */
   play() {
     const past = Object.entries(this.news.history);
     const steps = Math.max(0, ...past.map(([, readings]) => readings.length));
@@ -251,7 +251,7 @@ export class DemoRobot {
     for (const told of this.news.readings) this.say(told);
   }
 
-  /** Keep the readings at their declared age, without a new announcement. */
+  /** Keep the readings at their declared age, without announcing them again. */
   keep() {
     const nowMs = performance.now();
     for (const { signal, age } of this.news.readings) {

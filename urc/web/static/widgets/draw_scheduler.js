@@ -1,26 +1,29 @@
 // @ts-check
 /**
- * The number of widgets that are drawn in one frame. It knows no DOM.
+ * The number of widgets drawn in one frame. The module uses no DOM.
  *
- * If all news fits into a frame, all of it is drawn. On slower devices widgets take turns, so that the
- * frame rate stays: each draws its newest values several times a second.
+ * If one frame is enough, all changed widgets are drawn. On slower devices, widgets take turns to
+ * preserve the frame rate, and each draws its newest values several times a second.
  *
- * On a device that is too slow for half of them, widgets are drawn in every second frame only. The first
- * change of a frame costs the browser as much as several widgets, so more of them are drawn each second
- * this way, and every other frame is free for input.
+ * On a device that is too slow for half of them, widgets are drawn in every second frame only. The
+ * first change in a frame costs the browser as much time as several widgets. More widgets are
+ * therefore drawn per second this way, and every other frame is free for input.
  */
 
-/** The widgets' share of a frame, with styles, layout and painting; the rest is for input. */
+/**
+ * The widgets' share of a frame, including styles, layout and painting; the remaining time is for
+ * input.
+ */
 export const SHARE_MS = 8;
 /** The widgets' share of a frame before a free one. */
 export const SHARE_OF_TWO_MS = 12;
-/** Largest number of drawing frames until each widget has had its turn, on any device. */
+/** Maximum number of drawing frames until each widget has had its turn, on any device. */
 export const LONGEST_TURN = 10;
-/** Number of widgets below which there are no turns: measuring would cost more. */
+/** Number of widgets below which there are no turns, because measuring would take more time. */
 export const FEW = 8;
 const FASTER = 1.1;
 const SLOWER = 0.75;
-/** Load of all widgets in every second frame below which each frame is tried again, in shares. */
+/** Load of all widgets in every second frame below which every frame is tried again, as a share. */
 const NEARLY = 1.25;
 
 export class DrawScheduler {
@@ -33,8 +36,8 @@ export class DrawScheduler {
   }
 
   /**
-   * Begin a frame; return the number of widgets to draw. In a free frame none is drawn, not even urgent
-   * news, which waits for the next frame.
+   * Begin a frame; return the number of widgets to draw. In a free frame, no widget is drawn. Even
+   * urgent changes wait for the next frame.
    *
    * @param {number} count number of widgets
    */
@@ -47,8 +50,9 @@ export class DrawScheduler {
   }
 
   /**
-   * End a frame that was not free; return whether it is worth learning from. Waiting widgets count, too:
-   * with short turns few are drawn in each frame, so a larger budget could never be found.
+   * End a drawing frame; return whether its duration is useful for learning. Waiting widgets count,
+   * too. With short turns, few widgets are drawn in each frame, so a larger budget could otherwise
+   * never be found.
    *
    * @param {number} drawn number of drawn widgets
    * @param {number} waiting number of widgets that wait for their turn

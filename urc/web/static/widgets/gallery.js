@@ -2,10 +2,10 @@
 /**
  * Starts the gallery: each widget in each state of its demo, with a stub of a robot.
  *
- * Every cell has its own store, host and stub, so that states do not influence each other. The commands
- * of a widget are written into a list.
+ * Every cell has its own store, host and stub, so that states do not influence each other. A list
+ * shows each widget's commands.
  *
- * Once all of them are mounted and drawn, the page sets `data-ready` on the element with
+ * Once all widgets are mounted and drawn, the page sets `data-ready` on the element with
  * `data-gallery`.
  */
 import { part } from "../live/badge.js";
@@ -88,7 +88,7 @@ async function watch() {
         return;
       }
     } catch {
-      // The server is restarting: the next try may reach it.
+      // The server may be restarting, so try again later.
     }
     await new Promise((resolve) => setTimeout(resolve, STAMP_EVERY_MS));
   }

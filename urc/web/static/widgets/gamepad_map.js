@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * The mapping of a gamepad's sticks and buttons: the browser's standard, or the operator's mapping of the
- * device. Pure.
+ * The mapping of a gamepad's sticks and buttons: the browser's standard, or the operator's mapping
+ * for the device. Pure.
  *
  * @typedef {"left" | "right"} Side
  *
  * @typedef {object} PadMap
  * @property {number[]} axes Indexes of left across, left along, right across, right along; -1 for none.
- * @property {boolean[]} turned Whether each of those is inverted.
+ * @property {boolean[]} turned Whether each axis is inverted.
  * @property {number[]} left Buttons that enable the left stick while one is held.
  * @property {number[]} right The same for the right stick.
  * @property {number} slower Button for the next lower speed step; -1 for none.
@@ -28,7 +28,7 @@ export const STANDARD = Object.freeze({
 });
 
 /**
- * Return a stored mapping, or null if it is invalid: stored text cannot be trusted.
+ * Return a stored mapping; null if it is invalid, because stored text cannot be trusted.
  *
  * @param {string | null} text
  * @returns {PadMap | null}
@@ -58,7 +58,7 @@ function isPlace(value, least) {
 }
 
 /**
- * Return left across, left along, right across, right along: right and down are positive.
+ * Return left across, left along, right across and right along; right and down are positive.
  *
  * @param {PadMap} map
  * @param {readonly number[]} axes

@@ -25,7 +25,7 @@ export class Host {
     this.pace = new DrawScheduler();
     /** Cells that wait for their turn, oldest first. @type {Set<Cell>} */
     this.waiting = new Set();
-    /** Number of widgets drawn in the frame that is being painted; 0 without one. */
+    /** Number of widgets drawn in the current frame; 0 without a frame. */
     this.drawn = 0;
     this.begunMs = 0;
     // A message posted in a frame arrives after its painting.
@@ -34,7 +34,7 @@ export class Host {
       this.pace.learn(this.drawn, performance.now() - this.begunMs, this.cells.size);
       this.drawn = 0;
     };
-    /** Whether hidden cells are called, too. */
+    /** Whether hidden cells are also called. */
     this.isAllInSight = false;
     this.sight = new IntersectionObserver((entries) => {
       for (const entry of entries) {
@@ -81,7 +81,7 @@ export class Host {
    * @param {HTMLElement} el
    */
   async mountForeign(el) {
-    const { FrameHost } = await import("../frame/frame_host.js"); // most pages need none
+    const { FrameHost } = await import("../frame/frame_host.js"); // most pages do not need it
     if (el.isConnected && !this.cells.has(el)) await this.mount(new FrameHost(el, this.doors));
   }
 
@@ -102,14 +102,14 @@ export class Host {
     }
   }
 
-  /** Whether a widget has a signal as its input. @param {string} name */
+  /** Whether any widget has a signal as its input. @param {string} name */
   shows(name) {
     for (const cell of this.cells.values()) if (cell.shows(name)) return true;
     return false;
   }
 
   /**
-   * Let the widgets draw their news; if one frame is too short for all, in turn.
+   * Make the widgets draw their changes; they take turns if one frame is too short for all.
    *
    * @param {number} nowMs
    */

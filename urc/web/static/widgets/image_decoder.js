@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * Decoder for the images of one input, at the speed of the device: the newest wins, none is queued.
+ * Decoder for the images of one input, at the speed of the device. Only the newest image is
+ * decoded; no image is queued.
  *
  * @typedef {import("../core/types.js").Picture} Picture
  */

@@ -2,8 +2,8 @@
 /**
  * The toolkit for widgets: `import { part, write } from "urc/kit"`.
  *
- * No function reads the layout, and those that write do so on change only, so all of them may be called
- * in `update`. It knows no widget, no socket and no store.
+ * No function reads the layout, and functions write only changes, so all functions may be called in
+ * `update`. The module uses no widget, no socket and no store.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Reading} Reading
@@ -18,15 +18,17 @@ export { digitsIn, figure } from "../core/number_format.js";
 export { inTurn, wordOf } from "../core/formatting.js";
 export { mark, t } from "../core/words.js";
 
-/** "None": an unknown value is never shown as 0. */
+/** Text of an unknown value, which is never shown as 0. */
 export const DASH = "—";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Lifetime of a saved file's URL: browsers with a save dialog read it only after the dialog. */
+/**
+ * Lifetime of a saved file's URL. Browsers with a save dialog read the URL only after the dialog.
+ */
 const KEPT_MS = 10_000;
 
-/** Text of an exceeded limit: a shape and a word, since colour alone is not enough. */
+/** Text of an exceeded limit, with a shape and a word, because colour alone is not enough. */
 export const ALARMS = Object.freeze({
   "": "",
   lolo: mark("▲ Very low"),
@@ -64,7 +66,7 @@ export function drawing(root, selector) {
 }
 
 /**
- * Return the time of day as text, equal in logs and plots: 24 hours, in this device's time zone.
+ * Return the time of day as text for logs and plots, with 24 hours, in this device's time zone.
  *
  * @param {Date} time
  */
@@ -81,7 +83,8 @@ export function clock(time) {
 export function write(el, text) {
   const only = el.childNodes.length === 1 ? el.firstChild : null;
   if (text && only instanceof Text) {
-    // The text node stays: a new one would make the browser match the page's selectors again.
+    // The text node stays, because a new node would make the browser match the page's selectors
+    // again.
     if (only.data !== text) only.data = text;
   } else if (el.textContent !== text) {
     el.textContent = text;
@@ -103,7 +106,11 @@ export function attribute(el, name, value) {
   }
 }
 
-/** Written styles: reading them back from the element costs more. @type {WeakMap<Element, Map<string, string>>} */
+/**
+ * Written styles, because reading them from the element takes more time.
+ *
+ * @type {WeakMap<Element, Map<string, string>>}
+ */
 const styles = new WeakMap();
 
 /**
@@ -125,17 +132,22 @@ export function style(el, name, value) {
 
 /** Time for which a text must be shorter before it is drawn larger. */
 const LARGER_AFTER_MS = 2000;
-/** Room of each element in characters, and the time until which it may be too much. @type {WeakMap<Element, {room: number, untilMs: number}>} */
+/**
+ * Room of each element in characters, and the time until which it may be too large.
+ *
+ * @type {WeakMap<Element, {room: number, untilMs: number}>}
+ */
 const rooms = new WeakMap();
 
 /**
- * Write the room for a text, in characters, to a property of the style. It grows in steps of two at
- * once, and shrinks only after a while, so that changing digits do not change the font size.
+ * Write the room for a text, in characters, to a property of the style. The room grows immediately
+ * in steps of two, and shrinks only after a while, so that changing digits do not change the font
+ * size.
  *
  * @param {Element} el
  * @param {string} name such as "--value-characters"
  * @param {number} characters
- * @param {boolean} [isExact] without steps: the text fills all its room
+ * @param {boolean} [isExact] without steps, so that the text fills its room
  */
 export function fit(el, name, characters, isExact = false) {
   const needed = isExact ? characters : clamp(2 * Math.ceil(characters / 2), 4, 40);
@@ -154,9 +166,9 @@ const toldMs = new WeakMap();
 const TELL_EVERY_MS = 500;
 
 /**
- * Write attributes for screen readers if they have changed: at once, and then at most twice a second,
- * newest first. A screen reader reads no faster, and a meter that moves in each frame need not pay for
- * it.
+ * Write changed attributes for screen readers immediately, and then at most twice a second, with
+ * the newest values. Screen readers read no faster, and frequent writes would take time for meters
+ * that move in each frame.
  *
  * @param {Element} el
  * @param {Readonly<Record<string, string | null>>} attributes
@@ -232,7 +244,7 @@ export function format(value, digits) {
 }
 
 /**
- * Return the number in a reading; null if it has none that can be drawn.
+ * Return the number in a reading; null without a drawable number.
  *
  * @param {Reading | undefined} reading
  * @returns {number | null}
@@ -243,7 +255,7 @@ export function number(reading) {
 }
 
 /**
- * Return the robot's value for a word of a signal; the word itself if there is none.
+ * Return the robot's value for a word of a signal; by default, the word itself.
  *
  * @param {Pick<Signal, "states"> | undefined} signal
  * @param {unknown} word
@@ -254,7 +266,8 @@ export function keyOf(signal, word) {
 }
 
 /**
- * Return the numbers in a reading of an array, with null for unknown ones; null without an array.
+ * Return the numbers in a reading of an array, with null for unknown numbers; null without an
+ * array.
  *
  * @param {Reading | undefined} reading
  * @returns {(number | null)[] | null}
@@ -266,7 +279,7 @@ export function numbers(reading) {
 }
 
 /**
- * Return the readings of an input of many signals, in the order of the binding.
+ * Return the readings of a multiple input, in the order of the binding.
  *
  * @param {Reading | undefined} readings
  * @returns {readonly Reading[]}
@@ -276,7 +289,7 @@ export function many(readings) {
 }
 
 /**
- * Return the note at a value: missing, its age, or the exceeded limit.
+ * Return the note for a value: that it is missing, its age, or the exceeded limit.
  *
  * @param {Pick<Reading, "state" | "age" | "alarm">} reading
  * @param {(text: string, names?: Record<string, string | number>) => string} t `t` of the context
@@ -289,8 +302,8 @@ export function noteOf({ state, age, alarm }, t) {
 }
 
 /**
- * Return the common state of several readings, for `noteOf`: the oldest of the known ones, and the worst
- * alarm. Missing readings are ignored if others are known.
+ * Return the common state of several readings, for `noteOf`: the oldest known reading, and the
+ * worst alarm. Missing readings are ignored if others are known.
  *
  * @param {readonly (Reading | undefined)[]} readings
  * @returns {{state: Reading["state"], age: string, alarm: Alarm}}
@@ -308,8 +321,9 @@ export function worst(readings) {
 const sheets = new WeakMap();
 
 /**
- * Return a cleared drawing context for a canvas, in the size of its box and in the pixels of the screen.
- * Call it for each redraw, and draw at once: the result is shown at the end of the running code.
+ * Return a cleared drawing context for a canvas, with the size of its box in screen pixels. Call
+ * the function for each redraw and draw immediately, because the result is shown at the end of the
+ * running code.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {{width: number, height: number}} size in CSS pixels
@@ -329,7 +343,8 @@ export function board(canvas, { width, height }) {
 
 /**
  * Return the colours of the theme by their tokens, for a canvas: `{ level: "rgb(…)" }` for
- * `--urc-level`. It reads styles: call it when mounting, and for each call of `ctx.follow("theme", …)`.
+ * `--urc-level`. The function reads styles, so call it when mounting, and for each call of
+ * `ctx.follow("theme", …)`.
  *
  * @template {string} T
  * @param {Element} el
@@ -337,7 +352,8 @@ export function board(canvas, { width, height }) {
  * @returns {Record<T, string>}
  */
 export function colours(el, names) {
-  // Only a used colour is resolved: the token may hold `light-dark(…)` or a system colour.
+  // Browsers resolve only used colours, because a token may contain `light-dark(…)` or a system
+  // colour.
   const probe = document.createElement("span");
   probe.hidden = true;
   el.append(probe);

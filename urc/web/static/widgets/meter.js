@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * One value on a scale, with its number below: the common part of all scales.
- * `import { Meter } from "urc/meter"`.
+ * One value on a scale, with its number below, as the common part of all scales. `import { Meter }
+ * from "urc/meter"`.
  *
  * @typedef {import("../core/types.js").Context} Context
  * @typedef {import("../core/types.js").Reading} Reading

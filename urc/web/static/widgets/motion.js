@@ -1,11 +1,12 @@
 // @ts-check
 /**
- * The common part of widgets that drive: `import { Motion, signed } from "urc/motion"`.
+ * The common part of driving widgets: `import { Motion, signed } from "urc/motion"`.
  *
- * A widget reports the push of the hand, and draws the result. This module adds the options of
- * `urc/response_curve`, the speed steps with their buttons, keys and gamepad buttons, and the note with the reason
- * why nothing moves. The template has `.NAME` with `data-phase`, `.NAME-note`, and, for the speed steps,
- * buttons with `data-speed`. A single button for the next step is added for cells of low height.
+ * A widget reports the hand's push and draws the result. This module adds the options of
+ * `urc/response_curve`, the speed steps with their buttons, keys and gamepad buttons, and the note
+ * with the reason why nothing moves. The template has `.NAME` with `data-phase`, `.NAME-note`, and,
+ * for the speed steps, buttons with `data-speed`. A single button for the next step is added for
+ * cells of low height.
  *
  * @typedef {import("./response_curve.js").Push} Push
  * @typedef {import("../core/types.js").Context} Context
@@ -96,7 +97,7 @@ export class Motion {
       sample: (hand, dtS) => this.sample(hand, dtS),
       show: (state) => {
         this.state = state;
-        if (!state.values) this.at = null; // the lever springs back; the robot was told before
+        if (!state.values) this.at = null; // the lever springs back; the robot was notified before
         this.draw();
       },
     });
@@ -162,7 +163,7 @@ function made(name) {
 }
 
 /**
- * Return a share as text: two digits, and a sign for directions.
+ * Return a share as text with two digits, and a sign for directions.
  *
  * @param {unknown} value
  */
@@ -227,8 +228,8 @@ export function directed(axis, value, argument, t) {
 }
 
 /**
- * Keep one axis of a control readable as a slider for screen readers. Its text changes by tenths only,
- * so that a moving hand does not cause constant speech.
+ * Keep one axis of a control readable as a slider for screen readers. Its text changes only in
+ * steps of a tenth, so that a moving hand does not cause constant speech.
  *
  * @param {Element | null} el element with the role of a slider
  * @param {unknown} value
@@ -257,8 +258,8 @@ export function pulled({ x, y, startX, startY }, reach) {
 }
 
 /**
- * Return the part of a push for a control with these axes: another control of the same command may give
- * the other axis.
+ * Return the part of a push for a control with these axes. Another control of the same command may
+ * set the other axis.
  *
  * @param {string} axes "both", "x" or "y"
  * @param {{x: number, y: number}} push
@@ -268,7 +269,7 @@ export function along(axes, { x, y }) {
   return axes === "x" ? { x } : axes === "y" ? { y } : { x, y };
 }
 
-/** Key codes of each direction: by position, so that they are the same on every keyboard layout. */
+/** Key codes of each direction, by position, so that they are the same on every keyboard layout. */
 export const DIRECTIONS = Object.freeze({
   ahead: Object.freeze(["ArrowUp", "KeyW"]),
   back: Object.freeze(["ArrowDown", "KeyS"]),

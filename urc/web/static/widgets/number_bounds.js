@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Numbers of setpoints: their bounds, their steps, and the effect of keys. Pure.
+ * Numbers of setpoints: bounds, steps, and the effect of keys. Pure.
  *
  * @typedef {import("../core/types.js").Argument} Argument
  */
@@ -20,10 +20,10 @@ const ROOM = 100;
 export function boundsOf(argument, options) {
   const [least, most] = [argument?.min ?? -Infinity, argument?.max ?? Infinity];
   const inside = (/** @type {number} */ value) => Math.min(most, Math.max(least, value));
-  // An option may narrow the range of the command, and never widen it.
+  // An option may narrow the command's range, but never widen it.
   const lowest = typeof options.min === "number" ? inside(options.min) : argument?.min;
   const highest = typeof options.max === "number" ? inside(options.max) : argument?.max;
-  // Without bounds the range is 0 to 100; with one bound it is 100 wide.
+  // Without bounds, the range is 0 to 100; with one bound, it is 100 wide.
   const min = lowest ?? ((highest ?? ROOM) > 0 ? 0 : (highest ?? 0) - ROOM);
   const max = highest ?? (min < ROOM ? ROOM : min + ROOM);
   const isWhole = argument?.type === "integer";

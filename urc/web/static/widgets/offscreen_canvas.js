@@ -3,11 +3,11 @@
  * A canvas that changes less often than the page around it: `import { Sheet } from "urc/offscreen_canvas"`.
  *
  * A browser without a graphics processor copies each visible canvas whenever anything on the page
- * changes. It does not copy a finished bitmap. So this class draws offscreen, and shows the result.
+ * changes. It does not copy a finished bitmap, so this class draws offscreen and shows the result.
  */
 
 export class Sheet {
-  /** @param {HTMLCanvasElement} canvas canvas in the page; no other code may have drawn on it */
+  /** @param {HTMLCanvasElement} canvas canvas in the page, on which no other code has drawn */
   constructor(canvas) {
     this.canvas = canvas;
     const surface = typeof OffscreenCanvas === "function" ? new OffscreenCanvas(1, 1) : null;
@@ -35,7 +35,7 @@ export class Sheet {
     }
   }
 
-  /** Show it at the end of the running code, before the next frame is painted. */
+  /** Show the drawing at the end of the running code, before the next frame is painted. */
   showSoon() {
     if (this.isDue) return;
     this.isDue = true;
@@ -48,7 +48,8 @@ export class Sheet {
   /**
    * Show the drawing.
    *
-   * @param {boolean} [isKept] whether the next drawing adds to it; else the canvas is cleared
+   * @param {boolean} [isKept] whether the next drawing adds to this one; otherwise, the canvas is
+   *   cleared
    */
   show(isKept = false) {
     const { screen, surface, pen } = this;

@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * From the values of a widget to the arguments of a command. It knows no widget and no socket.
+ * The conversion of a widget's values to a command's arguments. The module uses no widget and no
+ * socket.
  *
  * @typedef {import("../core/types.js").Given} Given
  * @typedef {import("../core/types.js").Value} Value
@@ -53,8 +54,8 @@ export function describe(output) {
 /**
  * Return the command's arguments.
  *
- * A value goes to the argument in `names`, else to the argument of its own name. Widgets cannot change
- * fixed values.
+ * A value sets the argument in `names`, or else the argument with the same name. Widgets cannot
+ * change fixed values.
  *
  * @template {Given} V
  * @param {Output} output
@@ -63,7 +64,7 @@ export function describe(output) {
  */
 export function argumentsOf({ names, fixed, ranges = {}, isHeld }, given) {
   const renamed = new Set(Object.values(names));
-  // A held control may have more values than the command has arguments; the others are dropped.
+  // A held control may have more values than the command has arguments; extra values are dropped.
   const pairs = Object.entries(given).filter(([name]) => !isHeld && !renamed.has(name));
   for (const [target, name] of Object.entries(names)) {
     const value = Object.hasOwn(given, name) ? given[name] : undefined;

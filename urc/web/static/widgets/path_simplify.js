@@ -5,13 +5,13 @@
  * @typedef {readonly [number, number]} Point x forward, y left (REP 103), in the command's unit
  */
 
-/** Most rounds of simplification: after them the tolerance is larger than any pad. */
+/** Maximum number of simplification rounds, after which the tolerance is larger than any pad. */
 const ROUNDS = 24;
 
 /**
- * Return a line of fewer points with a distance of at most `tolerance` from the given one.
+ * Return a line with fewer points, at most `tolerance` away from the given line.
  *
- * It keeps the first and the last point (Douglas and Peucker, without recursion).
+ * The first and last points stay (Douglas and Peucker, without recursion).
  *
  * @param {readonly Point[]} points
  * @param {number} tolerance
@@ -65,8 +65,8 @@ export function distance([x, y], [fromX, fromY], [toX, toY]) {
 }
 
 /**
- * Return one line from several strokes, with at most `most` points: each stroke is simplified until the
- * number fits.
+ * Return one line from several strokes, with at most `most` points. Each stroke is simplified until
+ * the number is small enough.
  *
  * @param {readonly (readonly Point[])[]} strokes
  * @param {number} tolerance
@@ -98,7 +98,8 @@ export function lengthOf(points) {
 }
 
 /**
- * Return heading and distance of a vector: ahead is 0, left is positive, in radians.
+ * Return heading and distance of a vector. The heading is in radians; ahead is 0 and left is
+ * positive.
  *
  * @param {number} dx
  * @param {number} dy

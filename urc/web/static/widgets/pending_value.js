@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * A requested value, until the robot confirms it or the time is over. A control shows the robot's value
- * in the end.
+ * A requested value, until the robot confirms it or the time limit ends. Afterwards, a control
+ * shows the robot's value.
  *
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").Value} Value
@@ -11,7 +11,7 @@ export class PendingValue {
   /**
    * @param {object} spec
    * @param {number} spec.withinMs time limit of the confirmation
-   * @param {() => void} spec.show called for changes by time
+   * @param {() => void} spec.show called for changes over time
    * @param {AbortSignal} spec.signal
    * @param {(wished: Value, said: unknown) => boolean} [spec.isSame]
    */
@@ -22,9 +22,9 @@ export class PendingValue {
     /** Requested value; null without a request. @type {Value} */
     this.value = null;
     this.isMissed = false;
-    /** Readings up to this one do not confirm the request. */
+    /** Readings up to this number do not confirm the request. */
     this.serial = 0;
-    /** Present reading of the robot. @type {Reading | undefined} */
+    /** The robot's current reading. @type {Reading | undefined} */
     this.said = undefined;
     /** @type {number | undefined} */
     this.timer = undefined;
@@ -37,7 +37,7 @@ export class PendingValue {
 
   /**
    * @param {Value} value
-   * @param {Reading | undefined} reading present reading of the robot
+   * @param {Reading | undefined} reading the robot's current reading
    */
   make(value, reading) {
     this.value = value;
@@ -48,7 +48,9 @@ export class PendingValue {
     this.timer = window.setTimeout(() => this.end(), this.withinMs);
   }
 
-  /** End the wait. A robot that only reports changes is silent about a value that it had already. */
+  /**
+   * End the wait. A robot that reports only changes does not report a value that it already had.
+   */
   end() {
     if (this.value !== null && this.isSaid(this.said)) this.drop();
     else this.isMissed = this.value !== null;
@@ -60,7 +62,7 @@ export class PendingValue {
     return reading !== undefined && reading.value !== null && this.isSame(this.value, reading.value);
   }
 
-  /** Drop a request that was not sent. */
+  /** Drop an unsent request. */
   drop() {
     this.value = null;
     this.isMissed = false;

@@ -1,19 +1,20 @@
 // @ts-check
 /**
- * The share of the page's time that a widget may take. It knows no DOM.
+ * The share of the page's time that a widget may use. The module uses no DOM.
  *
- * A page draws sixty times a second for all its widgets together. A widget that often takes the time of
- * several frames is only called once a second. If even that call takes too long, it is ended. The page
- * cannot interrupt a call that never returns; then the server's lease ends all motion.
+ * A page draws sixty times a second for all its widgets together. A widget that often needs the
+ * time of several frames is called only once a second. If even that call takes too long, the widget
+ * is ended. The page cannot interrupt a call that never returns. In that case, the server's lease
+ * ends all motion.
  */
 
 /** Duration of a call that costs frames of the page. */
 export const LONG_MS = 50;
 const CALLS_SEEN = 60;
-/** Number of long calls among those that makes a widget slow. */
+/** Number of long calls among these at which a widget counts as slow. */
 const LONG_CALLS = 20;
 const SLOW_EVERY_MS = 1000;
-/** Duration of a call of a slow widget that blocks the page. */
+/** Duration above which a slow widget's call blocks the page. */
 const ENDLESS_MS = 500;
 /** Number of blocking calls after which the widget is ended. */
 const ENDLESS_CALLS = 10;
@@ -37,7 +38,7 @@ export class RenderBudget {
     return !this.isSlow || nowMs - this.lastMs >= SLOW_EVERY_MS;
   }
 
-  /** Whether the widget must end: it blocks the page even when called once a second. */
+  /** Whether the widget must end, because it blocks the page even when called once a second. */
   get isSpent() {
     return this.endlessCalls >= ENDLESS_CALLS;
   }
@@ -55,7 +56,7 @@ export class RenderBudget {
     if (isLong) this.longCalls += 1;
     if (this.calls.length > CALLS_SEEN && this.calls.shift()) this.longCalls -= 1;
     if (this.longCalls >= LONG_CALLS) this.isSlow = true;
-    // A minute without a long call: the cause is gone.
+    // After a minute without a long call, the cause has ended.
     if (this.isSlow && this.calls.length >= CALLS_SEEN && this.longCalls === 0) this.isSlow = false;
     if (this.isSlow && tookMs > ENDLESS_MS) this.endlessCalls += 1;
   }

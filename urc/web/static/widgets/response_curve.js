@@ -2,9 +2,9 @@
 /**
  * Response curves of held controls: `import { Pipeline } from "urc/response_curve"`. Pure maths.
  *
- * One pipeline for all inputs, in this order: gate, dead zone, expo, invert, scale and speed step, slew
- * rate. A push is a set of shares by name, each from -1 to 1. `x` and `y` form a vector: x is forward, y
- * is left (REP 103); any other name is independent.
+ * All inputs share one pipeline, in this order: gate, dead zone, expo, invert, scale and speed
+ * step, slew rate. A push is a set of shares by name, each from -1 to 1. `x` and `y` form a vector:
+ * x is forward, y is left (REP 103); any other name is independent.
  *
  * @typedef {"circle" | "square" | "cross"} DeadMan
  * @typedef {Record<string, number>} Push
@@ -18,14 +18,14 @@
  * @property {ReadonlySet<string>} inverted Names with inverted sign.
  *
  * @typedef {object} Moment
- * @property {number} dtS Seconds since the last sample; 0 starts from zero.
+ * @property {number} dtS Time since the last sample, in seconds; 0 starts from zero.
  * @property {number} [speed] The speed step, 0 to 1.
  * @property {boolean} [isFine] Whether the push is continuous, so that dead zone and expo apply; a key is
  *   either down or not.
  */
 
 /**
- * Return 0 within the dead zone; the rest of the travel covers the whole range.
+ * Return 0 within the dead zone; the remaining travel covers the whole range.
  *
  * @param {number} share
  * @param {number} zone 0 to below 1
@@ -47,8 +47,8 @@ export function expo(share, amount) {
 }
 
 /**
- * Return the next share on the way to the target. Deceleration is never limited, and a reversal begins
- * at zero.
+ * Return the next share towards the target. Deceleration is never limited, and a reversal begins at
+ * zero.
  *
  * @param {number} before
  * @param {number} target
@@ -81,7 +81,7 @@ export function gate(x, y, shape) {
 }
 
 /**
- * Apply dead zone and expo within the gate: to the length in a circle, else to each axis.
+ * Apply dead zone and expo within the gate, to the length in a circle and otherwise to each axis.
  *
  * @param {number} x
  * @param {number} y
@@ -96,7 +96,7 @@ export function curved(x, y, { gate: shape, deadZone: zone, expo: amount }) {
   return [x * gain, y * gain];
 }
 
-/** The pipeline with its last sample, which only the slew rate needs. */
+/** The pipeline with its last sample, which is needed only for the slew rate. */
 export class Pipeline {
   /** @param {Settings} settings */
   constructor(settings) {
@@ -181,7 +181,7 @@ export function speedsOf(options) {
 /**
  * Return the tilt of a device from its rest position, as a push.
  *
- * @param {{beta: number, gamma: number}} now degrees, as the browser gives them
+ * @param {{beta: number, gamma: number}} now angles from the browser, in degrees
  * @param {{beta: number, gamma: number}} rest
  * @param {number} angle angle of the screen, degrees
  * @param {number} range degrees at full deflection
@@ -213,7 +213,7 @@ export function arrow(x, y, isDiagonal, rest) {
 }
 
 /**
- * Return the position of a lever: a detent within reach, or the share itself.
+ * Return a lever's position: a detent within reach, or the share itself.
  *
  * @param {number} share
  * @param {readonly number[]} detents

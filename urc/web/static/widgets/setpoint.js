@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * A setpoint that the operator sets: its commands, its displayed value, and the robot's confirmation. It
- * draws nothing; slider, knob and number field are three views of it.
+ * A setpoint that the operator sets: its commands, its displayed value, and the robot's
+ * confirmation. The module draws nothing; slider, knob and number field are its three views.
  *
  * @typedef {import("../core/types.js").Value} Value
  * @typedef {import("../core/types.js").Context} Context
@@ -25,7 +25,7 @@ export class Setpoint {
     this.isLive = options["send"] !== "release";
     this.isOptimistic = options["echo"] === "optimistic";
     this.bounds = boundsOf(Object.values(ctx.command("change")?.arguments ?? {})[0], options);
-    /** Value of the gesture; null without one. @type {number | null} */
+    /** Value of the gesture; null without a gesture. @type {number | null} */
     this.hand = null;
     /** Cancels the gesture. Set by the view. */
     this.drop = () => this.cancel();
@@ -43,16 +43,16 @@ export class Setpoint {
       isSame: (wished, said) => Math.abs(Number(wished) - Number(said)) <= this.bounds.step / 2,
     });
     onStop(({ phase }) => {
-      if (phase !== "" && this.hand !== null) this.drop(); // the rest of this gesture sets nothing
+      if (phase !== "" && this.hand !== null) this.drop(); // the remaining gesture sets nothing
     });
   }
 
-  /** Value that the robot reports, or null. */
+  /** Value reported by the robot, or null. */
   get said() {
     return number(this.state);
   }
 
-  /** Displayed value: of the gesture, else of the robot, else the last sent one. */
+  /** Displayed value: the gesture's, or else the robot's, or else the last sent value. */
   get shown() {
     if (this.hand !== null) return this.hand;
     if (this.isOptimistic && this.wish.isWaiting) return Number(this.wish.value);

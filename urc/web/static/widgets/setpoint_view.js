@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The common view of a setpoint for knob, slider and number field, with the gestures on a dial or a
+ * The common view of a setpoint for knob, slider and number field, with gestures on a dial or
  * track.
  *
  * @typedef {import("./setpoint.js").Setpoint} Setpoint
@@ -24,7 +24,7 @@ export class SetpointView {
 
   /**
    * @param {Setpoint} setpoint
-   * @param {string} [fault] mistake in the typed text
+   * @param {string} [fault] error in the typed text
    */
   show(setpoint, fault = "") {
     const { root, text, note, locked } = this;
@@ -51,8 +51,8 @@ export class SetpointView {
   }
 
   /**
-   * Let gestures set it: on an element with the role slider, and by the buttons `.NAME-less` and
-   * `.NAME-more`.
+   * Allow gestures to set the value, on an element with the role slider and on the buttons
+   * `.NAME-less` and `.NAME-more`.
    *
    * @param {HTMLElement} control
    * @param {Setpoint} setpoint

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Style sheets of third-party modules, found by the module's name in the import map, loaded once.
+ * Style sheets of third-party modules, found by module name in the import map and loaded once.
  */
 
 /** @type {Map<string, Promise<void>>} */
@@ -25,7 +25,7 @@ export function loadStyle(module) {
 async function load(module) {
   const url = import.meta.resolve(`${module}/style.css`); // throws if the map has none
   const el = document.createElement("style");
-  // A linked sheet would be above every layer, and so above the widgets' styles.
+  // A linked sheet would be above every layer, and therefore above the widgets' styles.
   const script = document.querySelector("script[nonce]");
   el.nonce = script instanceof HTMLScriptElement ? script.nonce : "";
   el.textContent = `@import url(${JSON.stringify(url)}) layer(widgets.vendor);`;

@@ -27,7 +27,7 @@ export function memoryOf(slot) {
       try {
         sessionStorage.setItem(key, text);
       } catch {
-        // Without storage the value lasts until the page closes.
+        // Without storage, the value lasts until the page closes.
       }
     },
   };
