@@ -99,8 +99,11 @@ SLOW = (
             *("-n", "3", "--dist", "loadgroup"),
         ),
     ),
-    # These tests measure the time until a robot stops.
-    Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),
+    # These tests measure the time until a robot stops, and mostly wait: two at a time.
+    Step(
+        "tests motion",
+        (*PYTEST, "tests/e2e", "-m", "alone", "-n", "2", "--dist", "loadgroup"),
+    ),
 )
 
 

@@ -174,7 +174,9 @@ def test_what_a_widget_is_for_is_told_in_the_readers_language(client: TestClient
     listed = client.get("/widgets", headers=german).text
     assert "Zeigt, wo der Roboter ist" in listed
     assert "Shows the robot on a map" not in listed
-    assert 'class="urc-card-summary" lang="en">Shows the robot on a map' in client.get("/widgets").text
+    assert (
+        'class="urc-card-summary" lang="en">Shows the robot on a map' in client.get("/widgets").text
+    )
 
 
 @pytest.mark.parametrize(
