@@ -132,7 +132,7 @@ def _reasons(hub: "Hub") -> str:
 
 
 class _Printer:
-    """A printer of events: JSON lines on standard output, and log lines on standard error."""
+    """Prints events: JSON lines on standard output, and log lines on standard error."""
 
     def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
         self.received = 0
