@@ -96,7 +96,7 @@ SLOW = (
         "tests e2e",
         (
             *(*PYTEST, "tests/e2e", "-m", "not alone"),
-            *("-n", "3", "--dist", "loadgroup"),
+            *("-n", "4", "--dist", "loadgroup"),
         ),
     ),
     # These tests measure the time until a robot stops, and mostly wait: two at a time.

@@ -26,7 +26,7 @@ class Share(NamedTuple):
 
 SHARES: Mapping[str, Share] = {
     "/tests/contract/": Share(cases=20),
-    "/tests/e2e/": Share(cases=2, functions=0.5),
+    "/tests/e2e/": Share(cases=2, functions=0.4),
 }
 WHOLE = "/tests/e2e/motion/"
 """The tests of stopping: all of them, each time."""
@@ -37,7 +37,7 @@ def left_out(items: Iterable[pytest.Item]) -> set[pytest.Item]:
     files: dict[str, dict[str, list[pytest.Item]]] = {}
     for item in items:
         place = item.path.as_posix()
-        if WHOLE not in place and not item.get_closest_marker("alone"):
+        if WHOLE not in place:
             name = item.nodeid.partition("[")[0]
             files.setdefault(place, {}).setdefault(name, []).append(item)
     every = {item for functions in files.values() for cases in functions.values() for item in cases}

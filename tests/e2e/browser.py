@@ -77,6 +77,10 @@ async def running_browser(*flags: str, is_whole: bool = False) -> AsyncIterator[
             await browser.close()
 
 
+WITHOUT_SERVER = ("ERR_CONNECTION_REFUSED", "WebSocket handshake: net::ERR_CONNECTION_RESET")
+"""A test that ends stops its server before its page, which then connects again, or still does."""
+
+
 class PageFaults:
     """What went wrong in a page that nobody would see: console errors, exceptions, CSP reports."""
 
@@ -108,8 +112,7 @@ class PageFaults:
     def _console(self, message: ConsoleMessage) -> None:
         if message.type == "error":
             address = message.location.get("url", "")
-            # A test that ends stops its server before its page, which then tries to come back.
-            if "ERR_CONNECTION_REFUSED" not in message.text:
+            if not any(text in message.text for text in WITHOUT_SERVER):
                 self.found.append(f"console: {message.text} ({address})")
 
     def _page_error(self, error: Error) -> None:

@@ -180,7 +180,7 @@ def test_stop_and_reset(pair: Pair) -> None:
     _, robot = pair
     assert robot.stop() is True
     assert robot.latched_by
-    with pytest.raises(MotionEnded, match="stopped by"), robot.drive():
+    with pytest.raises(MotionEnded, match="Stopped by"), robot.drive():
         pytest.fail("it opened")
     robot.reset()
     assert robot.latched_by == ""
