@@ -234,7 +234,7 @@ async def test_two_sticks_share_the_controls(opening: Opening, tmp_path: Path) -
 async def test_stop_ends_the_motion_and_latches(pair: Pair) -> None:
     """Whoever holds the stick; nothing moves before a reset."""
     cart, robot = pair
-    with pytest.raises(MotionEnded, match="Stopped by"):  # noqa: PT012 - the end of the context raises
+    with pytest.raises(MotionEnded, match="stopped by"):  # noqa: PT012 - the end of the context raises
         async with robot.drive() as stick:
             stick(speed=0.5)
             await until(lambda: cart.is_moving)
