@@ -23,10 +23,13 @@ from typing import IO
 from hatch_build import NPM_TIMEOUT_S, VendorError, npm_command
 from scripts.needs import NEEDS, Brought, bring
 from scripts.node import node_executable
+from scripts.site import HTML
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = sys.executable
 NODE_MODULES = ROOT / "node_modules"
+BUILT_SITE = "URC_BUILT_SITE"
+"""Environment variable with the folder of the built site; without it, the tests build the site."""
 HANGS_AFTER_S = 3600
 """Timeout of a step, in seconds. A busy machine needs several times as long as an idle machine."""
 
@@ -55,7 +58,7 @@ STATIC = (
     Step("prose", (PYTHON, "-m", "scripts.prose")),
     Step("format", (PYTHON, "-m", "ruff", "format", "--check", ".")),
     Step("types", (PYTHON, "-m", "mypy")),
-    # The tests of the site build it, once.
+    # The step `site` checks all other links.
     Step("docs", (PYTHON, "-m", "scripts.docs", "--links")),
 )
 PYTEST = (PYTHON, "-m", "pytest")
@@ -90,13 +93,15 @@ QUICK = (
 )
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
 SLOW = (
+    # Built with all processors, for the tests of the site.
+    Step("site", (PYTHON, "-m", "scripts.site")),
     # Most of these tests wait for a server or for silence, so a few in parallel need no more
     # processor time.
     Step(
         "tests e2e",
         (
             *(*PYTEST, "tests/e2e", "-m", "not alone"),
-            *("-n", "4", "--dist", "loadgroup"),
+            *("-n", "3", "--dist", "loadgroup"),
         ),
     ),
     # These tests measure the time until a robot stops, and mostly wait: two at a time.
@@ -121,6 +126,7 @@ def main() -> int:
     environment = os.environ | brought.environment
     # Hundreds of tests start Python; without cached bytecode, each start compiles all of URC.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    environment[BUILT_SITE] = str(HTML)
     quick = (*STATIC, *([javascript] if javascript else []), *QUICK)
     try:
         outcomes += run(quick, environment)

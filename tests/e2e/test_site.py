@@ -1,5 +1,6 @@
 """The documentation site: it builds, is found through, reads without JavaScript, loads nothing."""
 
+import os
 import posixpath
 import re
 import subprocess
@@ -14,6 +15,7 @@ from threading import Thread
 import pytest
 from playwright.async_api import Browser, Page, Request
 
+from scripts.check import BUILT_SITE
 from tests.documentation import ROOT
 from tests.e2e.axe import faults, prepare
 
@@ -81,7 +83,9 @@ class Loads(HTMLParser):
 
 @pytest.fixture(scope="module")
 def html(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built once from nothing; a warning fails the build."""
+    """The site, built once from nothing; a warning fails the build, here or in `./dev test`."""
+    if built := os.environ.get(BUILT_SITE):
+        return Path(built)
     folder = tmp_path_factory.mktemp("site") / "html"
     command = [sys.executable, "-m", "scripts.site", str(folder)]
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
