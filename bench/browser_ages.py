@@ -10,7 +10,7 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""A valid measurement shows at least this share of the robot's values."""
+"""Smallest share of the robot's values that a valid measurement shows."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
 # The text in a frame's layout counts, because a page that writes outside of frames may change it

@@ -1,4 +1,4 @@
-"""Frame rate of every shipped robot's page in a WebKit without a graphics processor.
+"""Frame rate of every shipped robot's page in WebKit without a graphics processor.
 
 Without a graphics processor, Mesa composes the page in software, so layers and large repaints lower
 the frame rate. An empty page is measured before each page: its rate shows how busy the machine is.

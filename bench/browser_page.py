@@ -1,4 +1,4 @@
-"""Measurements of a page in a real Chromium: ages of values, frames, processor time.
+"""Measurements of a page in a real Chromium: value ages, frames and processor time.
 
 All ages are measured with the machine's monotonic clock. Robots send this clock's time
 (``peers/robot.py``), and the browser reports the page's start time on the same clock.
@@ -76,8 +76,8 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
     """Run a real ``urc serve`` for a robot; yield the address of its page.
 
     Args:
-        robot_port: port of the robot.
-        document: text of the profile without its name and transport.
+        robot_port: the robot's port.
+        document: the profile's text, without its name and transport.
         work: working folder of the server.
     """
     file = work / "bench.yaml"
@@ -115,7 +115,7 @@ async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
     Other programs have little effect on the measured processor time.
 
     Args:
-        one: page that already shows values.
+        one: a page that already shows values.
         seconds: duration of the measurement.
         slowed: factor by which the browser slows the page's processor.
     """
@@ -145,7 +145,7 @@ async def _metrics(line: CDPSession) -> dict[str, float]:
 
 
 def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = None) -> Result:
-    """Return the ratio of the time between frames to the longest allowed time."""
+    """Return the time between frames divided by the longest allowed time."""
     periods = sorted(1000 / cost.fps for cost in costs)
     most = 1000 / LEAST_FPS
     middle = periods[len(periods) // 2]

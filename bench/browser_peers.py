@@ -101,7 +101,7 @@ async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -
 
 
 async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
-    """Return the ages of one measurement; repeat the measurement if too few values were shown."""
+    """Return the ages from one measurement; repeat the measurement if too few values were shown."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
             await ages(one, SETTLE_S, 0.0)  # it shows values, so its start is over

@@ -1,4 +1,4 @@
-"""Processor time of a browser: URC's page compared with a roslibjs page for the same topics.
+"""A browser's processor time: URC's page compared with a roslibjs page for the same topics.
 
 Both pages show a map with a trail, an attitude, a stick, a camera and a value, in areas of equal
 size. Both pages get data from the same rosbridge server: URC's page through a real ``urc serve``,

@@ -1,4 +1,4 @@
-"""Processor time of a browser: the gallery's TurtleBot page compared with two plain pages.
+"""A browser's processor time: the gallery's TurtleBot page compared with two plain pages.
 
 The emulated robot sends its camera, map, laser and battery over rosbridge. One plain page shows
 only the same images, at the same size. The other plain page is hand-written with roslib and has the

@@ -54,7 +54,7 @@ READY = """
 
 
 def document() -> str:
-    """Return the robot's profile: its signals, one message, and sixty widgets."""
+    """Return the robot's profile, with its signals, one message and sixty widgets."""
     names = [f"s{each}" for each in range(CHANNELS)]
     signals: dict[str, dict[str, object]] = {
         name: {"type": "integer" if is_whole(each) else "number", "min": 0, "max": 100}

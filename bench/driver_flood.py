@@ -1,7 +1,7 @@
-"""Processor time of a flood of lines over a real socket, compared with a hand-written driver.
+"""Processor time for a flood of lines over a real socket, compared with a hand-written driver.
 
-The benchmark measures the CPU time of this process, from the request until the newest value of each
-signal is stored.
+The benchmark measures the CPU time of this process, from the request until each signal's newest
+value is stored.
 """
 
 import asyncio

@@ -10,7 +10,7 @@ The code is tidy and, like URC, has the features that every driver of a real rob
 - Every buffer has a limit: unterminated lines, pending requests, and output.
 - If the connection is lost, all pending requests fail immediately.
 
-The driver lacks other features of URC, such as link states, reconnecting, alarms and priorities.
+The driver lacks URC's other features, such as link states, reconnecting, alarms and priorities.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ MOST_UNSENT = 262_144
 
 
 def read(line: bytes, now: float) -> list[Sample] | None:
-    """Return the samples of a line, or None for an invalid line."""
+    """Return the samples in a line, or None for an invalid line."""
     parts = line.split(b" ")
     kind = parts[0]
     if b"_" in line:
@@ -73,7 +73,7 @@ def read(line: bytes, now: float) -> list[Sample] | None:
 
 
 class _Robot:
-    """The robot's values and the pending requests of a driver."""
+    """The robot's values and a driver's pending requests."""
 
     def __init__(self) -> None:
         self.latest: dict[str, Sample] = {}
@@ -83,7 +83,7 @@ class _Robot:
         self.done = asyncio.Event()
 
     def take(self, line: bytes, now: float) -> None:
-        """Store the readings of a line, and complete the request that waits for this line."""
+        """Store the readings in a line, and complete the request that is waiting for this line."""
         samples = read(line, now)
         if samples is None:
             self.faults += 1
@@ -123,7 +123,7 @@ class _Robot:
 
 
 def request(vx: float, wz: float) -> bytes:
-    """Return the frame of a clamped speed; raise `ValueError` for an invalid number."""
+    """Return the frame for a clamped speed; raise `ValueError` for an invalid number."""
     if not isfinite(vx + wz):
         raise ValueError("a speed must be a finite number")
     vx = max(-1.0, min(1.0, vx))
@@ -132,7 +132,7 @@ def request(vx: float, wz: float) -> bytes:
 
 
 class StreamDriver:
-    """A driver on `StreamReader` and `StreamWriter` with a reader task, the most common design."""
+    """A driver with `StreamReader`, `StreamWriter` and a reader task: the most common design."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._robot = _Robot()

@@ -1,4 +1,4 @@
-"""Processor time of a request and its reply over a socket, compared with a hand-written driver.
+"""Processor time for a request and its reply over a socket, compared with a hand-written driver.
 
 The benchmark measures the CPU time of this process; all drivers use the same robot in another
 process. Each round opens a new connection, and sends `TIMES` requests after a warm-up.

@@ -1,4 +1,4 @@
-"""Processor time of a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
+"""Processor time for a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
 back. URC uses the same kind of declaration as an ordinary profile. The hand-written code is typical

@@ -13,7 +13,7 @@ HEAD_BYTES = 4
 
 
 def accepted(server: socket.socket) -> socket.socket:
-    """Accept a client and answer its handshake, so that the next client connects."""
+    """Accept a client and answer its handshake, so that the next client can connect."""
     page, _ = server.accept()
     page.recv(4096)
     page.sendall(b"HTTP/1.1 101 Switching Protocols\r\n\r\n")

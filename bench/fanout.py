@@ -1,4 +1,4 @@
-"""Processor time of sending 200 values to 50 pages: URC compared with a plain loop of sends.
+"""Processor time for sending 200 values to 50 pages: URC compared with a plain loop of sends.
 
 The benchmark measures the processor time of the server, including readings and encoding. The pages
 and the robot run in other processes. The loop sends the same number of bytes to the same number of
@@ -48,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 async def _urc(clients: int, ticks: int) -> tuple[float, int]:
-    """Return URC's processor time, and the number of bytes per page and tick."""
+    """Return URC's processor time and the number of bytes per page and tick."""
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
     app = build_app(

@@ -1,6 +1,6 @@
-"""Effect of slow pages on other pages: two of twenty pages read nothing.
+"""How slow pages affect other pages: two of twenty pages read nothing.
 
-Another page reads only a quarter of its data. The baseline is a server with an unbounded queue for
+A third page reads only a quarter of its data. The baseline is a server with an unbounded queue for
 each page. In the baseline, the slow page's data ages as its queue grows.
 """
 
@@ -45,9 +45,9 @@ class Look(NamedTuple):
 
     ticks: int
     healthy: int
-    """Smallest number of frames that a healthy page received."""
+    """Smallest number of frames that any healthy page received."""
     age_ms: float
-    """Age of the data at the slow page in the last quarter of the run, in milliseconds."""
+    """Age of the slow page's data in the last quarter of the run, in milliseconds."""
     growth_mb: float
     """Growth of the server's memory since its start, in MB."""
 
@@ -60,7 +60,7 @@ class Naive:
         self.app: ASGIApp = Starlette(routes=[WebSocketRoute("/ws", self.page)])
 
     async def page(self, line: WebSocket) -> None:
-        """Send the queue of one page."""
+        """Send one page's queue."""
         queue: asyncio.Queue[str] = asyncio.Queue()
         await line.accept()
         self.queues.add(queue)
@@ -92,7 +92,7 @@ class Naive:
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the age of the data at the slow page with the age in the baseline."""
+    """Compare the age of the slow page's data with the age in the baseline."""
     seconds = LOOK_IF_FULL_S if full else LOOK_S
     ours = asyncio.run(_urc(seconds))
     naive = Naive()

@@ -17,7 +17,7 @@ BARS = 40
 """Longest bar of a histogram, in characters."""
 
 _UNITS = {"ms": "ms", "us": "us", "mb": "MB", "hz": "Hz"}
-"""Unit in the title of a column, for each suffix of the column's name."""
+"""Unit in a column's title, by the suffix of the column's name."""
 
 told: list[dict[str, object]] = []
 """Results of this run."""

@@ -1,4 +1,4 @@
-"""Measurement of ratios: baseline and subject alternate; the result is the median ratio.
+"""Measurement of ratios: baseline and subject alternate, and the result is the median ratio.
 
 Times vary with the machine's load, but the ratio of two times in one run is stable.
 """
@@ -18,7 +18,7 @@ PROCESS_TIMEOUT_S = 60
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """The goal of a benchmark: a name and an upper bound of the ratio."""
+    """A benchmark's goal: a name and an upper bound for the ratio."""
 
     name: str
     """Name of the measured ratio: subject / baseline."""
@@ -36,7 +36,7 @@ class Result:
     baseline_ms: float
     subject_ms: float
     spread: float
-    """Slowest round of the baseline divided by the median; a value above 2 means a busy machine."""
+    """The baseline's slowest round divided by its median; a value above 2 means a busy machine."""
     rounds: int
     versions: Mapping[str, str] = field(default_factory=dict)
 
@@ -47,7 +47,7 @@ class Result:
 
 
 def process_seconds(command: Sequence[str]) -> float:
-    """Run a command to its end and return its wall time in seconds.
+    """Run a command to completion and return its wall time in seconds.
 
     Raises:
         SystemExit: the command failed, or took longer than `PROCESS_TIMEOUT_S`.

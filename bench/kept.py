@@ -1,4 +1,4 @@
-"""Stored rows of a long run, so that an interrupted run can continue.
+"""Rows of a long run, stored so that an interrupted run can continue.
 
 Each benchmark stores rows in one file in the user's cache. A complete run deletes this file. Rows
 from other versions of the code are ignored.
@@ -40,7 +40,7 @@ class Kept:
 
 
 def _code() -> str:
-    """Return an identifier of the measured code version."""
+    """Return an identifier for the measured code version."""
     total = hashlib.sha256()
     for file in sorted((_ROOT / "urc").rglob("*.py")):
         total.update(file.read_bytes())

@@ -1,8 +1,8 @@
-"""Processor time of the server and its guards for each driven robot.
+"""Processor time that the server and its guards use for each driven robot.
 
-Rounds with idle and with driven robots alternate; the difference is the processor time of driving.
-Pages are open in all rounds. A page repeats the values of a finger at rest 20 times a second. A
-moving finger changes the values in every frame.
+Rounds with idle and with driven robots alternate; the difference is the processor time that driving
+uses. Pages are open in all rounds. While a finger rests, the page repeats its values 20 times a
+second. While a finger moves, the values change in every frame.
 """
 
 import statistics
@@ -23,10 +23,10 @@ from bench.rig.programs import Robots, Server
 __all__ = ["run"]
 
 GOAL = 0.02
-"""The goal: at most this share of a processor per driven robot."""
+"""Largest allowed share of a processor per driven robot."""
 ROBOTS = 6
 FINGERS = {"at rest": 20, "moving": 60}
-"""Ticks a second for each state of the finger, as in ``static/control/input.js``."""
+"""Ticks per second for each state of the finger, as in ``static/control/input.js``."""
 LOOK_S, LOOK_IF_FULL_S = 4.0, 10.0
 ROUNDS, ROUNDS_IF_FULL = 3, 9
 SETTLE_S = 0.5

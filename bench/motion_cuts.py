@@ -1,9 +1,9 @@
-"""Motion after a cut of the link to a driven robot, on every kind of transport.
+"""Motion after the link to a driven robot is cut, on every kind of transport.
 
 Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
-guards, and robots, brokers and login servers. The link of each robot is cut at different moments.
-The lengths of the cuts are evenly distributed on a logarithmic scale. Every second control is
-released during the cut. Without root and /dev/net/tun, the benchmark is skipped with a message.
+guards, and robots, brokers and login servers. Each robot's link is cut at different moments. The
+cut lengths are evenly distributed on a logarithmic scale. Every second control is released during
+the cut. Without root and /dev/net/tun, the benchmark is skipped with a message.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Time until driven robots stop after the server hangs or dies.
 
 A signal freezes or kills the server, or a backtracking pattern blocks the server. The guards check
-the leases, so the limit is the same as for the loss of an operator.
+the leases, so the limit is the same as for a lost operator.
 """
 
 import tempfile

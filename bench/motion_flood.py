@@ -1,10 +1,10 @@
-"""Effect of a page that sends a thousand ticks a second on a page that drives another robot.
+"""How a page that sends a thousand ticks a second affects a page that drives another robot.
 
 In short windows, the benchmark measures the latency from the driving page's socket to its robot.
 The windows alternate between a normal page, a page that floods another server, and a page that
 floods the same server. Any flood uses processor time of the machine, in the flooding page and in
-its server. The goal therefore compares the two floods. The result with the normal page is only
-printed.
+its server. The goal therefore compares the two floods. The result with the normal page is printed,
+but has no goal.
 """
 
 import statistics

@@ -1,4 +1,4 @@
-"""Data received after the program of a driven robot was frozen for 5 s.
+"""Data received after a driven robot's program was frozen for 5 s.
 
 Signals freeze and resume a substitute for rosbridge, while its kernel continues to accept data.
 Several robots are driven in parallel, each with its own program, session and guard. An interrupted

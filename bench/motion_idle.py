@@ -23,7 +23,7 @@ __all__ = ["run"]
 
 LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
 SETTLED_S = STOP_FOR_S + 0.5
-"""Time after the first stop in which all repetitions arrive, even over a broker, in seconds."""
+"""Time after the first stop within which all repetitions arrive, even over a broker, in seconds."""
 SPARE_S = 120.0
 
 

@@ -1,9 +1,9 @@
 """Time from a release until the robot receives the stop, for each of the twelve ways to release.
 
 A real Chromium drives through a real ``urc serve`` with its guard. The robot timestamps received
-data. Each time runs from the page's event until the stop's first byte arrives at the robot, on the
-machine's monotonic clock. The lease is one second, so a stop after its expiry would be obvious. A
-late trial is repeated if the machine caused the delay.
+data. Each time is measured on the machine's monotonic clock, from the page's event until the stop's
+first byte arrives at the robot. The lease is one second, so a stop after its expiry would be
+obvious. A late trial is repeated if the machine caused the delay.
 """
 
 import asyncio
@@ -87,7 +87,7 @@ class Trial(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the trial is invalid because of the machine's delay."""
+        """Whether the machine's delay makes the trial invalid."""
         return 0 < self.stop_ms - MOST_MS <= self.late_ms
 
 
@@ -97,7 +97,7 @@ class Scene(NamedTuple):
     one: Opened
     robots: Robots
     witness: Robots
-    """Measures its own late wake-ups, and the processor waits of the server, guard and browser."""
+    """Measures its own late wake-ups, and the processor waits of server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

@@ -1,8 +1,8 @@
 """Unwanted stops of a robot on a link that loses packets.
 
 Pages drive over a relay with a round-trip time of 100 ms and random loss in both directions. After
-each stop, a page starts a new gesture. For comparison, one run has a single connection; the other
-run has URC's second connection for lossy links. The benchmark needs root and /dev/net/tun;
+each stop, a page starts a new gesture. For comparison, one run uses a single connection, and the
+other also uses URC's second connection for lossy links. The benchmark needs root and /dev/net/tun;
 otherwise, the benchmark is skipped with a message.
 """
 
@@ -29,7 +29,7 @@ LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Largest allowed number of stops per minute, by packet loss in percent.
 
-With None, there is no limit.
+None means that there is no limit.
 """
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
 """Duration of the run with all robots in parallel, in seconds, by packet loss in percent."""

@@ -30,7 +30,7 @@ TICK_NS = 20_000_000
 """Tick interval in nanoseconds: shorter than a page's, longer than the profile's limit."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
-"""Smallest share of ticks that must arrive, because a busy machine drops some ticks."""
+"""Smallest share of ticks that must arrive; a busy machine drops some ticks."""
 PROFILE = """\
 urc: 1
 kind: robot

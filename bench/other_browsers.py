@@ -1,4 +1,4 @@
-"""Checks in browsers other than Chromium: every shipped robot's page, and driving a rover.
+"""Checks in browsers other than Chromium: opening every shipped robot's page, and driving a rover.
 
 Each page must be live, show all widgets, fit the narrowest screen, and apply each theme, without
 console errors. Each release must stop the rover before its lease ends.
@@ -24,10 +24,10 @@ RELEASES, RELEASES_IF_FULL = 3, 20
 STOPS, STOPS_IF_FULL = 1, 5
 RESTARTS, RESTARTS_IF_FULL = 1, 3
 HARMLESS = ("WebGL context", "ResizeObserver loop completed")
-"""Parts of harmless console messages.
+"""Text that occurs in harmless console messages.
 
 Without a graphics processor, Firefox has no WebGL. The widgets then draw in 2D or show a message.
-WebKit reports each size change that a widget receives only in the next frame.
+WebKit logs a message whenever a widget receives a size change only in the next frame.
 """
 
 

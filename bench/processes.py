@@ -26,13 +26,13 @@ def spent_s(before: Mapping[int, float], after: Mapping[int, float]) -> float:
 
 
 def resident_mb(process: int) -> float:
-    """Return the resident memory of a process."""
+    """Return a process's resident memory."""
     pages = _read(process, "statm").split()[1:2]
     return sum(map(int, pages)) * _PAGE_BYTES / 1e6
 
 
 def own_mb(process: int) -> float:
-    """Return the memory of a process, including its proportional share of shared memory (PSS)."""
+    """Return a process's memory, including its proportional share of shared memory (PSS)."""
     words = re.search(r"(?m)^Pss: +(\d+) kB", _read(process, "smaps_rollup"))
     return int(words[1]) * 1024 / 1e6 if words else 0.0
 

@@ -1,10 +1,10 @@
-"""Processor time and memory of one server with many robots and one page for each robot.
+"""Processor time and memory of one server that has many robots and one page for each robot.
 
 Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
 receives each change. Robots and pages run in two other processes, which only send or count bytes.
-Additional rows show how the costs grow with the number of robots, signals and pages, and the share
-of lines that reach no page. Drivable robots have guards in separate processes, which are measured
-separately.
+Additional rows show how the costs grow with the number of robots, signals and pages. They also show
+the share of lines that reach no page. Drivable robots have guards in separate processes, which are
+measured separately.
 """
 
 import json
@@ -52,7 +52,7 @@ commands:
 
 
 class Load(NamedTuple):
-    """The load of a server: numbers of robots, signals for each robot, and pages."""
+    """A server's load: the number of robots, of signals for each robot, and of pages."""
 
     robots: int
     signals: int
@@ -61,7 +61,7 @@ class Load(NamedTuple):
 
 
 class Look(NamedTuple):
-    """Totals of frames and processor times at one time."""
+    """Frame totals and processor times at one moment."""
 
     frames: int
     """Number of frames received by all pages."""
@@ -176,7 +176,7 @@ def _counts(pages: Program) -> list[int]:
 
 
 def _middle(rows: Sequence[Row]) -> Row:
-    """Return the median of each value measured for one load."""
+    """Return the median of each measured value for one load."""
     figures = {name: median(row[name] for row in rows) for name in rows[0] if name not in FIELDS}
     return {"figure": "server_robots", **{name: rows[0][name] for name in FIELDS}, **figures}
 

@@ -1,7 +1,7 @@
 """All tests that `./dev test` samples: every case, and twelve times as many examples.
 
-A function with several cases is one step, and so are all other functions of a file. An interrupted
-run can be continued.
+A function with several cases is one step. A file's other functions together are one step. An
+interrupted run can be continued.
 """
 
 import os

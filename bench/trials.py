@@ -1,4 +1,4 @@
-"""Repetition and results of trials that measure the time until a robot stops."""
+"""Repeat trials that measure the time until a robot stops, and report their results."""
 
 from collections.abc import Callable, Sequence
 from math import inf

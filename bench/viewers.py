@@ -1,4 +1,4 @@
-"""Pages that only watch: the program opens WebSockets, selects channels, and counts received data.
+"""Pages that only watch: they open WebSockets, select channels, and count received data.
 
 ``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. The client's number
 replaces ``{}`` in PATH. After each line on standard input, and when it closes, the program prints a
@@ -22,7 +22,7 @@ HANDSHAKE = (
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
 KEY = os.environ.get("URC_BENCH_KEY")
-"""Start key of a real server; the default is the key of the tests."""
+"""A real server's start key; the default is the key that tests use."""
 CHUNK = 1 << 18
 OPEN_TIMEOUT_S = 10
 
@@ -71,7 +71,7 @@ class Viewer:
 
 
 def head_and_body(data: bytes) -> int | None:
-    """Return the length of the first frame, or None if its header is incomplete."""
+    """Return the first frame's length, or None if its header is incomplete."""
     if len(data) < 2:
         return None
     size = data[1] & 0x7F

@@ -31,7 +31,7 @@ NODE_MODULES = ROOT / "node_modules"
 BUILT_SITE = "URC_BUILT_SITE"
 """Environment variable with the folder of the built site; without it, the tests build the site."""
 HANGS_AFTER_S = 3600
-"""Timeout of a step, in seconds. A busy machine needs several times as long as an idle machine."""
+"""Timeout for a step, in seconds. A busy machine takes several times as long as an idle one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Outcome:
 
     name: str
     fault: str
-    """Reason for the failure; empty if the step passed."""
+    """Reason for the failure; "" if the step passed."""
     seconds: float
 
 
@@ -67,7 +67,7 @@ PYTEST = (PYTHON, "-m", "pytest")
 def halves(tests: str, *half: str) -> tuple[Step, Step]:
     """Return two test steps: one for the folders of `tests` in `half`, one for all other tests.
 
-    The processes of the two steps do not communicate. A third process that distributed thousands of
+    The processes of the two steps do not communicate. A third process for distributing thousands of
     small tests would use a fifth of the processor time.
     """
     name = f"tests {tests.rpartition('/')[2]}"
@@ -113,7 +113,7 @@ SLOW = (
 
 
 def main() -> int:
-    """Run every step; print the summary; return the exit code."""
+    """Run every step, print the summary, and return the exit code."""
     if sys.argv[1:] not in ([], ["quick"]):
         print("usage: ./dev test [quick]", file=sys.stderr)
         return 2
@@ -224,7 +224,7 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes] | N
 
 
 async def _end_group(process: asyncio.subprocess.Process) -> None:
-    """Kill all processes that the step left running."""
+    """Kill all processes that the step has left running."""
     with suppress(ProcessLookupError, PermissionError):  # usually no process is left
         if os.name == "nt":
             process.kill()

@@ -1,4 +1,4 @@
-"""Compare two commits' results for the same documents; renamed words count as equal.
+"""Compare the results of two commits for the same documents; renamed words count as equal.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
@@ -139,7 +139,7 @@ def without_title(text: str) -> str:
 
 
 class Comparison:
-    """Counts of the differences between an old tree and this tree."""
+    """The number of differences between an old tree and this tree."""
 
     def __init__(self, old: Path, tell: Callable[[str], None] | None) -> None:
         self.old = old
@@ -190,7 +190,7 @@ class Comparison:
     def differs(self, text: str, kind: str) -> None:
         """Count a difference.
 
-        Print only the first difference of each kind, or all with `--list`.
+        Print only the first difference of each kind, or all differences with `--list`.
         """
         self.is_different = True
         self.counts[kind] += 1
@@ -209,7 +209,7 @@ class Comparison:
         return self._migrated[file]
 
     def moved(self, problem: Problem) -> Problem:
-        """Return a problem from the old tree with its expected new column and code.
+        """Return a problem from the old tree, with its expected new column and code.
 
         Renames never change lines.
         """

@@ -28,13 +28,13 @@ _BUILD_S = 1800
 
 
 def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
-    """Fill the folder `source` with all input for dpkg-buildpackage.
+    """Fill the folder `source` with everything that dpkg-buildpackage needs.
 
     Args:
         source: an empty folder.
         release: the release's folder with wheel, manual page, completions and notices.
         wheels: folder with the wheels of all packages that URC needs.
-        epoch: time of the release, in seconds since the epoch.
+        epoch: release time, in seconds since the epoch.
     """
     debian = source / "debian"
     shutil.copytree(TEMPLATE, debian)

@@ -50,7 +50,7 @@ def faults_of(page: Path) -> Iterator[str]:
 
 
 def fault_of(page: Path, target: str) -> str:
-    """Return the error of a link to a file in the tree, or "" if the link is valid."""
+    """Return the error in a link to a file in the tree, or "" if the link is valid."""
     path, _, anchor = target.partition("#")
     file = (page.parent / path).resolve() if path else page
     if not file.is_relative_to(ROOT):
@@ -74,7 +74,7 @@ def anchors_of(page: Path) -> set[str]:
 
 
 def term_anchors(cell: str) -> list[str]:
-    """Return the anchors of a glossary cell, which may contain several terms."""
+    """Return the anchors for a glossary cell, which may contain several terms."""
     plain = [re.sub(r"[^\w-]+", "-", term.lower()).strip("-") for term in cell.split(",")]
     return [f"term-{term}" for term in plain]
 

@@ -23,8 +23,11 @@ LOCKS: dict[str, tuple[str, ...]] = {
     "dev": ("pyproject.toml", "--group", "build", "--group", "dev"),
     "node": ("--group", "node"),
 }
-"""Arguments of each lock file: `demo` and `build` for `./dev demo`, `dev` for `./dev test`, `node`
-for machines without npm."""
+"""Arguments for each lock file.
+
+`demo` and `build` serve `./dev demo`, `dev` serves `./dev test`, and `node` serves machines without
+npm.
+"""
 SYSTEMS = "platform_python_implementation == 'CPython' and sys_platform != 'emscripten'"
 """The environments of ``[tool.uv]`` in pyproject.toml."""
 _HEADER = """\

@@ -15,8 +15,8 @@ def manual_page(date: str) -> str:
     """Return the page in man(7) markup.
 
     Args:
-        date: date of the release, such as ``2026-11-28``. The same sources and the same date
-        produce the same page.
+        date: release date, such as ``2026-11-28``. The same sources and the same date
+            produce the same page.
     """
     from argparse_manpage.manpage import Manpage
 

@@ -28,10 +28,10 @@ _STATUS = {
     152: "timeout",
     255: "timeout",
 }
-"""Status of a mutant for each exit code of mutmut; other exit codes mean `odd`."""
+"""Status of a mutant, by mutmut's exit code; other exit codes mean `odd`."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
-"""Statuses of detected mutants: a test failed or timed out."""
+"""Statuses of detected mutants, for which a test failed or timed out."""
 _COMMENT = re.compile(r"  # .*")
 Change = tuple[str, str]
 """The removed and inserted code of a mutant."""
@@ -100,10 +100,10 @@ class Kind(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """Explanations of surviving mutants: for each one, why no test needs to kill it."""
+    """Explanations for surviving mutants: why no test needs to kill them."""
 
     reasons: dict[tuple[str, Change], str]
-    """Reason by function and change."""
+    """Reason why a mutant is harmless, by function and change."""
     kinds: tuple[Kind, ...] = ()
 
     def covers(self, mutant: Mutant) -> bool:

@@ -26,11 +26,11 @@ WANTED = 0.9
 UNFINISHED = 3
 _END_S = 30
 _TEST_S = 20
-"""Timeout of a test in seconds, for mutants that hang; the slowest test takes 2 s."""
+"""Timeout for a test in seconds, to detect mutants that hang; the slowest test takes 2 s."""
 
 
 def main() -> int:
-    """Run the untested mutants; print the summary; return the exit code."""
+    """Run the untested mutants, print the summary, and return the exit code."""
     options = _options()
     if os.name == "nt":
         print("mutate: mutmut needs fork, which Windows lacks; use WSL", file=sys.stderr)

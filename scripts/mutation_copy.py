@@ -23,10 +23,10 @@ __all__ = [
 ]
 
 PLAIN = "_as_method"
-"""Suffix of a plain method that replaces a property of the original."""
+"""Suffix for the plain method that replaces a property of the original code."""
 STAMP = "urc-mutate.json"
 SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
-"""Exit codes of mutmut for killed mutants and for timeouts."""
+"""mutmut's exit codes for killed mutants and for timeouts."""
 
 
 class Settings(NamedTuple):

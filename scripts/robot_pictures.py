@@ -39,7 +39,7 @@ READY_MS = 60_000
 
 
 def with_picture(page: str, name: str) -> str:
-    """Return a manual page with the robot's picture below the summary."""
+    """Return a manual page, with the robot's picture below the summary."""
     head, summary, rest = page.split("\n\n", 2)
     title = head.removeprefix("# ")
     picture = f"![The page of {title} on a tablet](../images/robots/{name}.png)"
@@ -70,7 +70,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def pictures(names: list[str]) -> None:
-    """Take the pictures of all robots one after another."""
+    """Take pictures of all robots, one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:  # without a latched stop of the user
         await pictures_of(names, {"URC_DATA_DIR": folder})

@@ -3,7 +3,7 @@
     python -m scripts.sentences             60 sentences of HEAD
     python -m scripts.sentences COMMIT      of another commit
 
-The seed is the hash of the commit. The same commit therefore produces the same sentences on every
+The seed is the commit's hash. The same commit therefore produces the same sentences on every
 machine, and no one can select favourable sentences. Each sentence of at least four words has the
 same probability; identical sentences count once. `scripts/passages.py` defines prose.
 """

@@ -32,7 +32,7 @@ def main() -> int:
 
 
 def build(html: Path = HTML) -> int:
-    """Build the site without a cache; print the warnings; return the exit code of Sphinx.
+    """Build the site without a cache, print the warnings, and return Sphinx's exit code.
 
     A cache would hide warnings about unchanged pages, such as a link to a heading that no longer
     exists on another page.

@@ -32,9 +32,9 @@ LABELS = {
         'class="content-icon-container" role="navigation" aria-label="Page"'
     ),
 }
-"""Parts of the theme's markup, with the corrections that axe requires."""
+"""Parts of the theme's markup, and the corrections that the accessibility checker axe requires."""
 DOCUMENT = "urc-document"
-"""Class of a code block with a whole document, to which the playground adds its button."""
+"""CSS class of a code block with a whole document; the playground adds its button to the block."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def link_names(app: Sphinx, tree: nodes.document, name: str) -> None:
 
 
 def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
-    """Return whether a node has an ancestor of one of these kinds."""
+    """Return whether one of a node's ancestors is of one of these kinds."""
     while (node := node.parent) is not None:
         if isinstance(node, kinds):
             return True
@@ -123,7 +123,7 @@ def shorten_navigation(
 
 
 def source_line(context: dict[str, Any], name: str) -> str:
-    """Return the page's last line, which explains where to correct the page."""
+    """Return the page's last line, which explains where the page can be corrected."""
     for starts, command in MADE_BY:
         if name.startswith(starts):
             return f'<p class="urc-source">Made by <code>{command}</code> from the code.</p>'
@@ -143,7 +143,7 @@ def ancestors(app: Sphinx, name: str) -> list[str]:
 
 
 def title(app: Sphinx, name: str) -> str:
-    """Return the title of a page as HTML."""
+    """Return a page's title as HTML."""
     return escape(title_of(app, name))
 
 
@@ -183,12 +183,12 @@ def below(app: Sphinx, name: str) -> list[str]:
 
 
 def title_of(app: Sphinx, name: str) -> str:
-    """Return the title of a page."""
+    """Return a page's title."""
     return str(app.env.titles[name].astext())
 
 
 def summary_of(app: Sphinx, name: str) -> str:
-    """Return the first paragraph of a page, on one line."""
+    """Return a page's first paragraph, on one line."""
     tree = app.env.get_doctree(name)
     first = next(tree.findall(nodes.paragraph), None)
     return " ".join(first.astext().split()) if first else ""

@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 def place_of(literal: str) -> Place | None:
-    """Return a literal's place in the reference; None if it has no place."""
+    """Return the place of a literal in the reference, or None if it has no place there."""
     found = names().get(literal.rstrip(":"))
     if found is None and (command := _COMMAND.match(literal)):
         found = names().get(f"urc {command[1]}")
@@ -38,7 +38,7 @@ def place_of(literal: str) -> Place | None:
 
 @cache
 def names() -> Mapping[str, Place]:
-    """Return the place of each name. A key that several definitions share has no place."""
+    """Return each name's place. A key has no place if several definitions share it."""
     found: dict[str, Place] = {}
     for page in ("cli", "environment", "codes"):
         found |= {one: Place(f"reference/{page}", make_id(one)) for one in headings(page, "##+")}
@@ -54,6 +54,6 @@ def names() -> Mapping[str, Place]:
 
 
 def headings(page: str, level: str) -> list[str]:
-    """Return the headings of a reference page."""
+    """Return a reference page's headings."""
     text = (REFERENCE / f"{page}.md").read_text("utf-8")
     return re.findall(rf"^{level} (.+)$", text, re.MULTILINE)

@@ -119,7 +119,7 @@ async def tap(page: Page) -> None:
 
 
 async def shoot(page: Page, frames: list[tuple[float, bytes]]) -> CDPSession:
-    """Collect each painted picture with its time until the session ends."""
+    """Collect each painted picture, with its time, until the session ends."""
     session = await page.context.new_cdp_session(page)
     waiting = set()
 
@@ -141,7 +141,7 @@ async def shoot(page: Page, frames: list[tuple[float, bytes]]) -> CDPSession:
 
 
 async def drive(page: Page) -> None:
-    """Hold the stick and steer, release it, press STOP, and reset the stop."""
+    """Hold the stick and steer, then release the stick, press STOP, and reset the stop."""
     x, y, radius = await centre(page.locator(".joystick-pad").first)
     await asyncio.sleep(1)
     await page.mouse.move(x, y)
@@ -158,7 +158,7 @@ async def drive(page: Page) -> None:
 
 
 async def centre(pad: Locator) -> tuple[float, float, float]:
-    """Return the centre and the radius of a stick, in page pixels."""
+    """Return a stick's centre and radius, in page pixels."""
     box = await pad.bounding_box()
     assert box is not None  # noqa: S101  the page shows its stick
     middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -187,7 +187,7 @@ def write_loop(frames: list[tuple[float, bytes]]) -> None:
 
 
 async def tutorials() -> None:
-    """Write the pictures of the tutorials."""
+    """Write the tutorials' pictures."""
     images = DOCS / "images" / "tutorials"
     images.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -209,7 +209,7 @@ async def tutorials() -> None:
 
 
 def write_blocks(page: Path, folder: Path) -> None:
-    """Write the documents of a page, and the files of its widgets."""
+    """Write a page's documents, and the files of its widgets."""
     for block in blocks(page):
         if block.file:
             file = folder / "widgets" / block.file

@@ -64,7 +64,7 @@ class Lines:
 
 @dataclass
 class Structure:
-    """All metrics, with the names of the counted modules, classes and functions."""
+    """All metrics, and the names of the counted modules, classes and functions."""
 
     lines: Lines = field(default_factory=Lines)
     files: int = 0
@@ -106,7 +106,7 @@ def main() -> int:
 
 
 def table(found: Structure) -> list[tuple[str, str | int]]:
-    """Return the name and value of each metric of `urc`."""
+    """Return each metric of `urc` as a name and a value."""
     lines = found.lines
     return [
         ("lines of Python in urc/", lines.total),
@@ -213,7 +213,7 @@ def imported(module: Module, known: set[str]) -> set[str]:
 
 
 def every_statement(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yield each statement of a module, those in classes, functions and blocks too.
+    """Yield each statement of a module, including those in classes, functions and blocks.
 
     Unlike `ast.walk`, it skips expressions, which are nine tenths of a tree.
     """

@@ -96,7 +96,7 @@ def faults(tag: str, catalog: Catalog) -> Iterator[str]:
 
 
 def entries(catalog: Catalog) -> list[Message]:
-    """Return the messages of a catalogue without its header."""
+    """Return a catalogue's messages, without its header."""
     return [message for message in catalog if message.id]
 
 

@@ -61,7 +61,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def run(names: list[str]) -> None:
-    """Take the pictures of the widgets one after another."""
+    """Take pictures of the widgets, one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     async with (
         running_dashboard(FakeRobot(dashboard_profile())) as address,

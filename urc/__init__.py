@@ -1,4 +1,4 @@
-"""URC: describe a robot in one YAML file, and drive the robot from any browser.
+"""URC: describe a robot in one YAML file, and drive it from any browser.
 
 The package `urc` itself exports only the public names for Python programs. Other modules are
 imported on first use, because ``urc --version`` must not load a web server.

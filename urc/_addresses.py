@@ -22,7 +22,7 @@ _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254"
 
 
 class _Interface(ctypes.Structure):
-    """First fields of ``struct ifaddrs`` in C; the remaining fields differ between systems."""
+    """First fields of the C type ``struct ifaddrs``; the other fields differ between systems."""
 
     _fields_ = (
         ("next", ctypes.c_void_p),

@@ -1,7 +1,7 @@
-"""Checksum algorithms: parameters, and functions that compute checksums of bytes.
+"""Parameters of checksum algorithms, and functions that compute checksums of bytes.
 
 `zlib` and `binascii` compute the CRCs in `_BUILT_IN`, and `anycrc` computes all other CRCs. A sum
-or XOR checksum needs only one call of a C function.
+or XOR checksum needs only one call to a C function.
 """
 
 import binascii
@@ -40,7 +40,7 @@ class CrcSpec(NamedTuple):
 
 
 class FoldSpec(NamedTuple):
-    """Parameters of a checksum that combines all numbers of a range by addition or XOR."""
+    """Parameters of a checksum that adds or XORs all numbers in a range."""
 
     operation: Literal["sum", "xor"]
     bits: int = 8
@@ -55,7 +55,7 @@ class FoldSpec(NamedTuple):
     ored: int = 0
     """Bits that the last step sets in the result."""
     is_odd_xored: bool = False
-    """Whether an unpaired last byte of 16-bit numbers is combined by XOR."""
+    """Whether a last byte that does not fill a number is XORed into the result."""
 
 
 FOLDED: Final = {
@@ -74,7 +74,7 @@ PLAIN_CHECKSUMS: Final = {
     "fletcher32": 32,
     "internet": 16,
 }
-"""Width of the result, in bits, of each algorithm without parameters, by name."""
+"""Result width in bits of each algorithm without parameters, by name."""
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
@@ -131,7 +131,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
     builtin = _BUILT_IN.get(spec)
     if builtin is not None:
         return builtin
-    from anycrc import CRC  # takes 14 ms, so only drivers with such a checksum import it
+    from anycrc import CRC  # takes 14 ms, so only drivers with another CRC import it
 
     compute: Compute = CRC(*spec).calc
     return compute

@@ -1,4 +1,4 @@
-"""Execution of blocking work in a daemon thread, without delaying the event loop or process exit.
+"""Runs blocking work in a daemon thread, without delaying the event loop or the process's exit.
 
 A closing event loop waits for the threads of `asyncio.to_thread`. With `asyncio.to_thread`, a
 repository that does not respond for two minutes would delay Ctrl-C by two minutes.

@@ -12,7 +12,7 @@ DATA_DIR: Final = "URC_DATA_DIR"
 TOKEN: Final = "URC_TOKEN"  # noqa: S105 - the name of a variable
 REAL_TIME: Final = "URC_REAL_TIME"
 SETTING: Final = "URC_SET_"
-"""Name prefix of all variables that contain a robot's setting."""
+"""Name prefix of the variables that contain robot settings."""
 
 VARIABLES: Final[Mapping[str, str]] = {
     DATA_DIR: "Data folder with people, keys, packages, settings and logs. `--data-dir` overrides"
@@ -31,4 +31,4 @@ SYSTEM: Final[Mapping[str, str]] = {
     "SSH_AUTH_SOCK": "The SSH agent with the keys of transports with `agent: true`.",
     "XDG_DATA_HOME": "On Linux, the folder of the default data folder.",
 }
-"""Effect on URC of variables that other programs also use."""
+"""Effects on URC of variables that other programs also use, by name."""

@@ -1,4 +1,4 @@
-"""Optional packages: the command that installs the packages of an extra.
+"""Optional packages: the command that installs an extra's packages.
 
 Messages name the packages instead of ``urc[extra]``. For ``urc[extra]``, pip would search the index
 for `urc` itself, even if this URC was installed from a file or a checkout.
@@ -17,7 +17,7 @@ _IN_EXTRA = re.compile(r"""extra\s*==\s*['"]([a-z0-9-]+)['"]""")
 
 
 def missing(feature: str, package: str, extra: str) -> str:
-    """Return a message with the missing package of a feature and its install command.
+    """Return a message that names a feature's missing package and the command to install it.
 
     Args:
         feature: subject and verb, such as ``mqtt needs``.
@@ -30,7 +30,7 @@ def missing(feature: str, package: str, extra: str) -> str:
 def packages_of(extra: str) -> list[str]:
     """Return the requirements of an extra, such as ``paho-mqtt<3,>=2.1``.
 
-    Return an empty list if this URC has no metadata, as in a browser.
+    The list is empty if this URC has no package metadata, as in a browser.
     """
     from importlib.metadata import PackageNotFoundError, requires  # slow to load
 
@@ -48,7 +48,7 @@ def packages_of(extra: str) -> list[str]:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs the packages of an extra for this URC."""
+    """Return the command that installs an extra's packages for this URC."""
     quote = '"{}"'.format if os.name == "nt" else "'{}'".format
     packages = " ".join(quote(one) for one in packages_of(extra) or [f"urc[{extra}]"])
     if Path(sys.prefix, "pipx_metadata.json").is_file():

@@ -1,4 +1,4 @@
-"""Size-limited reading of ordinary files, excluding directories and pipes.
+"""Reads ordinary files up to a size limit, and rejects directories and pipes.
 
 Private to `urc.source`.
 """

@@ -1,4 +1,4 @@
-"""Location of the user's URC data on this machine."""
+"""Finds the folder of the user's URC data on this machine."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ __all__ = ["data_folder"]
 
 
 def data_folder(environ: Mapping[str, str] = os.environ) -> Path:
-    """Return the data folder of URC, which may not exist yet.
+    """Return URC's data folder, which may not exist yet.
 
     ``URC_DATA_DIR`` overrides the system's default. The default is in ``XDG_DATA_HOME`` or
     ``~/.local/share`` on Linux, in ``~/Library/Application Support`` on macOS, and in

@@ -1,4 +1,4 @@
-"""Text forms of values in templates, joined lists, paths, topics and messages.
+"""Formats values as text for templates, joined lists, paths, topics and messages.
 
 Private to expressions. Equal numbers have the same text, so 20 and 20.0 both become ``20``. Each
 number has the fewest digits that identify it. Numbers have no exponents, because few robots can
@@ -13,7 +13,7 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""Short escape sequences of line feed, carriage return and tab, by character."""
+"""Short escape sequences for line feed, carriage return and tab, by character."""
 
 
 def spelt(value: object) -> str:
@@ -34,7 +34,7 @@ def spelt(value: object) -> str:
 def quoted(value: object, most: int = 40) -> str:
     """Return the text of a value for messages to people: quoted text, or bytes as hex digits.
 
-    Control characters are escaped exactly once, so a value cannot control the terminal.
+    Each control character is escaped once, so a value cannot control the terminal.
 
     Args:
         value: any value from a robot, a page or a document.
@@ -71,7 +71,7 @@ def _json(value: object) -> str:
 
 
 def _decimal(text: str) -> str:
-    """Return a float without an exponent; a whole number also has no decimal point."""
+    """Return a float's text without an exponent; a whole number also has no decimal point."""
     digits, _, exponent = text.partition("e")
     if exponent:
         sign = "-" if digits[0] == "-" else ""

@@ -1,4 +1,4 @@
-"""Translation of expressions into Python source, for the supported subset of Jinja.
+"""Translates expressions in the supported subset of Jinja into Python source.
 
 Private to `urc.expressions`. Grammar and precedence follow the section "Expressions" of Jinja's
 template designer documentation. A custom parser can report the column of every error, and avoids
@@ -42,9 +42,9 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""Name of the counters in the namespace of an expression; documents cannot use this name."""
+"""Name of the counters in an expression's namespace; documents cannot use this name."""
 NONCE: Final = "nonce()"
-"""Name of the nonce in the namespace of an expression; documents cannot use this name."""
+"""Name of the nonce in an expression's namespace; documents cannot use this name."""
 _MOST_NONCE: Final = 64
 _NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -128,7 +128,7 @@ class _ExpressionParser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip the next token if it is `text` without quotes; return whether it was skipped."""
+        """Skip the next token if it is the unquoted word `text`; return whether it was skipped."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True

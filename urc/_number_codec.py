@@ -1,4 +1,4 @@
-"""Conversion between numbers and bytes, for every type of `urc._number_types`.
+"""Converts between numbers and bytes, for every type in `urc._number_types`.
 
 ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has two
 decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits per

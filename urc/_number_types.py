@@ -1,6 +1,6 @@
 """Number types in binary data, such as ``u16be``, ``bcd24le`` or ``f32cdab``.
 
-Items of a ``struct:`` and filters of expressions use the same type names.
+``struct:`` items and expression filters use the same type names.
 """
 
 import re

@@ -36,22 +36,21 @@ __all__ = [
 ]
 
 _OTHER_GROUP: Final = re.compile(r"\(?\?<([A-Za-z_]\w*)>")
-"""Pattern of a named group in the syntax of JavaScript, PCRE and .NET."""
+"""Pattern for a named group in the syntax of JavaScript, PCRE and .NET."""
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
 """Maximum ``n`` of a repeat ``{n}`` in RE2."""
 MAX_COST: Final = 1000
 """Maximum size of an unproven pattern with expanded repeats, approximately in RE2 instructions.
 
-The pattern ``\\$[^\\r\\n]{1,80}\\r\\n`` for an NMEA 0183 sentence has size 802. The slowest pattern
-within the limit takes about half a second for a frame of 64 KiB.
+The pattern ``\\$[^\\r\\n]{1,80}\\r\\n`` for an NMEA 0183 sentence has a size of 802. The slowest
+pattern within the limit takes about half a second for a frame of 64 KiB.
 """
 _RE2_BYTES: Final = 4 << 20
 """Memory limit of RE2 for one pattern, in bytes. With only 1 MiB, RE2 is a hundred times slower for
 repeats of optional parts."""
 _BEYOND_ASCII: Final = 6
-"""Number of RE2 instructions for the set of all non-ASCII characters, which RE2 matches byte by
-byte."""
+"""Number of RE2 instructions for all non-ASCII characters, which RE2 matches byte by byte."""
 
 _OTHER = 128
 """Code that represents all non-ASCII characters."""
@@ -207,7 +206,7 @@ def literal_prefix(pattern: Pattern) -> str:
 
 
 def is_plain_group(pattern: Pattern, name: str) -> bool:
-    """Return whether a group never contains ``_`` or non-ASCII characters."""
+    """Return whether a group can never match ``_`` or non-ASCII characters."""
     tree = _parser.parse(pattern.source, re.ASCII)
     found = _alphabet(tree, tree.state.groupdict[name])
     return found is not None and not found & {_OTHER, ord("_")}

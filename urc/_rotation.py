@@ -1,4 +1,4 @@
-"""Conversion of a quaternion to roll, pitch and yaw, in radians.
+"""Converts a quaternion to roll, pitch and yaw, in radians.
 
 Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any norm except
 zero. Roll, pitch and yaw are rotations about x, then y, then z, in the axes of REP-103. Without an

@@ -1,4 +1,4 @@
-"""Tokenizer of expressions, and conversion of tokens to constants.
+"""Splits expressions into tokens, and converts tokens to constants.
 
 Private to `urc._grammar`.
 """

@@ -1,4 +1,4 @@
-"""Translation of YAML parser errors into messages and hints for people.
+"""Translates YAML parser errors into messages and hints for people.
 
 Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). The C
 parser and the Python parser report different messages, so most decisions depend on the document's
@@ -316,7 +316,7 @@ _RULES: tuple[Callable[[_Clue], SyntaxFault | None], ...] = (
 
 
 def advice(text: str, column: int, *, has_comment: bool = True) -> str:
-    """Return a hint to quote the value at the 0-based `column` of the line `text`."""
+    """Return a hint that suggests quoting the value at the 0-based `column` of the line `text`."""
     rest = text[column:].split(" #")[0] if has_comment else text[column:]
     before = text[:column]
     if before.count("{") > before.count("}") or before.count("[") > before.count("]"):

@@ -14,7 +14,7 @@ from yaml.scanner import Scanner, ScannerError
 __all__ = ["PureParser"]
 
 _LETTER: Final = "\ufffc"
-"""Character without a meaning in YAML, which hides a ``?`` from the scanner."""
+"""Character without a meaning in YAML; it replaces each ``?`` that the scanner must not see."""
 _BLANK: Final = "\0 \t\r\n\x85\u2028\u2029"
 
 

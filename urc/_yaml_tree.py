@@ -1,4 +1,4 @@
-"""Conversion of YAML events into plain data and a parallel tree of marks.
+"""Converts YAML events into plain data and a parallel tree of marks.
 
 Private to `urc.source`. The reader processes the events of the YAML parser directly, without the
 library's composer. Nesting and aliases are limited *during* reading, so a document with
@@ -37,7 +37,7 @@ class DocumentLimits(NamedTuple):
 
 
 class StoppedError(Exception):
-    """Reading stopped at an error; the reader's last problem describes the error."""
+    """Reading stopped at an error, which the reader's last problem describes."""
 
 
 class _Built(NamedTuple):
@@ -290,7 +290,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon, which is the rest of an unquoted text after a comma."""
+        """Report a key without a colon, caused by a comma in an unquoted text."""
         self._report(
             event,
             "unquoted",

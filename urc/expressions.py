@@ -1,12 +1,12 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
-`urc._grammar` defines the supported subset. Expressions run in a sandbox without attributes of
-Python objects, loops, or operators that turn a short text into a very long text. Expressions can
+`urc._grammar` defines the supported subset. The sandbox for expressions has no attributes of Python
+objects, no loops, and no operators that turn a short text into a very long one. Expressions can
 call only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja
 converts CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong
 reading must not become zero. In Jinja, ``'abc' | int`` is 0.
 
-The result of a template with only one ``{{ expression }}`` keeps the type of the expression.
+If a template consists of a single ``{{ expression }}``, its result has the expression's type.
 """
 
 import ast
@@ -42,7 +42,7 @@ NOW: Final = "now"
 """Name ``now`` in expressions: the current Unix time, in seconds."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""Functions whose results, such as a length, reveal almost nothing about the operands."""
+"""Functions whose results, such as a length, reveal almost nothing about their operands."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Maximum length of a template, in characters."""
@@ -258,7 +258,7 @@ def defaulted_names(template: Template) -> frozenset[str]:
 
 
 def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bool) -> None:
-    """Add the root names under `node` to `needed`, or to `spare` for names with a default."""
+    """Add the root names under `node` to `needed`, or to `spare` if they have a default."""
     if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "ns":
         (spare if has_default else needed).add(str(ast.literal_eval(node.slice)))
         return

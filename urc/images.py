@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Maximum number of pixels of an image. An image with this number of pixels takes 64 MB of memory
+"""Maximum number of pixels in an image. An image with this number of pixels takes 64 MB of memory
 in a browser."""
 
 _OTHER: Final = "application/octet-stream"
@@ -53,7 +53,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def pixels(data: bytes) -> int:
-    """Return the number of pixels of an image; 0 if `data` ends before the size."""
+    """Return the number of pixels in an image; 0 if `data` ends before the size."""
     width, height = picture_size(data) or (0, 0)
     return width * height
 

@@ -1,4 +1,4 @@
-"""Atomic writing of private files: after a power failure, a file has its old or its new content.
+"""Writes private files atomically: after a power failure, a file has its old or its new content.
 
 The files contain persistent data: settings, a latched STOP, host keys.
 """
@@ -56,7 +56,7 @@ def put_private(file: Path, data: bytes) -> None:
 
 
 def _keep_name(folder: Path) -> None:
-    """Sync a folder to disk, if supported by the operating system."""
+    """Sync a folder to disk if the operating system supports this."""
     if hasattr(os, "O_DIRECTORY"):
         number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:

@@ -39,7 +39,7 @@ class UrcError(Exception):
 
 
 class ProblemsError(UrcError):
-    """An invalid document, with all problems of the pass that rejected the document."""
+    """An invalid document, with all problems from the pass that rejected it."""
 
     def __init__(self, problems: Sequence["Problem"]) -> None:
         self.problems = tuple(problems)

@@ -1,4 +1,4 @@
-"""Locations of the shipped folders: schemas, robots, widgets, templates and third-party JS.
+"""Finds the shipped folders: schemas, robots, widgets, templates and third-party JS.
 
 In a checkout, the folders are in the root of the repository, so edits take effect immediately. In
 an installed wheel, the folders are inside the package.

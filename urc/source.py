@@ -1,4 +1,4 @@
-"""Conversion of YAML text into a `Document`: plain data with the position of every value.
+"""Converts YAML text into a `Document`: plain data with the position of every value.
 
 This module is independent of robots. All errors are raised as `ProblemsError` with the position and
 a hint. Reading takes bounded time and memory for any content.
@@ -85,7 +85,7 @@ class Document:
         return [0, *(end.end() for end in ends.finditer(self.text))]
 
     def source_of(self, path: Path) -> "Document":
-        """Return the document with the text of the value at `path`, or of its nearest parent."""
+        """Return the document that contains the value at `path`, or the value's nearest parent."""
         return self._nearest(path)[0]
 
     def problem(
@@ -325,7 +325,7 @@ def _inside_lines(
 ) -> Span | None:
     """Return the position of a character in a multi-line scalar.
 
-    To find the position, the function searches for each source line in the value. Block scalars,
+    The function finds the position by searching for each source line in the value. Block scalars,
     plain text, and quoted text without escapes are supported.
     """
     position = 0

@@ -17,7 +17,7 @@ GOLDEN = 0.6180339887
 
 
 def lines(signals: int) -> list[bytes]:
-    """Return the lines that a robot sends repeatedly."""
+    """Return the lines that a robot sends in a loop."""
     return [
         json.dumps(
             {f"s{each}": round((tick * 1.7 + each * 3.1) % 100, 1) for each in range(signals)},

@@ -1,6 +1,6 @@
 """A hand-written page for one robot: ``python plain.py ROBOT_PORT``.
 
-The server forwards each line from the robot to the page's WebSocket immediately. The page shows the
+The server immediately forwards each line from the robot to the page's WebSocket. The page shows the
 line in its next frame.
 """
 

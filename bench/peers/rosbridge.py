@@ -71,7 +71,7 @@ def odometry(at_s: float) -> dict[str, object]:
 
 
 def imu(at_s: float) -> dict[str, object]:
-    """Return an IMU message with a swaying orientation."""
+    """Return an IMU message whose orientation sways."""
     turning = {"x": 0.1, "y": 0.2, "z": 0.3}
     return {
         "header": header(),
@@ -90,7 +90,7 @@ def battery(at_s: float) -> dict[str, object]:
 
 
 def pictures() -> list[str]:
-    """Return a list of different images, encoded in base64."""
+    """Return a list of different base64-encoded images."""
     chance = random.Random(1)  # noqa: S311 - noise, the same in each run
     made = []
     for number in range(15):
@@ -119,11 +119,11 @@ TOPICS: dict[str, tuple[Callable[[float], dict[str, object]], int]] = {
     "/camera/compressed": (camera, CAMERA_HZ),
     "/battery_state": (battery, 10),
 }
-"""For each topic, the function that builds a message for a given time, and the message rate."""
+"""For each topic, the message rate and the function that builds a message for a given time."""
 
 
 async def publish(line: ServerConnection, topic: str) -> None:
-    """Send the messages of a topic at its rate."""
+    """Send a topic's messages at its rate."""
     make, rate_hz = TOPICS[topic]
     began_s = time.monotonic()
     number = 0

@@ -1,4 +1,4 @@
-"""Robots driven over UDP, whose polls use the same frame counter.
+"""Robots driven over UDP, whose motion and polls share one frame counter.
 
 Each robot is a socket that stores received frames in order and answers polls. A session with a
 guard drives the robots. Each gesture uses a separate connection. A control is held for some

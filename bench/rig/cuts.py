@@ -1,4 +1,4 @@
-"""Cuts of the link between the server and the driven robots.
+"""Cuts in the link between the server and the driven robots.
 
 Each motion value is the send time of its tick, so the robot knows the age of received motion. One
 rig has robots on every kind of transport. A cut affects the whole link or the link of a single
@@ -28,7 +28,7 @@ from bench.rig.programs import Heard, Operators, Relay, Robots, Server
 __all__ = ["LATE_MS", "Cut", "CutRig"]
 
 LATE_MS = 300.0
-"""Age above which motion counts as late, in milliseconds."""
+"""Age beyond which motion counts as late, in milliseconds."""
 BURST_MS = 100.0
 """Longest time from late motion to the stop in milliseconds, if late motion is allowed."""
 LEAD_S = 0.2
@@ -57,7 +57,7 @@ class Cut(NamedTuple):
     late_ms: float
     """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
-    """Whether the robot moved when the link was cut.
+    """Whether the robot was moving when the link was cut.
 
     On a busy machine, the robot may have stopped before the cut.
     """
@@ -83,7 +83,7 @@ class Cut(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the trial is invalid because of the machine's delay."""
+        """Whether the machine's delay makes the trial invalid."""
         if not self.was_moving:
             return not self.fault
         late = self.oldest_ms - self.bounds.oldest_ms
@@ -137,7 +137,7 @@ class CutRig:
         self._witness = enter(Robots([]))
 
     def __enter__(self) -> Self:
-        """Return self; all programs end with the `with` block."""
+        """Return self; all programs end when the `with` block ends."""
         return self
 
     def __exit__(
@@ -155,7 +155,7 @@ class CutRig:
         return range(len(self.kinds))
 
     def port(self, index: int) -> int:
-        """Return the port that identifies one robot's link for cuts."""
+        """Return the port that identifies one robot's link when it is cut."""
         first = FIRST_PORT.get(self.kinds[index])
         return self.robots.ports[index] if first is None else first + index
 
@@ -163,17 +163,17 @@ class CutRig:
         """Cut the link while each robot is driven; return the results.
 
         Args:
-            seconds: length of the cut.
+            seconds: duration of the cut.
             order: ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
         return self._trial(self.indexes, seconds, order, self._share())
 
     def cut_one(self, index: int, seconds: float, share: float) -> Cut:
-        """Cut the link of one robot; several threads may call this method for different robots.
+        """Cut one robot's link; several threads may call this method for different robots.
 
         Args:
-            index: index of the robot in the rig.
-            seconds: length of the cut.
+            index: the robot's index in the rig.
+            seconds: duration of the cut.
             share: in every second cut, the fraction of the cut before the control's release.
         """
         for _ in range(ATTEMPTS - 1):
@@ -259,7 +259,7 @@ class CutRig:
         self, pages: Sequence[int] | dict[int, int], released: dict[int, int],
         cut_ns: int, healed_ns: int,
     ) -> None:  # fmt: skip
-        """Wait for the required stops, then for events that must not happen."""
+        """Wait for the required stops, then watch for motion that must not happen."""
         for index in pages:
             bounds = bounds_of(self.kinds[index])
             is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s

@@ -1,4 +1,4 @@
-"""Times from the loss of an operator to the stop, for eight kinds of loss.
+"""Times from losing an operator to the stop, for eight kinds of loss.
 
 In a round of trials, all robots are driven in parallel, each by one page, and all pages vanish.
 Each motion value is the send time of its tick, so the robots' logs contain all results.
@@ -25,7 +25,7 @@ LINK_DEATHS = ("black-hole", "interface-down")
 """Kinds of loss that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""Time after the link's restoration in which no motion may reach the robot, in seconds."""
+"""Time after the link is restored during which no motion may reach the robot, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
@@ -81,7 +81,7 @@ class Trial(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the trial is invalid because of the machine's delay."""
+        """Whether the machine's delay makes the trial invalid."""
         if not self.has_moved:
             return True
         return not self.fault and 0 < self.stop_ms - self.bound_ms <= self.late_ms
@@ -142,7 +142,7 @@ class Rig:
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
-        """Return self; all programs end with the `with` block."""
+        """Return self; all programs end when the `with` block ends."""
         return self
 
     def __exit__(
@@ -190,12 +190,12 @@ class Rig:
         """Make a page drive a robot until the page vanishes; return the page's number.
 
         Args:
-            index: number of the robot.
-            death: way of vanishing, as in `bench.rig.operator_process.Plan`.
-            drive_s: time of driving before the page vanishes, in seconds.
+            index: the robot's number.
+            death: how the page vanishes, as in `bench.rig.operator_process.Plan`.
+            drive_s: driving time before the page vanishes, in seconds.
             has_spare: whether the page has a second connection.
-            key: token of the page; None: the start key.
-            cookie: cookie of a sign-in, instead of a token.
+            key: the page's token; None for the start key.
+            cookie: cookie from a sign-in, used instead of a token.
         """
         self._numbers += 1
         key = self.server.key if key is None else key

@@ -10,7 +10,7 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""Time limit for replacing a killed guard, in ms; the new guard first sends a stop."""
+"""Time limit for replacing a killed guard, in ms; the new guard sends a stop first."""
 OPEN_MS = 100.0
 """Additional time for the new connection and the transfer, in ms."""
 AGAIN_S = 10.0
@@ -23,7 +23,7 @@ class EngineRig(Rig):
     can_hang = True
 
     def engine_bout(self, death: str) -> list[Trial]:
-        """Drive every robot, and freeze, kill or block the server; return the results."""
+        """Drive every robot, then freeze, kill or block the server; return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
@@ -59,7 +59,7 @@ class EngineRig(Rig):
             self._watch()
 
     def guard_bout(self) -> list[Trial]:
-        """Drive every robot, kill one guard after another, and return the results."""
+        """Drive every robot, kill the guards one after another, and return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():

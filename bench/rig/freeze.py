@@ -66,7 +66,7 @@ class Freeze(NamedTuple):
     late_ms: float
     """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
-    """Whether the robot moved at the start of the freeze.
+    """Whether the robot was moving at the start of the freeze.
 
     On a slow machine, an expired lease may have stopped the robot already.
     """

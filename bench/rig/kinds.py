@@ -39,10 +39,10 @@ FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
 
 
 class Bounds(NamedTuple):
-    """Limits of a kind of transport after a cut."""
+    """Limits that apply to one kind of transport after a cut."""
 
     oldest_ms: float
-    """Largest allowed age of received motion, in ms."""
+    """Largest allowed age of motion when it is received, in ms."""
     most_late: int | None
     """Largest allowed number of motion frames older than 300 ms."""
     stop_ms: float
@@ -56,7 +56,7 @@ class Bounds(NamedTuple):
 
 
 def bounds_of(kind: str) -> Bounds:
-    """Return the limits of a kind of transport."""
+    """Return the limits for a kind of transport."""
     if kind in _AT_ONCE:
         return Bounds(300.0, 0, 100.0, 0.45)
     if kind == "udp":
@@ -104,7 +104,7 @@ _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
     "ros": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
 }
-"""A slow request that delays motion on the same connection."""
+"""A slow request, which delays motion on the same connection."""
 
 
 class Counterpart(Program):
@@ -132,7 +132,7 @@ def place_of(kind: str, index: int) -> str:
 
 
 def document(kind: str, index: int, port: int, other: Counterpart | None) -> str:
-    """Return the document of a robot at `port`, and its third-party program, or None."""
+    """Return a robot's document at `port`, and its third-party program, or None."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
         options = options.replace("OTHER", str(other.port))

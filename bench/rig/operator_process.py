@@ -2,7 +2,7 @@
 
 The program reads plans from standard input, one JSON object on each line, and forks a process for
 each plan. The process acts like a page: it takes control, sends a tick every 50 ms, and vanishes as
-planned. For each event, the process prints one line, with times from the monotonic clock in
+planned. For each event, the process prints one line; times are from the monotonic clock, in
 nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
@@ -45,21 +45,21 @@ class Plan(NamedTuple):
     port: int
     robot: str
     death: str
-    """Way of vanishing: ``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``.
+    """How the page vanishes: ``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``.
 
     With ``outside``, the page keeps driving while another program cuts the link. With ``flood``,
     the page sends a thousand ticks a second.
     """
     drive_s: float
-    """Time of driving before the page vanishes, in seconds."""
+    """Driving time before the page vanishes, in seconds."""
     life_s: float = 120.0
     """Longest run time of the page's process, in seconds."""
     command: str = "go"
     argument: str = "t"
     key: str = ""
-    """Start key of the server, or a token; "" for neither."""
+    """The server's start key, or a token; "" for neither."""
     cookie: str = ""
-    """Cookie of a sign-in, ``name=secret``; "" for no cookie."""
+    """Cookie from a sign-in, ``name=secret``; "" for no cookie."""
     has_spare: bool = False
     """Whether the page also sends held controls on a second connection."""
 
@@ -117,7 +117,7 @@ class Page:
         self._sort()  # the first messages may have arrived with the handshake
 
     def say(self, message: dict[str, Any]) -> bool:
-        """Send a message if this requires no wait; return whether it was sent."""
+        """Send a message if sending does not require waiting; return whether it was sent."""
         return self._frame(1, json.dumps(message).encode())
 
     def close(self) -> None:
@@ -248,7 +248,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return the first frame's opcode and payload, and the remaining data, or None."""
+    """Return the first frame's opcode, payload and the remaining data; None if incomplete."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -316,7 +316,7 @@ def _die(page: Page, plan: Plan) -> None:
 
 
 def start(plan: Plan) -> int:
-    """Fork the process of a plan; return its id."""
+    """Fork a process for a plan; return its id."""
     child = os.fork()
     if child:
         tell("pid", plan.number, child)
@@ -338,7 +338,7 @@ def _end_with_parent() -> None:
 
 
 def _reap(children: dict[int, int]) -> None:
-    """Remove ended processes from the list, because process ids may soon be reused."""
+    """Remove ended processes from the list, because their ids may soon be reused."""
     for number, child in list(children.items()):
         if os.waitpid(child, os.WNOHANG)[0]:
             del children[number]

@@ -76,7 +76,7 @@ class Program:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return self; the program ends with the `with` block."""
+        """Return self; the program ends when the `with` block ends."""
         return self
 
     def __exit__(
@@ -90,12 +90,12 @@ class Program:
 
     @property
     def pid(self) -> int:
-        """Process id of the running program."""
+        """The running program's process id."""
         return self._process.pid
 
     @property
     def is_running(self) -> bool:
-        """Whether the program still runs."""
+        """Whether the program is still running."""
         return self._process.poll() is None
 
     def order(self, text: str) -> None:
@@ -113,7 +113,7 @@ class Program:
                 raise AssertionError(f"{what}: not within {timeout_s:g} s; it said:\n{said}")
 
     def wait_for(self, word: str, timeout_s: float = ANSWER_S, *, after: int = 0) -> list[str]:
-        """Return the words of the first line from index `after` that begins with `word`."""
+        """Return the words of the first line that begins with `word`, starting at index `after`."""
 
         def found() -> list[str]:
             lines = (line.split() for line in self.lines[after:])
@@ -185,9 +185,9 @@ class Robots(Program):
         self.heard: list[list[Heard]] = [[] for _ in places]
         """Received lines of each robot."""
         self.late: list[tuple[int, float]] = []
-        """Times of late wake-ups of the robots' process, with delays in milliseconds."""
+        """Times at which the robots' process woke up late, with delays in milliseconds."""
         self.waits: dict[int, list[tuple[int, float]]] = {}
-        """Waits for a processor, by process id: end times, and durations in ms."""
+        """Each process's waits for a processor, by process id: end times, and durations in ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
         is_foxglove = any(place.startswith("foxglove:") for place in places)
@@ -214,7 +214,7 @@ class Robots(Program):
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay of the robots' process between two times, in milliseconds."""
+        """Return the largest delay in the robots' process between two times, in milliseconds."""
         with self.changed:
             found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
         return max(found, default=0.0)
@@ -234,7 +234,7 @@ class Operators(Program):
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """Remaining text of each report, by the report's first word and the plan's number."""
+        """Text that follows a report's first word and its plan's number, by word and number."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
@@ -260,7 +260,7 @@ class Operators(Program):
         return self.news[word, number]
 
     def kill(self, number: int) -> None:
-        """End the page of a plan, and wait for the end of its process."""
+        """End a plan's page, and wait until its process has ended."""
         self.order(json.dumps({"kill": number}))
         self.wait_until(lambda: ("ended", number) in self.news, ANSWER_S, f"end of {number}")
 
@@ -314,7 +314,7 @@ class Server(Program):
 
         Args:
             profiles: paths of the robots' documents.
-            data: data folder of the server.
+            data: the server's data folder.
             options: additional options of ``urc serve``.
             host: address to listen on.
             inside: command prefix of a network namespace, from `Relay.inside`.
@@ -333,7 +333,7 @@ class Server(Program):
 
     @property
     def guards(self) -> list[int]:
-        """Process ids of all the server's guards."""
+        """Process ids of all of the server's guards."""
         found = Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text("ascii").split()
         return [int(child) for child in found if _is_guard(child)]
 
@@ -353,5 +353,5 @@ def _is_guard(process: str) -> bool:
 
 
 def now_ns() -> int:
-    """Return the time of the monotonic clock, in nanoseconds."""
+    """Return the monotonic clock's time, in nanoseconds."""
     return time.monotonic_ns()

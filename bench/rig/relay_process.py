@@ -47,7 +47,7 @@ MOST_WAITING = 4096
 
 @dataclass
 class Side:
-    """One end of the link between the namespaces."""
+    """One end of the link between the two namespaces."""
 
     name: str
     namespace: int
@@ -65,7 +65,7 @@ class Weather:
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """For each side, whether all its packets are lost."""
+    """Whether all packets from a side are lost, for each side."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
     """Blocked ports of each side. A side's packets to or from a blocked port are lost."""
 

@@ -1,4 +1,4 @@
-"""Times from a revocation to the stop, for each kind of right that can end.
+"""Times from revoking a right to the stop, for each kind of right that can end.
 
 In a round of trials, all robots are driven in parallel, each by its own person, device or program.
 This process then revokes the rights in the server's data folder, as ``urc people`` does, while the
@@ -45,7 +45,7 @@ class RevocationRig(Rig):
         self._count = 0
 
     def bout(self, death: str) -> list[Trial]:
-        """Drive each robot, and revoke each right in the way `death`; return the results."""
+        """Drive each robot, revoke each right as `death` specifies, and return the results."""
         holders = {index: self._admitted(death) for index in self.indexes}
         for one in holders.values():
             self._await_known(one)

@@ -4,8 +4,8 @@
 ``ws`` is a WebSocket server; each message is a line. ``bridge`` implements the protocol of
 rosbridge; ``{"data": NUMBER}`` on ``/go`` counts as the line ``M NUMBER``. ``http`` is an HTTP
 server; a request for ``/go?t=NUMBER`` counts as the line ``M NUMBER``. ``mqtt:HOST:PORT``
-subscribes to the topic ``go`` of a broker. The program prints one line for each event, with times
-of the monotonic clock in nanoseconds::
+subscribes to the topic ``go`` of a broker. The program prints one line for each event; times are
+from the monotonic clock, in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection opened, or a broker accepted the subscription
@@ -39,7 +39,7 @@ LATE_NS = 5_000_000
 """Shortest reported delay of a wake-up, in nanoseconds."""
 LONGEST_LINE = 65536
 BROKER_S = 20.0
-"""Timeout for the start of a broker, in seconds."""
+"""Timeout for starting a broker, in seconds."""
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
@@ -124,7 +124,7 @@ class BridgeEar(WebEar):
     """A decoder of messages published through a rosbridge."""
 
     def read(self, body: bytes) -> list[str]:
-        """Return a line for a message on the topic of motion, and no line for other messages."""
+        """Return a line for a message on the motion topic, and no line for other messages."""
         said = json.loads(body)
         is_motion = said["op"] == "publish" and said["topic"] == "/go"
         return [f"M {said['msg']['data']}"] if is_motion else []
@@ -172,7 +172,7 @@ EARS = {
 
 @dataclass
 class Door:
-    """The listening socket of one robot."""
+    """One robot's listening socket."""
 
     robot: int
     socket: socket.socket
@@ -229,7 +229,7 @@ class Others:
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
-        """Return the processes that waited since the last check, with wait times in nanoseconds."""
+        """Return the processes that have waited since the last check, with times in nanoseconds."""
         found: list[tuple[str, int]] = []
         with contextlib.suppress(OSError):  # the process has ended
             with open(f"/proc/{self._process}/task/{self._process}/children") as children:

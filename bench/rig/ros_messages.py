@@ -1,7 +1,7 @@
 """Random ROS messages and their bytes, made by the library rosbags.
 
-rosbags, by Ternaris, is independent of URC. It has a type store of ROS 2, and serializes to CDR and
-to the format of ROS 1. The values of a message are compared as plain data, as URC reads them.
+rosbags, by Ternaris, is independent of URC. It includes a ROS 2 type store, and serializes to CDR
+and to the ROS 1 format. The values of a message are compared as plain data, as URC reads them.
 Non-finite numbers become None, and arrays of ``uint8`` become bytes.
 """
 
@@ -69,7 +69,7 @@ class RandomMessages:
         self._numbers = numpy.random.default_rng(seed)
 
     def message(self, name: str) -> Any:
-        """Return a random message of a type, as an object of rosbags."""
+        """Return a random message of a type, as a rosbags object."""
         if name in _TIMES:  # rosbags supports only the times of ROS 2, which have a different sign
             return self._store.types[name](self._dice.randrange(2**31), self._dice.randrange(10**9))
         described = self._store.fielddefs[name][1]

@@ -53,7 +53,7 @@ FONTS_CONF = """<?xml version="1.0"?>
 
 
 class BringError(Exception):
-    """The browser could not be installed from npm; the message is one line."""
+    """The browser could not be installed from npm; the message fits on one line."""
 
 
 def bring_chromium() -> str:

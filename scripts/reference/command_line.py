@@ -1,4 +1,4 @@
-"""The page of the command line, from the argument parsers of `urc`."""
+"""The page of the command line, generated from the argument parsers of `urc`."""
 
 import argparse
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ def page() -> str:
 
 
 def parser_of(verb: str) -> argparse.ArgumentParser:
-    """Return the parser of a subcommand."""
+    """Return a subcommand's parser."""
     parser = argparse.ArgumentParser(prog=f"urc {verb}", add_help=False)
     import_module(module_of(verb)).add_arguments(parser)
     return parser

@@ -1,4 +1,4 @@
-"""Pages of the language's keys, from the schemas: one page for each family of keys."""
+"""Pages of the language's keys, generated from the schemas: one page for each family of keys."""
 
 import json
 import re
@@ -77,7 +77,7 @@ def page(name: str) -> str:
 
 @cache
 def page_of() -> dict[str, str]:
-    """Return the page of each definition."""
+    """Return each definition's page."""
     return {one: name for name, family in FAMILIES.items() for one in family.definitions}
 
 
@@ -139,7 +139,7 @@ def _keys(file: str, owner: str, schema: Schema, shared: list[str]) -> Iterator[
 
 
 def _required_when_whole(schema: Schema) -> list[str]:
-    """Return the keys that only a part, or a document with a parent, may omit."""
+    """Return the keys that may be omitted only in a part or in a document with a parent."""
     otherwise = schema.get("else", {})
     inner: list[str] = list(otherwise.get("required", ()))
     return inner + _required_when_whole(otherwise) if otherwise else inner

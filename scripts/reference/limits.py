@@ -1,4 +1,4 @@
-"""The page of limits, from the constants whose docstring begins with “Maximum”."""
+"""The page of limits, generated from the constants whose docstring begins with “Maximum”."""
 
 import ast
 from collections.abc import Iterator
@@ -38,7 +38,7 @@ def page() -> str:
 
 
 def limits() -> Iterator[Limit]:
-    """Yield every limit in the code, in the order of the modules."""
+    """Yield every limit in the code, in module order."""
     for file in sorted((ROOT / "urc").rglob("*.py")):
         body = ast.parse(file.read_text("utf-8")).body
         for statement, following in pairwise(body):

@@ -1,4 +1,4 @@
-"""Pieces of Markdown for the pages of the reference."""
+"""Functions that generate pieces of Markdown for the reference pages."""
 
 import re
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""The page of the WebSocket messages, from the message types in `urc.wire`."""
+"""The page of the WebSocket messages, generated from the message types in `urc.wire`."""
 
 import ast
 import inspect
@@ -87,7 +87,7 @@ def _texts(message: type) -> Mapping[str, str]:
 
 
 def _type(annotation: object) -> str:
-    """Return the type of a field in words."""
+    """Return a field's type in words."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation is type(None):
         return "null"

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
-"""Sign-in methods of devices and programs; these sign-ins stay valid until they are removed."""
+"""Sign-in methods of devices and programs, whose sign-ins stay valid until they are removed."""
 
 
 class PrincipalStatus(NamedTuple):
@@ -43,13 +43,13 @@ class PrincipalStatus(NamedTuple):
     passkeys: int = 0
     """Number of passkeys."""
     accounts: int = 0
-    """Number of accounts at identity providers (OpenID Connect)."""
+    """Number of accounts with identity providers (OpenID Connect)."""
     invited_until: float | None = None
     """UTC time at which the newest invitation expires, in seconds; None without an invitation."""
     sign_ins: int = 0
     """Number of active sign-ins."""
     used_at: float | None = None
-    """UTC time of the last use, in seconds; None if never used."""
+    """UTC time of the last use, in seconds; None if unused."""
 
 
 def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStatus]:
@@ -112,7 +112,7 @@ def principal_named(directory: Directory, kind: Kind, name: str) -> Principal | 
 def change_grants(
     store: AccessStore, principal: str, change: Callable[[tuple[Grant, ...]], Iterable[Grant]]
 ) -> tuple[Grant, ...]:
-    """Apply `change` to the grants of a principal, store the result and return it.
+    """Apply `change` to a principal's grants, store the result and return it.
 
     Raises:
         AccessError: the principal is unknown.
@@ -136,8 +136,8 @@ def invite_person(
 
     Args:
         store: the store.
-        name: name of the person.
-        grants: grants of a new person; empty for an existing person.
+        name: the person's name.
+        grants: grants for a new person; empty for an existing person.
         now: UTC time in seconds since 1970.
         ends_at: UTC time at which the code expires.
 
@@ -166,7 +166,7 @@ def replace_passphrase(store: AccessStore, person: str, kept: str) -> int:
 
     Args:
         store: the store.
-        person: id of the person.
+        person: the person's id.
         kept: hash of the new passphrase.
 
     Raises:
@@ -191,8 +191,8 @@ def add_token(
 
     Args:
         store: the store.
-        name: name of the program.
-        grants: grants of the token.
+        name: the program's name.
+        grants: the token's grants.
         now: UTC time in seconds since 1970.
         ends_at: UTC time at which the token expires; None for no expiry.
         commands: commands that the program may send; empty for all commands of its role.
@@ -221,8 +221,8 @@ def add_guest(
 
     Args:
         store: the store.
-        name: name of the guest.
-        robot: name of the robot in URLs.
+        name: the guest's name.
+        robot: the robot's name in URLs.
         now: UTC time in seconds since 1970.
         ends_at: UTC time at which the link expires.
 
@@ -252,7 +252,7 @@ def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bo
 
 
 def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
-    """End restored codes and sign-ins that are unsafe to keep; return the number of ended sign-ins.
+    """End restored codes and sign-ins that are unsafe to keep; return the number of sign-ins ended.
 
     After the backup, codes may have been used and browser sign-ins revoked. All codes and browser
     sign-ins therefore end. People keep their passphrases.
@@ -270,7 +270,7 @@ def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
 
 
 def newest_time(store: AccessStore) -> float:
-    """Return the UTC time of the newest event in the store, in seconds; 0 for an empty store."""
+    """Return the UTC time of the store's newest event, in seconds; 0 for an empty store."""
     directory = store.directory()
     people = (one.created_at for one in directory.principals.values())
     return max([0.0, *people, *(one.used_at for one in directory.sign_ins.values())])

@@ -1,4 +1,4 @@
-"""A local certificate authority, which provides HTTPS on machines without a public name.
+"""A local certificate authority, which enables HTTPS on machines without a public name.
 
 Layer 4. `CertificateAuthority` keeps one root certificate for years and uses it to issue the
 server's certificate. Users trust the root certificate once on each device. The root is limited to
@@ -60,7 +60,7 @@ class ServerCertificate(NamedTuple):
     ends: datetime
     """Time after which browsers reject the certificate."""
     is_new: bool
-    """Whether the certificate was issued by this call."""
+    """Whether this call issued the certificate."""
 
 
 class CertificateAuthority:
@@ -247,10 +247,10 @@ def fingerprint(certificate: x509.Certificate) -> str:
 
 
 def issued_at(file: Path) -> datetime | None:
-    """Return the earliest possible issue time of a certificate from this module.
+    """Return the earliest time at which this module can have issued a certificate.
 
-    The start of its validity does not show the issue time, because it is never later than `OLDEST`.
-    Return None for a missing or damaged file.
+    The certificate's start of validity does not show the issue time, because it is never later than
+    `OLDEST`. Return None for a missing or damaged file.
     """
     found = _certificate(file)
     if found is None:

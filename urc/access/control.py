@@ -1,4 +1,4 @@
-"""Access control of one server: identification of requests, and a check of rights at each command.
+"""Access control for one server: identify requests, and check rights at each command.
 
 Layer 4. Each server has one local user in addition to the people, devices and programs in the
 store. The local user holds the start key and administers the server. The server prints the start
@@ -7,8 +7,7 @@ server.
 
 Theory of operation. Every change, including a change by another process, replaces the whole
 `directory`. The callbacks in `on_change` then close the sockets that have lost their rights. Time
-in this module never runs backwards, so a change of the machine's clock cannot revive an ended
-sign-in.
+in this module never runs backwards, so changing the machine's clock cannot revive an ended sign-in.
 """
 
 import asyncio
@@ -95,7 +94,7 @@ class AccessControl:
     def code(self) -> str:
         """Return a one-time code that replaces the start key for one browser of the local user.
 
-        A used code is harmless if it becomes public, for example in a browser's command line.
+        Disclosing a used code is harmless, for example in a browser's command line.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None
@@ -124,7 +123,7 @@ class AccessControl:
     # Changes
 
     async def watch(self) -> None:
-        """Detect changes by other processes and record the use of sign-ins, until cancelled.
+        """Until cancelled, detect changes by other processes and record the use of sign-ins.
 
         A thread reads the file, because another process may have locked it.
         """
@@ -149,7 +148,7 @@ class AccessControl:
         self._merge()
 
     def load(self) -> None:
-        """Read the store again like `reload`, but block until done."""
+        """Read the store again like `reload`, but block until the read is complete."""
         self._stored = self.store.directory() if self.store else Directory()
         self._merge()
 
@@ -160,7 +159,7 @@ class AccessControl:
         await self.reload()
 
     def used(self, sign_in: str) -> None:
-        """Note the use of a sign-in; `watch` records it later."""
+        """Note that a sign-in was used; `watch` records the use later."""
         # Only in memory, because every request is a use and a transaction would wait for the disk.
         self._used[sign_in] = self.now()
 

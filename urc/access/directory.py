@@ -17,7 +17,7 @@ __all__ = ["NOBODY", "Directory", "Identity", "Kind", "Principal", "SignIn", "Wa
 
 Kind = Literal["person", "device", "program", "guest"]
 Way = Literal["key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
-"""Method of a sign-in; the audit log records this method for each command."""
+"""How a sign-in was made; the audit log records this method for each command."""
 
 
 class Principal(NamedTuple):
@@ -30,13 +30,13 @@ class Principal(NamedTuple):
     """Display name, also used in the audit log, such as “Tablet in the lab”."""
     grants: tuple[Grant, ...] = ()
     owner: str = ""
-    """Id of the person who owns the device. An owned device has its owner's rights."""
+    """Id of the device's owner. An owned device has its owner's rights."""
     commands: tuple[str, ...] = ()
     """Commands that a program may send; empty for all commands of its role."""
     created_at: float = 0.0
     """UTC creation time, in seconds since 1970."""
     ends_at: float | None = None
-    """UTC time at which all rights end; None for no end."""
+    """UTC time at which all rights end; None if they never end."""
 
 
 class SignIn(NamedTuple):
@@ -57,7 +57,7 @@ class SignIn(NamedTuple):
     idle_s: float | None
     """Maximum time without use, in seconds; None for no limit."""
     place: str = ""
-    """Network address from which the sign-in was made."""
+    """Network address from which the person signed in."""
     agent: str = ""
     """Name of browser and system, such as “Chromium on Android”."""
 
@@ -72,7 +72,7 @@ class Identity(NamedTuple):
     """The proven identity of a request, without any rights."""
 
     principal: str = ""
-    """Id of the principal; "" for an unknown visitor."""
+    """The principal's id; "" for an unknown visitor."""
     sign_in: str = ""
     """Id of the sign-in."""
     name: str = ""
@@ -86,7 +86,7 @@ NOBODY: Final = Identity()
 
 
 def digest_of(secret: str) -> bytes:
-    """Return the stored form of a random secret.
+    """Return the form in which a random secret is stored.
 
     A fast hash is sufficient for 256 random bits. Only user-chosen passphrases need a slow hash.
     """
@@ -125,8 +125,8 @@ class Directory:
         Args:
             who: the identity, possibly from an earlier directory.
             now: UTC time in seconds since 1970.
-            robot: name of the robot; "" for the whole server.
-            tags: tags of the robot.
+            robot: the robot's name; "" for the whole server.
+            tags: the robot's tags.
         """
         return role_at(self._grants(who, now), robot, tags)
 
@@ -144,7 +144,7 @@ class Directory:
         return self.principals.get(principal.owner, principal).grants
 
     def end_of(self, sign_in: SignIn) -> float:
-        """Return the UTC time at which a sign-in ends without further use; infinity for no end.
+        """Return the UTC time at which a sign-in ends if it is not used again; infinity if never.
 
         A device's sign-in also ends when its owner's rights end.
         """

@@ -5,7 +5,7 @@ and another person on this server may have the same name. The functions block fo
 milliseconds, so servers call them in a thread.
 
 Theory of operation. Each sign-in replaces the grants of the previous sign-in with those from its
-current claims. Grants from an administrator remain. All rights of the person, including those of
+current claims. Grants from an administrator remain. All of the person's rights, including those of
 devices and passkeys, end with the sign-in. The next sign-in renews them. An account that its
 provider has blocked therefore loses all access.
 """
@@ -33,7 +33,7 @@ class ExternalAccount(NamedTuple):
     issuer: str
     """Address of the provider."""
     subject: str
-    """Identifier of the account at its issuer; never reused for another account."""
+    """The account's identifier at its issuer; never reused for another account."""
     name: str
     """Display name."""
     grants: tuple[Grant, ...]
@@ -89,8 +89,8 @@ def admit_named(
     Args:
         store: the store.
         name: name confirmed by a trusted proxy.
-        new_grants: grants of a new person; if empty, the person must already exist.
-        proxy: name of the proxy.
+        new_grants: grants for a new person; if empty, the person must already exist.
+        proxy: the proxy's name.
         now: UTC time in seconds since 1970.
         ends_at: UTC time at which the sign-in ends. For a person added by a proxy, all rights end
             at the same time.

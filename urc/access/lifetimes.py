@@ -11,7 +11,7 @@ _DAY_S: Final = 24 * 3600.0
 
 
 class Lifetime(NamedTuple):
-    """Limits of one kind of sign-in."""
+    """Limits for one kind of sign-in."""
 
     longest_s: float | None
     """Maximum duration, in seconds; None for no limit."""

@@ -4,9 +4,10 @@ Layer 4. The sign-in follows OpenID Connect Core 1.0, RFC 7636 (PKCE) and RFC 97
 practice).
 
 Theory of operation. `begin` returns the address of the provider's page. The address contains a
-random state, which is valid once and for ten minutes. The state is valid only in the browser that
-has the binding, so a link cannot sign a browser in to an attacker's account. `finish` exchanges the
-code in the redirect for an ID token and checks the token. The token's claims determine the grants.
+random state, which is valid for ten minutes and only once. The state is valid only in the browser
+that has the binding, so a link cannot sign a browser in to an attacker's account. `finish`
+exchanges the code in the redirect for an ID token and checks the token. The token's claims
+determine the grants.
 """
 
 import asyncio
@@ -84,7 +85,7 @@ class OidcSignIn:
 
         Args:
             redirect: address on this server to which the provider redirects the browser.
-            place: network address of the browser.
+            place: the browser's network address.
 
         Raises:
             AccessError: the provider is unreachable, or its description is invalid.
@@ -107,10 +108,10 @@ class OidcSignIn:
         return OidcRedirect(f"{metadata.authorization}{joint}{urlencode(query)}", binding)
 
     async def finish(self, answer: Mapping[str, str], binding: str, now: float) -> ExternalAccount:
-        """Return the account of a browser that returns from the provider.
+        """Return the account of a browser that the provider has sent back.
 
         Args:
-            answer: query parameters of the redirect.
+            answer: the redirect's query parameters.
             binding: the secret in the browser's cookie; "" without a cookie.
             now: UTC time in seconds since 1970.
 
@@ -139,7 +140,7 @@ class OidcSignIn:
         )
 
     async def _claims(self, response: Mapping[str, Any], nonce: str, now: float) -> dict[str, Any]:
-        """Return the claims of the ID token; add claims of the account if the rules need them."""
+        """Return the ID token's claims; add the account's claims if the rules need them."""
         token = response.get("id_token")
         if not isinstance(token, str):
             raise AccessError("the provider sent no ID token: is the scope 'openid' allowed?")
@@ -173,7 +174,7 @@ class OidcSignIn:
         return "?"
 
     def _ends_at(self, response: Mapping[str, Any], claims: Mapping[str, Any], now: float) -> float:
-        """Return the latest end of the sign-in, limited by the provider's session.
+        """Return the latest end of the sign-in, as limited by the provider's session.
 
         The provider may report the end of its session in the claim ``session_expiry`` (OpenID
         Connect Enterprise Extensions) or in ``refresh_expires_in`` (Keycloak).

@@ -50,29 +50,29 @@ class ClaimRule(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class OidcOptions:
-    """The options of one provider."""
+    """One provider's options."""
 
     issuer: str
-    """Address of the provider, exactly as written in its tokens."""
+    """The provider's address, exactly as written in its tokens."""
     client_id: str
-    """Identifier of this server at the provider."""
+    """This server's identifier at the provider."""
     client_secret: str = field(default="", repr=False)
-    """The secret of this server at the provider; "" for a public client."""
+    """This server's secret at the provider; "" for a public client."""
     title: str = ""
     """Text of the sign-in button, such as the name of the school."""
     address: str = ""
-    """Public address of this server, without a path; "" to use the address in each request."""
+    """This server's public address, without a path; "" to use the address in each request."""
     scopes: tuple[str, ...] = _SCOPES
     name: str = "preferred_username"
     """Claim that contains the person's name."""
     authority_file: Path | None = None
-    """Certificate authorities for the provider, in PEM format; None for those of this machine."""
+    """Certificate authorities for the provider, in PEM format; None for the machine's own."""
     longest_s: float = LONGEST_H * 3600
     """Longest duration of a sign-in, in seconds."""
     rules: tuple[ClaimRule, ...] = ()
 
     def grants(self, claims: Mapping[str, Any]) -> tuple[Grant, ...]:
-        """Return the grants of a person with these claims."""
+        """Return the grants for a person with these claims."""
         given = (
             rule.grant
             for rule in self.rules
@@ -83,10 +83,10 @@ class OidcOptions:
 
 
 def claim_values(claims: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """Return the values of a claim as text; a list has several values.
+    """Return a claim's values as text; a list has several values.
 
     Args:
-        claims: the claims of a token.
+        claims: a token's claims.
         name: name of the claim, or a path with dots.
     """
     if name in claims:

@@ -22,7 +22,7 @@ from urc.access.options_file import is_loopback_host
 __all__ = ["KEPT_S", "MOST_BYTES", "OidcProvider", "ProviderMetadata", "TOTAL_S"]
 
 TOTAL_S: Final = 10.0
-"""Timeout of one request, in seconds."""
+"""Timeout for one request, in seconds."""
 MOST_BYTES: Final = 262_144
 """Largest permitted response, in bytes."""
 KEPT_S: Final = 3600.0
@@ -35,7 +35,7 @@ _PATH: Final = "/.well-known/openid-configuration"
 
 
 class ProviderMetadata(NamedTuple):
-    """The parts of a provider's description needed for a sign-in (OpenID Connect Discovery, 3)."""
+    """The parts of a provider's description that a sign-in needs (OpenID Connect Discovery, 3)."""
 
     authorization: str
     """Address of the provider's sign-in page."""
@@ -71,7 +71,7 @@ class OidcProvider:
         self._keys_at = float("-inf")
 
     async def metadata(self) -> ProviderMetadata:
-        """Return the description of the provider, from the cache if possible.
+        """Return the provider's description, from the cache if possible.
 
         Raises:
             AccessError: the provider is unreachable, or its description is invalid.
@@ -93,11 +93,11 @@ class OidcProvider:
             return found
 
     async def keys(self, *, is_fresh: bool = False) -> list[dict[str, Any]]:
-        """Return the keys of the provider, as JSON Web Keys.
+        """Return the provider's keys as JSON Web Keys.
 
         Args:
-            is_fresh: whether the cached keys may be outdated, because a token has an unknown key.
-                Even then, the keys are requested at most once a minute.
+            is_fresh: whether the cached keys may be outdated because a token has an unknown key.
+                Even then, keys are requested at most once a minute.
 
         Raises:
             AccessError: the provider is unreachable, or its response is invalid.
@@ -141,7 +141,7 @@ class OidcProvider:
         return await self._ask("POST", metadata.token, form=form, credentials=credentials)
 
     async def userinfo(self, token: str) -> dict[str, Any]:
-        """Return more claims of a token's account; empty if the provider does not offer them.
+        """Return further claims of a token's account; empty if the provider does not offer any.
 
         Raises:
             AccessError: the provider is unreachable or rejects the token.

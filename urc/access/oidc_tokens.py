@@ -17,7 +17,7 @@ ALGORITHMS: Final = (
 )  # fmt: skip
 """Allowed signature algorithms (RFC 7518, RFC 9864)."""
 LEEWAY_S: Final = 60.0
-"""Tolerated difference between the clocks of this machine and the provider, in seconds."""
+"""Tolerated difference between this machine's clock and the provider's clock, in seconds."""
 _SHORTEST_RSA: Final = 2048
 _LONGEST_TOKEN: Final = 65536
 
@@ -39,10 +39,10 @@ def verified_claims(
 
     Args:
         token: the token.
-        keys: keys of the provider, as JSON Web Keys (RFC 7517).
+        keys: the provider's keys, as JSON Web Keys (RFC 7517).
         issuer: expected issuer.
-        client_id: identifier of this server at the provider.
-        nonce: random text of this sign-in.
+        client_id: this server's identifier at the provider.
+        nonce: random text that belongs to this sign-in.
         now: UTC time in seconds since 1970.
 
     Raises:
@@ -85,7 +85,7 @@ def _time(claims: Mapping[str, Any], name: str) -> float:
 
 
 def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the claims of a token with a valid signature."""
+    """Return a token's claims if its signature is valid."""
     from joserfc import jws, jwt
     from joserfc.errors import BadSignatureError, JoseError
 

@@ -1,4 +1,4 @@
-"""YAML files with sign-in options; every error contains the line.
+"""YAML files with sign-in options; every error message contains the line.
 
 Layer 4. The file contains no secrets. It names other files with the secrets, which only their owner
 may read.
@@ -29,7 +29,7 @@ class OptionsFile:
         """Read the file.
 
         Args:
-            file: path of the file.
+            file: the file's path.
             keys: all permitted keys of the file.
 
         Raises:
@@ -37,7 +37,7 @@ class OptionsFile:
         """
         self._document: Document = read_document(file, _LIMITS)
         self.folder = Path(file).resolve().parent
-        """Folder of the file; paths of other files are relative to this folder."""
+        """The file's folder; paths of other files are relative to this folder."""
         data = self._document.data
         if not isinstance(data, dict):
             raise self.fault((), f"expected the keys: {', '.join(keys)}", "wrong-type")
@@ -69,7 +69,7 @@ class OptionsFile:
     def text_in(
         self, path: DocumentPath, data: dict[str, Any], key: str, default: str | None = None
     ) -> str:
-        """Return the text of a key in the mapping `data` at `path`; see also `text`."""
+        """Return a key's text in the mapping `data` at `path`; see also `text`."""
         value = data.get(key)
         if value is None and default is not None:
             return default
@@ -89,10 +89,10 @@ class OptionsFile:
         return value
 
     def secret(self, key: str, *, shortest: int = 1) -> str:
-        """Return the stripped content of a secret's file; "" if the key is missing.
+        """Return a secret file's content without surrounding spaces; "" if the key is missing.
 
         Args:
-            key: the key that contains the path of the file.
+            key: the key that contains the file's path.
             shortest: minimum length of the secret, in characters.
 
         Raises:

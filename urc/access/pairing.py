@@ -1,4 +1,4 @@
-"""One-time codes that pair a device or let an invited person choose a passphrase.
+"""One-time codes for pairing a device, or with which an invited person chooses a passphrase.
 
 Layer 4. Each function runs in one transaction. The code therefore stays valid after an error, such
 as a name in use. The functions block for a few milliseconds.
@@ -49,14 +49,14 @@ class NewSignIn(NamedTuple):
 def pair(
     store: AccessStore, code: str, name: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
 ) -> NewSignIn:
-    """Add a device with the code of an invitation; return its sign-in, which serves as its key.
+    """Add a device with an invitation's code; return its sign-in, which serves as its key.
 
     Args:
         store: the store.
         code: the code.
         name: name chosen on the device, used if the invitation has no name.
         now: UTC time in seconds since 1970.
-        origin: origin of the request.
+        origin: where the request came from.
 
     Raises:
         AccessError: the code is unknown, or the name is invalid or in use.
@@ -82,7 +82,7 @@ def join(
         code: the code of the invitation.
         kept: hash of the passphrase.
         now: UTC time in seconds since 1970.
-        origin: origin of the request.
+        origin: where the request came from.
 
     Raises:
         AccessError: the code is unknown, or the person was removed.
@@ -110,7 +110,7 @@ def check_number(sign_in: SignIn) -> str:
 
 
 def free_name(directory: Directory, wanted: str) -> str:
-    """Return `wanted`, or a similar free name such as ``Phone 2`` if a device has that name."""
+    """Return `wanted`, or a similar name such as ``Phone 2`` if a device already has that name."""
     number, name = 1, wanted
     while principal_named(directory, "device", name) is not None:
         number += 1

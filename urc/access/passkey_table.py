@@ -1,4 +1,4 @@
-"""Table of all passkeys, in the store of people, devices and programs.
+"""The table of all passkeys, part of the store of people, devices and programs.
 
 Layer 4. A passkey is a public key, so the table contains no secrets. The methods block for a few
 milliseconds, so servers call them in a thread.
@@ -82,7 +82,7 @@ class PasskeyTable:
         return Passkey(*row) if row else None
 
     def of(self, principal: str) -> list[Passkey]:
-        """Return the passkeys of a person, oldest first."""
+        """Return a person's passkeys, oldest first."""
         with self._store.transaction() as base:
             rows = base.execute(
                 "SELECT * FROM passkeys WHERE principal = ? ORDER BY created_at, id", (principal,)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["CHALLENGE_S", "Passkeys", "RelyingParty", "relying_party"]
 
 CHALLENGE_S: Final = 300.0
-"""Time limit of a ceremony and of the browser's dialog, in seconds."""
+"""Time limit for a ceremony and for the browser's dialog, in seconds."""
 _NAME: Final = "URC"
 _LOCAL: Final = "localhost"
 _DEFAULT_PORTS: Final = {"http": 80, "https": 443}
@@ -56,7 +56,7 @@ class _Ceremony(NamedTuple):
 
 
 def relying_party(host: str, port: int | None) -> RelyingParty:
-    """Return the relying party of a request.
+    """Return the relying party for a request.
 
     Args:
         host: host of the request's ``Host`` header; an IPv6 address keeps its brackets.
@@ -79,7 +79,7 @@ def relying_party(host: str, port: int | None) -> RelyingParty:
 
 
 class Passkeys:
-    """The ceremonies of one server."""
+    """One server's ceremonies."""
 
     def __init__(self, table: PasskeyTable, clock: Callable[[], float] = time.monotonic) -> None:
         """Initialize without pending challenges.
@@ -101,7 +101,7 @@ class Passkeys:
         Args:
             owner: the signed-in person.
             party: this server.
-            place: network address of the request.
+            place: network address that the request came from.
 
         Raises:
             AccessError: the person has too many passkeys.
@@ -143,7 +143,7 @@ class Passkeys:
             owner: the signed-in person who requested the options.
             party: this server.
             response: the result of ``navigator.credentials.create``, as JSON.
-            name: display name of the passkey.
+            name: the passkey's display name.
             now: UTC time in seconds since 1970.
 
         Raises:
@@ -175,7 +175,7 @@ class Passkeys:
 
         Args:
             party: this server.
-            place: network address of the request.
+            place: network address that the request came from.
         """
         from webauthn import generate_authentication_options
         from webauthn.helpers.structs import UserVerificationRequirement
@@ -260,7 +260,7 @@ def _challenge_of(answer: Mapping[str, Any]) -> str:
 
 
 def _owner_of(answer: Mapping[str, Any]) -> str:
-    """Return the owner's id from the authenticator's response; "" without an id."""
+    """Return the owner's id from the authenticator's response; "" if there is no id."""
     try:
         return _bytes(answer["response"].get("userHandle") or "").decode()
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -268,7 +268,7 @@ def _owner_of(answer: Mapping[str, Any]) -> str:
 
 
 def _verified(verify: Callable[..., Any], **given: Any) -> Any:
-    """Return the result of the library's check; raise `AccessError` for any failure."""
+    """Return the result of the library's check; raise `AccessError` if the check fails."""
     try:
         return verify(**given)
     except Exception as error:

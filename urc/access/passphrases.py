@@ -1,4 +1,4 @@
-"""Passphrases: rules for new passphrases, argon2id hashes, and the check at sign-in.
+"""Passphrases: rules for new ones, argon2id hashes, and the check at sign-in.
 
 Layer 4. A hash is deliberately slow and takes about 50 ms and 64 MiB. Servers therefore compute one
 hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, the second recommended choice of
@@ -45,7 +45,7 @@ The hash is a literal, because computing it would delay each server start by 50 
 
 
 def hash_of(passphrase: str, *, name: str = "") -> str:
-    """Return the hash of a new passphrase, with its salt and parameters.
+    """Return a new passphrase's hash, with its salt and parameters.
 
     Raises:
         AccessError: the passphrase is too short, too long, too uniform, identical to the name, or
@@ -69,7 +69,7 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
 
 
 def matches(passphrase: str, kept: str | None) -> bool:
-    """Return whether `passphrase` matches the hash; the check always takes the time of one hash.
+    """Return whether `passphrase` matches the hash; the check always takes as long as one hash.
 
     Args:
         passphrase: passphrase entered at the sign-in.
@@ -96,8 +96,8 @@ def is_stale(kept: str) -> bool:
 def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
     """Return the id of the person with this name and passphrase; "" if either is wrong.
 
-    An unknown name and a wrong passphrase take the same time. A hash with outdated parameters is
-    replaced. The call blocks for about 50 ms.
+    Checking takes equally long for an unknown name and for a wrong passphrase. A hash with outdated
+    parameters is replaced. The call blocks for about 50 ms.
 
     Raises:
         AccessError: the store cannot be used.

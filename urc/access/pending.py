@@ -1,4 +1,4 @@
-"""Pending sign-ins, which wait a short time for their second request and can be used once.
+"""Pending sign-ins, which briefly wait for their second request and can be used only once.
 
 Layer 4. Pure. A passkey signs a challenge of the server. An OpenID Connect provider returns the
 browser with a state. The limits restrict the memory that unknown visitors can occupy.
@@ -14,7 +14,7 @@ __all__ = ["MOST_PENDING", "MOST_PENDING_HERE", "Pending", "place_of"]
 MOST_PENDING: Final = 2048
 """Maximum number of pending sign-ins; above the limit, the oldest is dropped."""
 MOST_PENDING_HERE: Final = 16
-"""Maximum number of pending sign-ins per place; above the limit, the place's oldest is dropped."""
+"""Maximum number of pending sign-ins per place; above the limit, that place's oldest is dropped."""
 _SUBNET: Final = 64
 
 _Value = TypeVar("_Value")
@@ -27,7 +27,7 @@ class _Entry(NamedTuple, Generic[_Value]):
 
 
 class Pending(Generic[_Value]):
-    """Values, accessible by random 256-bit keys."""
+    """Values that are stored under random 256-bit keys."""
 
     def __init__(self, lasts_s: float) -> None:
         """Initialize without values.
@@ -47,7 +47,7 @@ class Pending(Generic[_Value]):
 
         Args:
             value: the value, which can be retrieved once.
-            place: network address of the visitor.
+            place: the visitor's network address.
             now: monotonic time in seconds.
         """
         place = place_of(place)
@@ -63,7 +63,7 @@ class Pending(Generic[_Value]):
         return key
 
     def finish(self, key: str, now: float) -> _Value | None:
-        """Return the value of a key and delete the key; None for an unknown or expired key."""
+        """Return a key's value and delete the key; None for an unknown or expired key."""
         self._forget_old(now)
         entry = self._entries.pop(key, None)
         return entry.value if entry else None
@@ -77,7 +77,8 @@ class Pending(Generic[_Value]):
 def place_of(address: str) -> str:
     """Return the part of an address that identifies a visitor's network for the limits.
 
-    A device can use any of 2⁶⁴ addresses in its IPv6 network, so the limit applies to the network.
+    A device can use any of the 2⁶⁴ addresses in its IPv6 network, so the limit applies to the
+    network.
     """
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])

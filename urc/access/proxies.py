@@ -34,34 +34,34 @@ class TrustedProxy:
     """One trusted proxy."""
 
     name: str
-    """Name of the proxy in logs."""
+    """The proxy's name in logs."""
     user_header: bytes
     """Name of the header with the person's name, in lower case."""
     secret_header: bytes
     """Name of the header with the secret, in lower case."""
     secret: bytes = field(repr=False)
     new_people: tuple[Grant, ...] = ()
-    """Grants of a new person; if empty, new people are rejected."""
+    """Grants for a new person; if empty, new people are rejected."""
 
 
 class ProxiedRequest(NamedTuple):
-    """The headers of one request after the proxy check."""
+    """One request's headers after the proxy check."""
 
     headers: list[tuple[bytes, bytes]]
     """The headers without proxy headers."""
     proxy: TrustedProxy | None = None
     """The proxy whose secret was correct, or None."""
     user: str = ""
-    """Name of the person according to the proxy; "" if the proxy sent no name."""
+    """The person's name according to the proxy; "" if the proxy sent no name."""
     fault: str = ""
-    """Reason why proxy headers were ignored, or ""."""
+    """Reason why proxy headers were ignored; "" if they were not."""
 
 
 def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) -> ProxiedRequest:
-    """Return a request's headers without proxy headers, and the person confirmed by a proxy.
+    """Return a request's headers without proxy headers, and the person that a proxy confirmed.
 
     Args:
-        headers: headers of the request, with names in lower case.
+        headers: the request's headers, with names in lower case.
         proxies: the trusted proxies.
     """
     kept = list(headers)

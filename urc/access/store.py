@@ -1,8 +1,8 @@
 """The store of people, devices, programs, sign-ins and pairing codes: one private SQLite file.
 
-Layer 4. Secrets are stored as hashes only. Several processes can use the file: the server and the
-management commands on the same machine. `changed` reports changes by other processes, so a removal
-on the command line takes effect on a running server.
+Layer 4. Secrets are stored as hashes only. Several processes can use the file at once: the server,
+and management commands on the same machine. `changed` reports changes by other processes, so a
+removal on the command line takes effect on a running server.
 
 Theory of operation. Each change is one transaction. `directory` reads all tables, with at most a
 few thousand rows, into an immutable `Directory`. Readers never see a partial change.
@@ -94,7 +94,7 @@ class Invitation(NamedTuple):
 
 
 class AccessStore:
-    """The file; its methods block for a few milliseconds, so servers call them in a thread."""
+    """The store; its methods block for a few milliseconds, so servers call them in a thread."""
 
     def __init__(self, folder: Path) -> None:
         """Open the file, and create it if it is missing.
@@ -140,7 +140,7 @@ class AccessStore:
         return was != self._seen
 
     def instance(self) -> str:
-        """Return the identifier of this store, which is part of its cookies' names."""
+        """Return this store's identifier, which is part of its cookies' names."""
         with self._lock, self._readable():
             (instance,) = self._base.execute("SELECT instance FROM server").fetchone()
         return str(instance)
@@ -169,13 +169,13 @@ class AccessStore:
         """Add a principal and return it.
 
         Args:
-            kind: kind of the principal.
-            name: name of the principal, unique within its kind, ignoring case.
-            grants: grants of the principal.
+            kind: the principal's kind.
+            name: the principal's name, unique within its kind, ignoring case.
+            grants: the principal's grants.
             now: UTC time in seconds since 1970.
             owner: id of the person who owns the device.
             commands: commands that a program may send; empty for all commands of its role.
-            ends_at: UTC time at which all rights end; None for no end.
+            ends_at: UTC time at which all rights end; None if they never end.
 
         Raises:
             AccessError: the name is empty, too long or in use, or there are too many principals.
@@ -211,7 +211,7 @@ class AccessStore:
             raise AccessError(f"the name {name!r} is in use") from None
 
     def set_grants(self, principal: str, grants: Iterable[Grant]) -> None:
-        """Replace the grants of a principal; raise `AccessError` if the principal is unknown."""
+        """Replace a principal's grants; raise `AccessError` if the principal is unknown."""
         self._update(
             "UPDATE principals SET grants = ? WHERE id = ?", grants_to_json(grants), principal
         )
@@ -233,7 +233,7 @@ class AccessStore:
     # Passphrases
 
     def set_passphrase(self, principal: str, kept: str) -> None:
-        """Store the hash of a passphrase; raise `AccessError` if the principal is unknown."""
+        """Store a passphrase's hash; raise `AccessError` if the principal is unknown."""
         with self._change():
             try:
                 self._base.execute(

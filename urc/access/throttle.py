@@ -1,9 +1,9 @@
-"""Rate limit for failed attempts to sign in, pair or open a link.
+"""Rate limit for failed attempts to sign in, pair a device or open a link.
 
 Layer 4. Pure. Each address and each attempted name has its own count of failures. After `FREE`
-failures, each further failure doubles the wait, up to `LONGEST_S`. A success clears only the count
-of the name, so an attacker with one valid account cannot clear the count of an address. STOP is
-never throttled here.
+failures, each further failure doubles the wait, up to `LONGEST_S`. A success clears only the name's
+count, so an attacker with one valid account cannot clear the address's count. STOP is never
+throttled here.
 """
 
 from collections import OrderedDict
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 __all__ = ["FREE", "LONGEST_S", "MOST", "Throttle"]
 
 FREE: Final = 5
-"""Number of failures without a wait."""
+"""Number of failures that cause no wait."""
 LONGEST_S: Final = 30.0
 """Longest wait between two attempts, in seconds."""
 FORGET_S: Final = 900.0
@@ -37,7 +37,7 @@ class Throttle:
 
         Args:
             now: monotonic time in seconds.
-            keys: keys of the attempt, such as its address and the attempted name.
+            keys: what identifies the attempt, such as its address and the attempted name.
         """
         return max((self._wait_s(now, key) for key in keys), default=0.0)
 
@@ -52,7 +52,7 @@ class Throttle:
             self._buckets.popitem(last=False)
 
     def succeeded(self, key: str) -> None:
-        """Forget the failures of a name after its owner has signed in."""
+        """Forget a name's failures after its owner has signed in."""
         self._buckets.pop(key, None)
 
     def _bucket(self, now: float, key: str) -> _Bucket:

@@ -1,11 +1,12 @@
-"""The alarms of one robot: a state machine for each signal with limits, as in ISA-18.2.
+"""One robot's alarms: a state machine for each signal with limits, as in ISA-18.2.
 
 Layer 3. Pure. The inputs are sample alarms, suppression, lost values and operator actions, each
 with its time. The outputs are the records and the history events.
 
-An alarm leaves the list only after an acknowledged return to normal, or with a new document. An
-alarm stays if its value becomes unknown. A chattering alarm (3 activations in a minute) ends only
-after 10 s of normal values, so it does not flash or fill the history.
+An alarm leaves the list only after an acknowledged return to normal, or when a new document no
+longer declares it. An alarm stays in the list if its value becomes unknown. A chattering alarm (3
+activations in a minute) ends only after 10 s of normal values, so it does not flash or fill the
+history.
 """
 
 from collections import deque
@@ -35,7 +36,7 @@ __all__ = [
 CHATTER_TIMES: Final = 3
 CHATTER_S: Final = 60.0
 SETTLE_S: Final = 10.0
-"""Time of normal values after which a chattering alarm ends, in seconds."""
+"""How long values must be normal before a chattering alarm ends, in seconds."""
 LONGEST_SHELF_S: Final = 86_400.0
 
 
@@ -52,11 +53,11 @@ class AlarmList:
     def __init__(
         self, limits: Mapping[str, AlarmLimits], records: Iterable[AlarmRecord] = ()
     ) -> None:
-        """Continue the alarms of an earlier run.
+        """Continue with the alarms from an earlier run.
 
         Args:
-            limits: limits by signal; alarms of other signals are not allowed.
-            records: the records of the last run. Their values are now unknown.
+            limits: limits by signal; alarms for other signals are not allowed.
+            records: the records from the last run. Their values are now unknown.
         """
         self.records: dict[str, AlarmRecord] = {
             one.signal: one._replace(is_known=False) for one in records
@@ -77,7 +78,7 @@ class AlarmList:
         )
         self._activations: dict[str, deque[float]] = {}
         self._settling: dict[str, float] = {}
-        """End time of each chattering alarm with a normal value, by signal."""
+        """Time at which each chattering alarm with a normal value ends, by signal."""
 
     @property
     def is_flooded(self) -> bool:
@@ -100,7 +101,7 @@ class AlarmList:
     # The robot
 
     def judge(self, signal: str, alarm: Alarm, value: Reading, now: float) -> None:
-        """Process the alarm of a sample; an unavailable value ends no alarm."""
+        """Process a sample's alarm; an unavailable value does not end an alarm."""
         if value is None:
             self.forget((signal,), now)
             return
@@ -177,7 +178,7 @@ class AlarmList:
         self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
-        """Mark values as unknown because of a lost link or stale values; alarms stay."""
+        """Mark values as unknown after a lost link or after values became stale; alarms stay."""
         for signal in signals:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
@@ -185,7 +186,7 @@ class AlarmList:
                 self._record(self._put(record._replace(is_known=False)), "unknown", now)
 
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
-        """Set the pairs of signal and condition that are now suppressed by design.
+        """Set the pairs of signal and condition that are suppressed by design from now on.
 
         Alarms of unknown values stay unchanged until their next value.
         """
@@ -205,7 +206,7 @@ class AlarmList:
             self._raise(judged, now)
 
     def adopt(self, limits: Mapping[str, AlarmLimits], now: float) -> None:
-        """Use another document's limits, and remove alarms that the document does not declare."""
+        """Use another document's limits, and remove alarms that this document does not declare."""
         self._limits = limits
         self._settling.clear()
         for record in [*self.records.values()]:
@@ -229,7 +230,7 @@ class AlarmList:
 
         Args:
             raised: the attribute `raised` of each alarm that the operator saw, by signal. An alarm
-            that has been raised again since then is not acknowledged.
+                that has been raised again since then is not acknowledged.
             actor: the person or program.
             now: UTC time in seconds.
         """
@@ -316,7 +317,7 @@ class AlarmList:
             self._events.append(AlarmEvent(now, "", kind))
 
     def _judged(self, record: AlarmRecord) -> AlarmRecord:
-        """Return the record with its condition's present suppression."""
+        """Return the record, marked as suppressed if its active condition is suppressed now."""
         pair = record.signal, record.condition
         return record._replace(is_suppressed=record.is_active and pair in self._suppressed)
 

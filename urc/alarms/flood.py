@@ -2,7 +2,7 @@
 
 Layer 3. Pure. A flood begins with more than 10 alarms in 10 minutes, because one operator can
 handle at most 10. A flood ends with fewer than 5 alarms in 10 minutes. A burst is a sequence of
-alarms with short gaps. The first alarm of a burst is often the cause of the others.
+alarms with short gaps. The first alarm in a burst is often the cause of the others.
 """
 
 from collections import deque
@@ -12,9 +12,9 @@ __all__ = ["BURST_GAP_S", "FLOOD_BEGINS", "FLOOD_ENDS", "FLOOD_S", "FloodDetecto
 
 FLOOD_S: Final = 600.0
 FLOOD_BEGINS: Final = 10
-"""Highest number of alarms in `FLOOD_S` without a flood."""
+"""Highest number of alarms in `FLOOD_S` that is not yet a flood."""
 FLOOD_ENDS: Final = 5
-"""A flood ends with fewer alarms than this in `FLOOD_S`."""
+"""A flood ends when fewer alarms than this number occurred in `FLOOD_S`."""
 BURST_GAP_S: Final = 5.0
 """Longest time between two alarms of one burst, in seconds."""
 

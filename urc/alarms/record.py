@@ -1,4 +1,4 @@
-"""The state of one alarm, and the events of its history.
+"""The state of one alarm, and the events in its history.
 
 Layer 3. Pure. All times are in UTC seconds since 1970, because shelves end at a time of day and
 states survive a restart.
@@ -85,11 +85,11 @@ class AlarmRecord(NamedTuple):
 
 
 class AlarmEvent(NamedTuple):
-    """One event of the history."""
+    """One event in the history."""
 
     at: float
     signal: str
-    """Name of the signal; "" for a flood."""
+    """The signal's name; "" for a flood."""
     kind: AlarmEventKind
     condition: str = ""
     priority: AlarmPriority = "medium"
@@ -102,7 +102,7 @@ class AlarmEvent(NamedTuple):
     until: float = 0.0
     """End time of a shelf."""
     times: int = 1
-    """Number of equal activations that the event represents."""
+    """Number of identical activations that the event represents."""
 
 
 def condition_of(alarm: Alarm, value: Reading, limits: AlarmLimits) -> str:

@@ -40,7 +40,7 @@ _SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
 
 
 class _Exit(Exception):
-    """An exception that ends parsing after help text or an error message was printed."""
+    """An exception that ends parsing after help text or an error message has been printed."""
 
 
 class _ArgumentParser(argparse.ArgumentParser):
@@ -69,7 +69,7 @@ def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Na
 
 
 def describe(parser: argparse.ArgumentParser, summary: str, module: Any) -> None:
-    """Add the description, example and arguments of a subcommand to a parser."""
+    """Add a subcommand's description, example and arguments to a parser."""
     parser.description = summary[0].upper() + summary[1:] + "."
     parser.epilog = f"example:\n  {module.EXAMPLE}"
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -185,7 +185,7 @@ def what_it_has(word: str, known: Iterable[str]) -> str:
 def duration(text: str) -> float:
     """Return a duration in seconds, greater than 0.
 
-    `text` is a number of seconds, or a number with ms, s, m or h.
+    `text` is a number of seconds, or a number with the unit ms, s, m or h.
     """
     found = _DURATION.fullmatch(text)
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0

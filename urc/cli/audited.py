@@ -1,4 +1,4 @@
-"""Audit entries about commands on this machine, in the audit log of the data folder.
+"""Audit entries about commands run on this machine, in the data folder's audit log.
 
 A running server may write to the same file. Both processes extend the same hash chain.
 """
@@ -19,7 +19,7 @@ _WAIT_S = 2.0
 
 
 def audit_access(data: Path, command: str, **about: object) -> None:
-    """Record a change of people, devices, programs or roles by a command.
+    """Record a command's change to people, devices, programs or roles.
 
     Args:
         data: the data folder.
@@ -30,7 +30,7 @@ def audit_access(data: Path, command: str, **about: object) -> None:
 
 
 def audit_packages(command: str, packages: Iterable[object]) -> None:
-    """Record a change of packages or repositories by a command.
+    """Record a command's change to packages or repositories.
 
     Args:
         command: the change, such as ``install``.

@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "InstallPlan":
-    """Return the packages, preferably in the installed versions, because these are tested."""
+    """Return the packages, preferably their installed versions, which have been tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_requirement

@@ -1,7 +1,6 @@
 """Colours of terminal output, according to https://no-color.org and the type of terminal.
 
-Layer 6. Colours never convey additional information, because the coloured words state the same
-meaning.
+Layer 6. Colours never add information, because the coloured words already express the meaning.
 """
 
 import os
@@ -21,11 +20,11 @@ _CODES: dict[str, str] = {
     "quiet": "2",
     "title": "1",
 }
-"""Parameters of the control sequence SGR (ECMA-48, 8.3.117)."""
+"""Parameters of SGR control sequences (ECMA-48, 8.3.117)."""
 
 
 def is_terminal(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
-    """Return whether a stream is a terminal that understands control sequences."""
+    """Return whether a stream is a terminal that supports control sequences."""
     try:
         return stream.isatty() and environment.get("TERM") != "dumb"
     except ValueError:  # a closed stream

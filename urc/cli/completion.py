@@ -1,7 +1,7 @@
 """`urc completion`: print the script that completes `urc` in a shell.
 
 At each press of Tab, argcomplete runs `urc` with the command line in the environment. The
-completions therefore match the installed version and include the robots of this machine.
+completions therefore match the installed version and include the robots on this machine.
 """
 
 import argparse

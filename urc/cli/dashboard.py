@@ -65,7 +65,7 @@ class DashboardAddress:
     tiles: Path | None = None
     """Folder of map tiles; None means maps without background tiles."""
     is_open: bool = False
-    """Whether visitors without a sign-in may watch and drive."""
+    """Whether visitors who have not signed in may watch and drive."""
     shows_installed: bool = False
     """Whether the menu lists installed robots and drivers."""
     trusted: Sequence[str] = ()
@@ -73,13 +73,13 @@ class DashboardAddress:
     recordings: Path | None = None
     """Folder for recordings of all sessions; None disables recording."""
     recorder: ServerRecorder | None = None
-    """Destination of audit entries about recordings."""
+    """Receiver of audit entries about recordings."""
     tls: TlsOptions = PLAIN
     """HTTPS certificate, and public names of a web server in front of this server."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
     """Sign-in options."""
     monitors: bool = False
-    """Default for robots: whether they stay connected for their alarms."""
+    """Whether robots stay connected for their alarms by default."""
     notify: NotifyOptions | None = None
     """Hook for alarm notifications; None disables notifications."""
 
@@ -106,8 +106,8 @@ def run_dashboard(
         faults: faults to inject into emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
 
     Raises:
-        UrcError: the port is not available, two robots have the same name, or a fault is
-            impossible.
+        UrcError: the port is not available, two robots have the same name, or a fault cannot be
+            injected.
     """
     names = [profile.name for profile in profiles]
     for name in names:
@@ -182,7 +182,7 @@ async def _serve(
 
 
 def _options(place: DashboardAddress) -> DashboardOptions:
-    """Return the options of the application that the command line determines."""
+    """Return the application options that are set on the command line."""
     return DashboardOptions(
         allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
         tiles=place.tiles,
@@ -194,7 +194,7 @@ def _options(place: DashboardAddress) -> DashboardOptions:
 
 
 async def _warn_of(data: Path) -> None:
-    """Print warnings about a wrong clock and about an interrupted restore of the data folder."""
+    """Print warnings about a wrong clock and an interrupted restore of the data folder."""
     if warning := await asyncio.to_thread(clock_warning, data):
         complain(f"urc: {warning}")
     if is_interrupted(data):
@@ -263,7 +263,7 @@ def _motion(place: DashboardAddress) -> Motion:
 
 
 def _first(factory: RobotFactory, profile: Profile) -> Robot:
-    """Return a robot of the command line, with its stored settings if they are valid."""
+    """Return a robot from the command line, with its stored settings if they are valid."""
     try:
         return factory.robot(profile.name, profile)
     except UrcError as error:

@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _invite_phone(address: str) -> None:
-    """Print a link and a QR code that pair one device with the role drive."""
+    """Print a link and a QR code for pairing one device with the role ``drive``."""
     from urc.cli.devices import invite_device
     from urc.cli.identities import opened, roles_in
 

@@ -148,7 +148,7 @@ def invite_device(
 
 
 def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add roles to a device, or remove roles."""
+    """Add roles to a device, or remove roles from it."""
     return change_roles(store, "device", arguments, "devices")
 
 

@@ -41,7 +41,7 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""Extra and purpose of each optional package."""
+"""For each optional package, the extra that installs it and its purpose."""
 OPTIONAL = {
     "google-re2": "patterns without provably linear run time; refused without this package",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",

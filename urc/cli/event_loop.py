@@ -60,7 +60,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
 
 
 class _OneLine(logging.Formatter):
-    """A formatter of readable log lines with exception names, but without tracebacks."""
+    """A formatter for readable log lines that contain exception names but no tracebacks."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""

@@ -26,7 +26,7 @@ __all__ = ["FaultInjector", "add_faults"]
 _LONGEST: Final = 4096
 """Maximum length of a line, in bytes; longer lines are dropped."""
 _MOST_WAITING: Final = 64
-"""Maximum number of unread lines; further lines are dropped."""
+"""Maximum number of unread lines; additional lines are dropped."""
 
 
 async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
@@ -112,8 +112,7 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
 class FaultInjector:
     """The emulated robots of one process, and their injected faults.
 
-    A robot's faults persist when its emulation restarts, for example after a change of its
-    settings.
+    A robot's faults persist when its emulation restarts, for example after its settings change.
     """
 
     def __init__(self, now: Callable[[], float] = time.time) -> None:
@@ -125,7 +124,7 @@ class FaultInjector:
         self._now = now
         self._emulated_robots: dict[str, list[EmulatedRobot]] = {}
         self._wrong: dict[str, dict[str, str]] = {}
-        """Faults of each robot for its next emulation, by robot name."""
+        """Each robot's faults for its next emulation, by robot name."""
 
     @contextmanager
     def watch(self, name: str, emulated_robot: "EmulatedRobot") -> Iterator[None]:
@@ -141,7 +140,7 @@ class FaultInjector:
             emulated_robots.remove(emulated_robot)
 
     def begin(self, texts: Sequence[str]) -> None:
-        """Inject the command-line faults; raise `Misuse` for an impossible fault."""
+        """Inject the command-line faults; raise `Misuse` if a fault cannot be injected."""
         for text in texts:
             try:
                 self.inject(text)

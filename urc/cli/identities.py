@@ -41,7 +41,7 @@ __all__ = [
 Action = Callable[["AccessStore", argparse.Namespace], int]
 """Function that runs one action of a command, such as ``add``."""
 _FIRST_ACTIONS = ("add", "invite", "pair")
-"""Actions that are permitted to create the data folder."""
+"""Actions that may create the data folder."""
 _LONGEST_DAYS = 3650
 _SPAN = re.compile(r"([0-9]{1,5})(m|h|d)")
 _SECONDS = {"m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -114,7 +114,7 @@ def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]
 
 
 def named(store: "AccessStore", kind: "Kind", name: str) -> "Principal":
-    """Return the principal of this kind and name; raise `UrcError` with a suggestion."""
+    """Return the principal of this kind and name, or raise `UrcError` with a suggestion."""
     from urc.access.administration import principal_named
     from urc.cli.arguments import what_it_has
 
@@ -140,7 +140,7 @@ def roles_in(texts: Sequence[str] | None) -> tuple["Grant", ...]:
 def change_roles(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str
 ) -> int:
-    """Run ``grant`` or ``revoke``: add roles to a person or device, or remove roles."""
+    """Run ``grant`` or ``revoke``: add or remove roles of a person or device."""
     from urc.access.administration import change_grants
 
     (name,) = words_of(arguments, verb, "NAME")
@@ -179,7 +179,7 @@ def rename(store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, ve
 def remove(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str, result: str
 ) -> int:
-    """Run ``remove``: remove a person, device or program; `result` ends the printed message."""
+    """Run ``remove``: remove a person, device or program; append `result` to the message."""
     (name,) = words_of(arguments, verb, "NAME")
     principal = named(store, kind, name)
     store.remove(principal.id)
@@ -246,7 +246,7 @@ def show(
 
     Args:
         rows: one object for each entry, for JSON.
-        table: the header row, then one row of texts for each entry.
+        table: the header row, followed by one row of texts for each entry.
         arguments: arguments with `--format`.
         empty: message for an empty list.
     """

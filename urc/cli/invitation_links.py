@@ -64,7 +64,7 @@ def qr_lines(text: str, columns: int) -> Iterator[str]:
     """Yield the lines of a QR code, black on white on any background.
 
     Each line shows two rows of modules. If the terminal is too narrow or cannot show half blocks,
-    yield nothing.
+    the function yields nothing.
     """
     import segno
 
@@ -101,7 +101,7 @@ def _parsed(address: str) -> str:
 
 
 def _running(data: Path) -> str:
-    """Return the newest server's address, preferably for other devices; "" without a server."""
+    """Return the newest server's address, preferably for other devices; "" if no server runs."""
     from urc.runtime.running_servers import servers
 
     running = list(servers(data).values())
@@ -115,7 +115,7 @@ def _running(data: Path) -> str:
 
 
 def _fingerprint(data: Path) -> str:
-    """Return the fingerprint of the local certificate authority; "" without an authority."""
+    """Return the local certificate authority's fingerprint; "" if there is no authority."""
     from urc.access.authority import AUTHORITY_FOLDER, fingerprint
 
     file = data / AUTHORITY_FOLDER / "authority.pem"

@@ -60,7 +60,7 @@ def _migrate(file: str, *, is_check: bool) -> bool:
 
 
 def _write(file: str, content: bytes) -> None:
-    """Replace the content of a file atomically. After a failure, the file keeps its old content.
+    """Replace a file's content atomically. After a failure, the file keeps its old content.
 
     Symbolic links and file permissions are preserved.
     """

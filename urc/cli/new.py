@@ -70,7 +70,7 @@ def _filled(text: str, name: str, folder: Path) -> str:
 def _path_to(target: Path, folder: Path) -> str:
     """Return the path from a folder to a URC file.
 
-    The path is relative if both are in one checkout, and otherwise absolute.
+    The path is relative if both are in the same checkout, and otherwise absolute.
     """
     home = shipped("schemas").parent.resolve()
     if folder.resolve().is_relative_to(home):

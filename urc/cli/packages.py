@@ -103,7 +103,7 @@ def is_path(word: str) -> bool:
 def planned(
     word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False
 ) -> "InstallPlan":
-    """Return the install plan of a package name, file or folder, with all archives downloaded."""
+    """Return the install plan for a package name, file or folder, with all archives downloaded."""
     from urc.packages.install import plan_file, plan_requirement
     from urc.packages.names import parse_requirement
     from urc.packages.sources import open_source
@@ -123,7 +123,7 @@ def planned(
 
 @contextmanager
 def _working(title: str) -> Iterator[Callable[[str], None]]:
-    """Show a status line; the yielded function stores messages and prints them after the work."""
+    """Show a status line; the yielded function stores messages, which are printed at the end."""
     from urc.cli.progress import Progress
 
     notes: list[str] = []
@@ -160,7 +160,7 @@ def add_risks(parser: argparse.ArgumentParser) -> None:
 
 
 def add_waivers(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that accepts packages without a signature, by name."""
+    """Declare the option that names packages to accept without a signature."""
     parser.add_argument(
         "--allow-unsigned",
         metavar="NAME",
@@ -184,7 +184,7 @@ def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
 
 
 def is_agreed(question: str) -> bool:
-    """Ask the user a yes-or-no question; raise `Misuse` without a terminal."""
+    """Ask the user a yes-or-no question; raise `Misuse` if there is no terminal."""
     if not sys.stdin.isatty():
         raise Misuse("no terminal is available for the question; use --yes to confirm in advance")
     try:
@@ -202,7 +202,7 @@ def is_agreed_to(
     """Ask the user, unless `--yes` is given. New permissions require an additional option.
 
     Args:
-        difference: changes from the installed version; None without an installed version.
+        difference: changes from the installed version; None if no version is installed.
         risks: local resources that the package itself specifies.
         arguments: parsed arguments with ``yes``, ``allow_more`` and ``takes_risks``.
         question: question to the user, such as ``Update it?``.
@@ -264,7 +264,7 @@ def _warn(line: str) -> None:
 
 
 def signer(file: Path | None = None) -> "Signer | None":
-    """Return the key in the given file, or this user's own key; None without a key.
+    """Return the key in the given file, or this user's own key; None if there is no key.
 
     Raises:
         Misuse: the given file does not exist.
@@ -278,7 +278,7 @@ def signer(file: Path | None = None) -> "Signer | None":
 
 
 def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool = False) -> int:
-    """Print the newest version of each package that matches all words; return 1 without a match."""
+    """Print the newest version of each package that matches all words; return 1 if none match."""
     from urc.cli.output import json_text
     from urc.packages.index import search
     from urc.packages.sources import merged

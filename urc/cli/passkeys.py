@@ -42,10 +42,10 @@ def list_passkeys(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def remove_passkey(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a passkey, for example of a lost phone, and end the person's passkey sign-ins.
+    """Remove a passkey, such as a lost phone's, and end the person's passkey sign-ins.
 
     Raises:
-        UrcError: the name or id prefix matches no passkey of the person, or several passkeys.
+        UrcError: the name or id prefix matches none of the person's passkeys, or several of them.
     """
     from urc.access.administration import end_sign_ins
     from urc.access.passkey_table import PasskeyTable

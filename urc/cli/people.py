@@ -132,7 +132,7 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add roles to a person, or remove roles."""
+    """Add roles to a person, or remove roles from them."""
     return change_roles(store, "person", arguments, "people")
 
 
@@ -142,7 +142,7 @@ def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Remove a person with all of their devices and sign-ins."""
+    """Remove a person and all of their devices and sign-ins."""
     return remove(store, "person", arguments, "people", ", with all sign-ins and devices")
 
 

@@ -16,7 +16,7 @@ from urc.problems import printable
 __all__ = ["Progress"]
 
 _FIRST_S = 0.4
-"""Delay before the first status line, in seconds, so that short work shows no status line."""
+"""Delay before the first status line, in seconds; shorter work shows no status line."""
 _EVERY_S = 0.2
 _COLUMNS = 78
 _ERASE = "\r\x1b[K"
@@ -61,7 +61,7 @@ class Progress:
             self._thread.join()
 
     def step(self, detail: str = "") -> None:
-        """Start the next step, such as the robot ``puppet``."""
+        """Start the next step; `detail` names it, for example ``puppet`` for a robot."""
         self._done += 1
         self._detail = detail
 

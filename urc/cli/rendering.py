@@ -1,7 +1,7 @@
 """The warning about emulated robots without cameras and laser scanners.
 
-Layer 6. These simulated sensors need an extra, because real robots do not use it; see
-docs/decisions/0045.
+Layer 6. Simulated cameras and laser scanners need a separate extra, because real robots do not use
+it; see docs/decisions/0045.
 """
 
 from collections.abc import Iterable

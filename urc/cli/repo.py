@@ -187,7 +187,7 @@ def _search(arguments: argparse.Namespace) -> int:
 
 
 def _index(arguments: argparse.Namespace) -> int:
-    """Write the index of a folder for a static web server; return 1 after a rejected package."""
+    """Write a folder's index for a static web server; return 1 if a package was rejected."""
     from urc.packages.index_builder import make_index
     from urc.runtime.package_check import examine
 
@@ -203,7 +203,7 @@ def _index(arguments: argparse.Namespace) -> int:
 
 
 def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
-    """Return the signer of the index; None without a key."""
+    """Return the index's signer; None if there is no key."""
     from urc.cli.packages import signer
     from urc.packages.index_head import IndexSigner
 
@@ -267,7 +267,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 
 async def _renewing(folder: Path, codec: "IndexSigner | None") -> None:
-    """Renew the signature of the index before it expires, while the repository is served."""
+    """Renew the index's signature before it expires, while the repository is served."""
     from urc.packages.index_builder import renew
     from urc.packages.names import PackageError
 
@@ -280,7 +280,7 @@ async def _renewing(folder: Path, codec: "IndexSigner | None") -> None:
 
 
 def _tokens(arguments: argparse.Namespace, folder: Path) -> "UploadTokens | None":
-    """Return the upload tokens; None without a token file."""
+    """Return the upload tokens; None if there is no token file."""
     from urc.packages.tokens import UploadTokens
 
     file: Path | None = arguments.tokens

@@ -116,7 +116,7 @@ def _import(known: "BlockStore", file: Path, fingerprint: str) -> None:
 
 
 def _check_trust(known: "BlockStore", found: "BlockFile", file: Path, fingerprint: str) -> None:
-    """Raise `PackageError` unless the user trusts the key of a list."""
+    """Raise `PackageError` unless the user trusts the block list's key."""
     from urc.cli.packages import repositories
     from urc.packages.names import PackageError
 
@@ -134,7 +134,7 @@ def _check_trust(known: "BlockStore", found: "BlockFile", file: Path, fingerprin
 
 
 def _tell_hits() -> None:
-    """Print the blocked packages among the installed packages."""
+    """Print the installed packages that are blocked."""
     from urc.cli.packages import open_store
     from urc.problems import printable
 

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the newest version of each package that matches all words; return 1 without a match."""
+    """Print the newest version of each package that matches all words; return 1 if none match."""
     from urc.cli.packages import search_repositories
 
     return search_repositories(arguments.words, arguments.kind, is_json=arguments.json)

@@ -31,7 +31,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 KNOWN_S = 3.0
 """Timeout for reading the signals that a command requires, in seconds."""
 _WRONG_USE = ("bad-argument", "unknown-command")
-"""Codes of failures due to wrong arguments."""
+"""Failure codes for wrong arguments."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +129,7 @@ def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return a text converted to the type of its argument. The engine checks ranges and choices."""
+    """Return a text converted to its argument's type. The engine checks ranges and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)

@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the sign-ins with device, place and last use, beginning with the most recently used."""
+    """List the sign-ins with their device, place and last use, most recently used first."""
     words_of(arguments, "sign-ins")
     directory, now = store.directory(), time.time()
     of = _principals_of(directory, arguments.of)
@@ -89,7 +89,7 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _end(one: "SignIn") -> float | None:
-    """Return the UTC time at which a sign-in ends without further use; None for no end."""
+    """Return the UTC time at which a sign-in ends if not used again; None if it never ends."""
     ends = [one.ends_at, None if one.idle_s is None else one.used_at + one.idle_s]
     return min((each for each in ends if each is not None), default=None)
 

@@ -90,7 +90,7 @@ def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
 
     Args:
         data: folder with the store of people, devices and programs; None for only the local user.
-        is_open: whether visitors without a sign-in may watch and drive.
+        is_open: whether visitors who have not signed in may watch and drive.
 
     Raises:
         AccessError: the store cannot be used.

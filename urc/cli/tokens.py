@@ -32,7 +32,7 @@ _LONGEST_COMMAND = 100
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command-line arguments: action, scope and end."""
+    """Declare the command-line arguments: action, scope and end time."""
     add_actions(
         parser,
         _ACTIONS,

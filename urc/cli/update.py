@@ -109,7 +109,7 @@ def _update(
 def _told(
     old: "Lock", plan: "InstallPlan", difference: "UpdateDiff", origins: list[str]
 ) -> list[str]:
-    """Return the changes of an update as text."""
+    """Return an update's changes as text."""
     from urc.packages.update import headline
 
     lines = [headline(old, plan.lock)]

@@ -87,7 +87,7 @@ def _exit_code(report: _Report, arguments: argparse.Namespace) -> int:
 
 
 def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
-    """Check now and after every change of a document; at Ctrl-C, return the last exit code."""
+    """Check now and after every change to a document; on Ctrl-C, return the last exit code."""
     from urc.runtime.file_watch import FileWatcher, wait_for_change
 
     code = 0

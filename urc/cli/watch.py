@@ -126,7 +126,7 @@ async def _follow(
 
 
 def _reasons(hub: "Hub") -> str:
-    """Return the states of the links as the end of an error message, or ""."""
+    """Return the states of the links, to append to an error message; "" if there are no states."""
     details = dict.fromkeys(link.detail for link in hub.links.values() if link.detail)
     return f": {'; '.join(details)}" if details else ""
 

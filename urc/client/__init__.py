@@ -1,8 +1,8 @@
-"""Robots for Python programs, with one interface in this process and over a server.
+"""Robots for Python programs, with the same interface in this process and over a server.
 
 `open` opens a robot on a server, and `connect` connects a robot in this process. The module
 `urc.client.sync` offers the same functions without ``async``. Names are imported on first use,
-because the two openings need different parts of URC.
+because each opening needs different parts of URC.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The address and the secrets of a server, and the encryption of its connections.
+"""A server's address and secrets, and the encryption of its connections.
 
 Layer 5. Certificates are always checked, against the system's trust store or the authority in a
 file. A token never crosses a network unencrypted, unless the program explicitly allows it.
@@ -18,7 +18,7 @@ _MOST_BYTES = 4096
 
 
 class ServerAddress(NamedTuple):
-    """The checked address of a server."""
+    """A server's address, after checks."""
 
     scheme: str
     """``http`` or ``https``."""
@@ -33,7 +33,7 @@ class ServerAddress(NamedTuple):
 
     @property
     def origin(self) -> str:
-        """Value of the header ``Origin`` of the server's own pages."""
+        """Value of the ``Origin`` header of the server's own pages."""
         return self.url
 
     def socket(self, robot: str) -> str:
@@ -52,7 +52,7 @@ class ServerAddress(NamedTuple):
 
 
 def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAddress:
-    """Return the address of a server.
+    """Return a server's address.
 
     Args:
         server: address such as ``https://robots.lab:8080``, without a path.

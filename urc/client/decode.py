@@ -53,7 +53,7 @@ def signals_of(hello: HelloMessage) -> dict[str, Signal]:
 
 
 def samples_of(message: ValuesMessage, signals: Sequence[Signal], now_s: float) -> Iterator[Sample]:
-    """Yield the readings of a message; their ages are relative to `now_s`."""
+    """Yield the readings in a message; their ages are relative to `now_s`."""
     indexes = _indexes.decode(message.i)
     ages = message.a if isinstance(message.a, Sequence) else [message.a] * len(indexes)
     alarms = message.s or [""] * len(indexes)
@@ -65,7 +65,7 @@ def samples_of(message: ValuesMessage, signals: Sequence[Signal], now_s: float) 
 
 
 def readings_of(values: Mapping[str, object], signals: Mapping[str, Signal]) -> dict[str, Reading]:
-    """Return the values of a reply, each converted to its signal's type."""
+    """Return the values in a reply, each converted to its signal's type."""
     return {name: reading_of(value, signals.get(name)) for name, value in values.items()}
 
 

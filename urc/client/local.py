@@ -1,4 +1,4 @@
-"""The opening of a robot in this process: the same profile and engine as the dashboard.
+"""Opening a robot in this process, with the same profile and engine as the dashboard.
 
     import asyncio
     from urc import connect
@@ -79,11 +79,11 @@ async def connect(
 class ConnectedRobot(HubReadings):
     """A robot connected by this process; see `urc.client.robot.RobotInterface`.
 
-    The attribute `session` offers all other functions.
+    The attribute `session` provides all other functions.
     """
 
     def __init__(self, session: Session) -> None:
-        """Store the session; scripts call `connect` instead of this constructor."""
+        """Store the session; scripts call `connect` instead of using this constructor."""
         super().__init__(session.hub)
         self.session = session
         self.motion = LocalMotion(session)
@@ -101,7 +101,7 @@ class ConnectedRobot(HubReadings):
 
     @property
     def operator(self) -> str:
-        """Name of the controls' holder in this process; "" without a holder."""
+        """Name of the holder of the controls in this process; "" without a holder."""
         holder = self.motion.controller.lease.state.holder
         return holder.name if holder is not None else ""
 
@@ -130,7 +130,7 @@ class ConnectedRobot(HubReadings):
         """Stop the robot, and latch STOP in this process.
 
         Returns:
-            Whether all connections of the robot accepted the stop within two seconds.
+            Whether all of the robot's connections accepted the stop within two seconds.
 
         Raises:
             UrcError: the robot has no motion to stop.

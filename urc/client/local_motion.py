@@ -159,7 +159,7 @@ class LocalMotion(ProgramControls):
         self.controller.release(_US.id, command)
 
     async def leave(self, command: str) -> None:
-        """Wait until the stop is written; release the controls after the last stick."""
+        """Wait until the stop is written; after the last stick, release the controls."""
         ends_s = self._clock.now() + _STILL_S
         try:
             while not self.controller.rests(command):

@@ -1,6 +1,6 @@
 """An event loop in a daemon thread, for programs without ``async``.
 
-Layer 5. The thread never delays the end of the process. Every call has a time limit.
+Layer 5. The thread never keeps the process from ending. Every call has a time limit.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ _Entered = TypeVar("_Entered")
 
 
 class LoopThread:
-    """A daemon thread with an event loop, which never delays the end of the process."""
+    """A daemon thread with an event loop; it never keeps the process from ending."""
 
     def __init__(self, timeout_s: float) -> None:
         self.timeout_s = timeout_s
@@ -79,7 +79,7 @@ class LoopThread:
         self.loop.call_soon_threadsafe(leave.set)
 
     def close(self) -> None:
-        """Stop the loop, and wait for the end of the thread."""
+        """Stop the loop, and wait until the thread has ended."""
         self.loop.call_soon_threadsafe(self.loop.stop)
         self._thread.join(_CLOSE_S)
 
@@ -101,6 +101,6 @@ def _tell(inside: "Future[_Entered]", ended: "Future[None]") -> None:
 
 
 def _wait_quietly(staying: "Future[None]") -> None:
-    """Wait for the end of a context whose block raised an error; ignore further errors."""
+    """Wait until a context whose block raised an error has ended; ignore further errors."""
     with suppress(Exception, CancelledError):
         staying.result(_CLOSE_S)

@@ -23,7 +23,7 @@ STOP_REASONS: Final[Mapping[Reason, str]] = {
     "stopped": "STOP was pressed",
     "revoked": "the connection to the robot was cut",
 }
-"""Text for the end of a motion, by the reason that the guard reports."""
+"""Text that explains why a motion ended, by the reason that the guard reports."""
 _LEFT: Final = "the context of drive has ended"
 
 
@@ -61,7 +61,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     async def take(self, command: str) -> None:
-        """Prepare the motion of a held command; the first stick also takes the controls.
+        """Prepare a held command's motion; the first stick also takes the controls.
 
         Raises:
             MotionEnded: the controls were refused.

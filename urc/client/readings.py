@@ -33,7 +33,7 @@ class HubReadings:
         return self.hub.links
 
     def latest(self, name: str, /) -> Sample | None:
-        """Return the newest reading of a signal, or None.
+        """Return a signal's newest reading, or None.
 
         Raises:
             UrcError: the robot has no signal of this name.
@@ -78,7 +78,7 @@ class HubReadings:
                     await subscription.changed()
 
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
-        """Yield the readings of the named signals, or of all signals, until the caller stops.
+        """Yield readings of the named signals, or of all signals, until the caller stops.
 
         The first readings are the present readings. Only the newest reading is kept, so a slow
         program skips readings and never falls behind.

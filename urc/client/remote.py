@@ -1,4 +1,4 @@
-"""The opening of a server's robot: values, log, commands and motion over one WebSocket.
+"""Opening a server's robot: values, log, commands and motion over one WebSocket.
 
     import asyncio
     import urc.client
@@ -67,7 +67,7 @@ __all__ = ["RemoteRobot", "open"]
 _MOST_IMAGES: Final = 64
 _GOODBYE_S: Final = 1.5
 _LINKS_S: Final = 1.0
-"""Maximum wait for the state of the transports, which follows the first message, in seconds."""
+"""Maximum wait for the transports' state, which follows the first message, in seconds."""
 _POST_S: Final = 3.0
 
 log = logging.getLogger(__name__)
@@ -88,11 +88,11 @@ async def open(
 
     Args:
         server: address such as ``https://robots.lab:8080``.
-        robot: name of the robot in its URL; "" for the server's only robot.
-        token: token of this program; "" for none.
+        robot: the robot's name in its URL; "" for the server's only robot.
+        token: this program's token; "" for none.
         token_file: file with the token, instead of `token`.
         authority: PEM file with the certificate of the server's local authority; None for the
-        system's trust store. Certificates are always checked.
+            system's trust store. Certificates are always checked.
         allow_unencrypted: whether to send the token to another computer over plain HTTP, where
             others on the network can read it.
         timeout: longest duration of one attempt to connect, in seconds.
@@ -134,7 +134,7 @@ class RemoteRobot(HubReadings):
         token: str,
         context: SSLContext | None,
     ) -> None:
-        """Prepare the robot; programs call `open` instead of this constructor."""
+        """Prepare the robot; programs call `open` instead of using this constructor."""
         super().__init__(Hub({}))
         self._robot = robot
         self.motion = RemoteMotion(socket)
@@ -213,10 +213,10 @@ class RemoteRobot(HubReadings):
         return self.motion.drive(command, valid_s)
 
     async def stop(self) -> bool:
-        """Stop the robot and latch STOP over the socket, plus over HTTP if the socket is silent.
+        """Stop the robot and latch STOP over the socket, and over HTTP if the socket is silent.
 
         Returns:
-            Whether all connections of the robot accepted the stop within two seconds.
+            Whether all of the robot's connections accepted the stop within two seconds.
 
         Raises:
             UrcError: the robot has no motion to stop.

@@ -1,4 +1,4 @@
-"""The alarms of a server's robot, and a program's actions on these alarms.
+"""The alarms of a server's robot, and the actions that a program can take on them.
 
 Layer 5. The list arrives over the WebSocket. Actions are HTTP requests; the server answers after it
 has stored the change.
@@ -42,7 +42,7 @@ class RemoteAlarms:
         """Acknowledge alarms that this program has received; without names, all pending alarms.
 
         Returns:
-            The signals of the acknowledged alarms, without alarms that were raised again meanwhile.
+            The acknowledged alarms' signals, excluding alarms that were raised again meanwhile.
 
         Raises:
             UrcError: the server refused, or could not be reached.
@@ -71,7 +71,7 @@ class RemoteAlarms:
         return await self._act("unshelve", {"signals": signals})
 
     def update(self, message: AlarmsMessage) -> None:
-        """Apply the changes of a message."""
+        """Apply the changes in a message."""
         if message.full:
             self.rows.clear()
         for signal in message.gone:

@@ -1,7 +1,7 @@
 """The commands that a program sends to a server, and their pending replies.
 
-Layer 5. The server sends exactly one reply to each command. After a loss of the connection, the
-outcome of a pending command is unknown, so it fails and is never repeated.
+Layer 5. The server sends exactly one reply to each command. If the connection is lost, a pending
+command's outcome is unknown, so the command fails and is never repeated.
 """
 
 import asyncio
@@ -34,9 +34,9 @@ class RemoteCommands:
         """Run a command and return its reply.
 
         Args:
-            name: name of the command.
+            name: the command's name.
             arguments: its arguments.
-            stops: number of STOPs known to the program; None to skip the check.
+            stops: number of STOPs that the program knows of; None to skip the check.
 
         Raises:
             CommandFailed: the connection is down, or was lost before the reply.

@@ -1,7 +1,7 @@
 """The controls of a server's robot: the lease, heartbeats, ticks and STOP.
 
 Layer 5. Each tick contains the lease epoch, a number, and the server's newest heartbeat, so that
-the server can refuse late and repeated ticks. After a loss of the connection, motion never resumes:
+the server can refuse late and repeated ticks. If the connection is lost, motion never resumes:
 every stick ends, and the server stops the robot.
 """
 
@@ -31,9 +31,9 @@ __all__ = ["ControlMessage", "RemoteMotion", "plain_arguments"]
 ControlMessage = LeaseMessage | HeartbeatMessage | StoppedMessage | RefusedMessage
 """Server messages about the controls."""
 _ASK_S: Final = 2.0
-"""Maximum time for the answer to a request about the controls, in seconds."""
+"""Maximum wait for the answer to a request about the controls, in seconds."""
 STOP_AGAIN_S: Final = 0.3
-"""Silence of the server after which STOP is also sent over HTTP, in seconds."""
+"""Duration of the server's silence after which STOP is also sent over HTTP, in seconds."""
 _CONFIRM_S: Final = 2.0
 _CONNECT_S: Final = 10.0
 """Maximum wait for the robot's first connection, in seconds."""
@@ -67,7 +67,7 @@ class RemoteMotion(ProgramControls):
 
     @property
     def stops(self) -> int | None:
-        """Number of STOPs known to this program; None before the first lease."""
+        """Number of STOPs that this program knows of; None before the first lease."""
         return self.lease.stops if self.lease is not None else None
 
     # -- messages
@@ -96,7 +96,7 @@ class RemoteMotion(ProgramControls):
         self._changed.set()
 
     def lost(self) -> None:
-        """End all motion after a loss of the connection."""
+        """End all motion after the connection was lost."""
         self.end_all(_CUT)
         self.lease = None
         self._beat = 0

@@ -1,4 +1,4 @@
-"""The interface of a robot for Python programs, with the same meaning in every opening.
+"""A robot's interface for Python programs, which has the same meaning in every opening.
 
 Layer 5. `urc.connect` connects a robot in this process, and `urc.client.open` uses a robot of a
 server. Both return this interface, so a program switches between them by changing one line. The
@@ -57,7 +57,7 @@ class RobotInterface(Protocol):
         """Name of the operator who pressed STOP; "" while STOP is not latched."""
 
     def latest(self, name: str, /) -> Sample | None:
-        """Return the newest reading of a signal, or None without a reading.
+        """Return a signal's newest reading; None if there has been no reading.
 
         Raises:
             UrcError: the robot has no signal of this name.
@@ -81,21 +81,21 @@ class RobotInterface(Protocol):
         """Return the first reading that meets the condition; the present reading counts.
 
         Args:
-            name: name of the signal.
+            name: the signal's name.
             is_met: the condition; None for any reading.
             timeout: longest wait, in seconds; None for no limit.
 
         Raises:
-            TimeoutError: the time is over.
+            TimeoutError: the timeout has passed.
             UrcError: the robot has no signal of this name.
             ConnectionLost: the server has ended the connection for good.
         """
 
     def watch(self, *names: str) -> AsyncIterator[Sample]:
-        """Yield the readings of the named signals, or of all signals, until the caller stops.
+        """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        The first readings are the present ones. Only the newest reading is kept, so a slow program
-        skips readings and never falls behind.
+        The first readings are the present readings. Only the newest reading is kept, so a slow
+        program skips readings and never falls behind.
 
         Raises:
             UrcError: the robot has no signal of this name.
@@ -103,9 +103,9 @@ class RobotInterface(Protocol):
         """
 
     def log(self) -> AsyncIterator[LogEntry]:
-        """Yield the lines of the robot's log that follow this call, until the caller stops.
+        """Yield each new line of the robot's log, until the caller stops.
 
-        A warning takes the place of lines that were lost, with their number.
+        A warning with the number of lost lines replaces these lines.
 
         Raises:
             ConnectionLost: the server has ended the connection for good.
@@ -114,8 +114,8 @@ class RobotInterface(Protocol):
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
         """Run a command and return the values of its reply.
 
-        The call confirms a command with ``confirm``. A two-person command waits for the approval of
-        a person at a dashboard.
+        The call confirms a command with ``confirm``. A two-person command waits until a person at a
+        dashboard approves it.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.
@@ -129,20 +129,20 @@ class RobotInterface(Protocol):
         The robot stops when the context ends, for any reason. See `Stick`.
 
         Args:
-            command: name of a held command; "" for the only held command of the robot.
-            valid_s: time for which one call of the stick moves the robot, 0.05 to 1 second.
+            command: name of a held command; "" for the robot's only held command.
+            valid_s: time for which one call to the stick moves the robot, 0.05 to 1 second.
 
         Raises:
             UrcError: the robot has no such held command, or `command` is "" and the robot has
-            several.
-            MotionEnded: the controls were refused, or motion ended before the context.
+                several.
+            MotionEnded: the controls were refused, or motion ended before the context did.
         """
 
     async def stop(self) -> bool:
         """Stop the robot, and latch STOP. STOP does not require the controls and is never refused.
 
         Returns:
-            Whether all connections of the robot accepted the stop within two seconds.
+            Whether all of the robot's connections accepted the stop within two seconds.
 
         Raises:
             UrcError: the robot has no motion.

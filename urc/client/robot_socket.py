@@ -1,9 +1,9 @@
 """The WebSocket of a server's robot, reopened after each loss, with one writer.
 
 Layer 5. Theory of operation. `run` reopens the socket after increasing delays with jitter, so that
-many programs do not reconnect at the same moment. Pings detect a dead connection within 4 s; motion
-does not rely on them. The writer sends a message only after the kernel has accepted the previous
-one. Meanwhile, a newer tick of the same command replaces the waiting tick.
+many programs do not reconnect at the same moment. Pings detect a dead connection within 4 s, but
+motion does not rely on pings. The writer sends a message only after the kernel has accepted the
+previous one. Meanwhile, a newer tick of the same command replaces the waiting tick.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ _JITTER: Final = (0.8, 1.2)
 _PING_S: Final = 1.0
 _SILENT_S: Final = 3.0
 _MOST_BYTES: Final = 16 * 1024 * 1024
-"""Longest accepted message: an image."""
+"""Longest accepted message, in bytes; the longest messages are images."""
 _GOODBYE_S: Final = 1.0
 _FOR_GOOD: Final = (CLOSE_BAD_MESSAGES, CLOSE_NO_ROBOT, CLOSE_NOT_LET_IN)
 _DENIED: Final = (401, 403)
@@ -60,16 +60,16 @@ class RobotSocket:
 
         Args:
             address: the server.
-            robot: name of the robot; "" for the server's only robot.
-            token: token of the program; "" for none.
+            robot: the robot's name; "" for the server's only robot.
+            token: the program's token; "" for none.
             context: rules for certificates; None without encryption.
             timeout_s: longest duration of one attempt to connect, in seconds.
         """
         self.address = address
         self.on_message: Callable[[str | bytes], None] = _ignore
-        """Callback for each message, in order."""
+        """Callback that receives each message, in order."""
         self.on_lost: Callable[[str], None] = _ignore
-        """Callback for the loss of the connection, with the reason."""
+        """Callback that is called when the connection is lost, with the reason."""
         self.is_up = False
         """Whether the server has sent its first message on this connection; set by the owner."""
         self._robot = robot

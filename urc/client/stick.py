@@ -5,7 +5,7 @@ tick every 50 ms, while the input is younger than `valid_s`. A program that hang
 raises an exception or dies does not renew its input, so the robot stops. No timer sends ticks for a
 program that does not renew its input.
 
-If motion ends for any reason except `release` or the end of the context, further calls of the stick
+If motion ends for any reason except `release` or the end of the context, further calls to the stick
 fail. New motion then requires a new context, just as a person must release and press a control
 again.
 """
@@ -30,23 +30,23 @@ __all__ = [
 ]
 
 VALID_S: Final = 0.25
-"""Default time for which one call of the stick moves the robot, in seconds."""
+"""Default time for which one call to the stick moves the robot, in seconds."""
 SHORTEST_VALID_S: Final = 0.05
 LONGEST_VALID_S: Final = 1.0
 TICK_S: Final = 0.05
-"""Interval between two ticks of unchanged input, in seconds."""
+"""Interval between two ticks with unchanged input, in seconds."""
 _SOONEST_S: Final = 0.01
 """Shortest interval between two ticks, in seconds; later input waits for its tick."""
 HELD_UP_S: Final = 0.25
-"""Sampling gap after which motion ends, in seconds; this process was suspended or blocked."""
+"""Sampling gap after which motion ends, in seconds; a gap means a suspended or blocked process."""
 
 
 class MotionEnded(UrcError):
-    """Motion ended before its context: by a stop, a refusal, a lost connection or late input."""
+    """Motion ended before its context: after a stop, a refusal, a lost connection or late input."""
 
 
 class MotionLine(Protocol):
-    """The path of ticks to the robot; each opening of a robot has its own class."""
+    """The path that ticks take to the robot; each way to open a robot has its own class."""
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
         """Send one tick; return the reason why motion must end, or ""."""
@@ -56,24 +56,24 @@ class MotionLine(Protocol):
 
 
 class Stick:
-    """The input of one held command, valid while the context of `drive` is open.
+    """The input of one held command, valid while the `drive` context is open.
 
     ``stick(speed=0.5)`` moves the robot for at most `valid_s` seconds; call the stick again before
     that time ends. Calls are cheap and may come from any thread.
     """
 
     def __init__(self, command: str, valid_s: float = VALID_S) -> None:
-        """Create a stick without input; programs call `drive` instead of this constructor."""
+        """Create a stick without input; programs call `drive` instead of using this constructor."""
         self.command = command
         """Name of the held command."""
         self.valid_s = valid_s
         self.ended = ""
-        """Reason for the end of motion; "" while the stick works."""
+        """Reason why motion ended; "" while the stick works."""
         self._input: tuple[Mapping[str, Reading], float] | None = None
         self._changed = asyncio.Event()
 
     def __call__(self, /, **arguments: Reading) -> None:
-        """Set the arguments of the held command; missing arguments use their defaults.
+        """Set the held command's arguments; missing arguments use their defaults.
 
         Raises:
             MotionEnded: motion has ended; the message has the reason.
@@ -82,12 +82,12 @@ class Stick:
         self.wake()
 
     async def hold(self, seconds: float, /, **arguments: Reading) -> None:
-        """Keep the same arguments for a time, while this call is awaited.
+        """Keep the same arguments for the given time, while this call is awaited.
 
         Args:
             seconds: the duration; the robot then continues to move for `valid_s` seconds, unless
-            the stick is called or released.
-            arguments: as in a call of the stick.
+                the stick is called or released.
+            arguments: as in a call to the stick.
 
         Raises:
             MotionEnded: motion ended before the time had passed.
@@ -100,7 +100,7 @@ class Stick:
             raise MotionEnded(self.ended)
 
     def release(self) -> None:
-        """Stop the robot and keep the controls; the next call of the stick moves the robot again.
+        """Stop the robot and keep the controls; the next call to the stick moves the robot again.
 
         Raises:
             MotionEnded: motion has already ended.
@@ -113,13 +113,13 @@ class Stick:
     # -- the owner of the context
 
     def put(self, arguments: Mapping[str, Reading]) -> None:
-        """Set the input from any thread, without waking the sampler."""
+        """Set the input, from any thread, without waking the sampler."""
         if self.ended:
             raise MotionEnded(self.ended)
         self._input = (dict(arguments), time.monotonic())
 
     def clear(self) -> None:
-        """Remove the input from any thread, without waking the sampler."""
+        """Remove the input, from any thread, without waking the sampler."""
         self._input = None
 
     def wake(self) -> None:
@@ -133,7 +133,7 @@ class Stick:
         self.wake()
 
     def sample(self) -> tuple[Mapping[str, Reading], float] | None:
-        """Return the arguments and the time of the last call; None without input."""
+        """Return the last call's arguments and time; None without input."""
         self._changed.clear()
         return self._input
 

@@ -43,7 +43,7 @@ from urc.wire.server_messages import AlarmRow
 __all__ = ["CALL_S", "SyncAlarms", "SyncRobot", "SyncStick", "connect", "open"]
 
 CALL_S: Final = 30.0
-"""Default time limit of one call, in seconds."""
+"""Default time limit for one call, in seconds."""
 _Result = TypeVar("_Result")
 
 
@@ -68,7 +68,7 @@ def open(
 ) -> "AbstractContextManager[SyncRobot]":
     """Open a server's robot while the context is active; see `urc.client.open`.
 
-    `timeout` is the time limit of every call, in seconds.
+    `timeout` is the time limit for every call, in seconds.
     """
     from urc.client import remote
 
@@ -137,7 +137,7 @@ class SyncRobot:
         return self._robot.latched_by
 
     def latest(self, name: str, /) -> Sample | None:
-        """Return the newest reading of a signal, or None without a reading.
+        """Return a signal's newest reading; None if there has been no reading.
 
         Raises:
             UrcError: the robot has no signal of this name.
@@ -163,21 +163,21 @@ class SyncRobot:
         """Return the first reading that meets the condition; the present reading counts.
 
         Args:
-            name: name of the signal.
+            name: the signal's name.
             is_met: the condition, which runs in the robot's thread; None for any reading.
-            timeout: longest wait, in seconds; None for the time limit of every call.
+            timeout: longest wait, in seconds; None for the time limit that applies to every call.
 
         Raises:
-            TimeoutError: the time is over.
+            TimeoutError: the timeout has passed.
             UrcError: the robot has no signal of this name, or the connection has ended for good.
         """
         return self._thread.call(self._robot.wait_for(name, is_met), timeout)
 
     def watch(self, *names: str, timeout: float | None = None) -> Iterator[Sample]:
-        """Yield the readings of the named signals, or of all signals, until the caller stops.
+        """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        `timeout` is the longest wait for the next reading, in seconds; None for the time limit of
-        every call.
+        `timeout` is the longest wait for the next reading, in seconds; None for the time limit that
+        applies to every call.
 
         Raises:
             TimeoutError: no reading arrived in time.
@@ -186,7 +186,7 @@ class SyncRobot:
         return self._steps(self._robot.watch(*names), timeout)
 
     def log(self, *, timeout: float | None = None) -> Iterator[LogEntry]:
-        """Yield the lines of the robot's log that follow this call, until the caller stops.
+        """Yield each new line of the robot's log, until the caller stops.
 
         Raises:
             TimeoutError: no line arrived in time.
@@ -210,7 +210,7 @@ class SyncRobot:
         The robot stops when the context ends, for any reason.
 
         Raises:
-            UrcError: the robot has no such held command, or several and `command` is "".
+            UrcError: the robot has no such held command, or it has several and `command` is "".
             MotionEnded: the controls were refused, or motion ended before the context did.
         """
         driving = partial(self._robot.drive, command, valid_s=valid_s)
@@ -221,7 +221,7 @@ class SyncRobot:
         """Stop the robot, and latch STOP.
 
         Returns:
-            Whether all connections of the robot accepted the stop within two seconds.
+            Whether all of the robot's connections accepted the stop within two seconds.
 
         Raises:
             UrcError: the robot has no motion, or the server could not be reached.
@@ -331,11 +331,11 @@ class SyncStick:
 
     @property
     def ended(self) -> str:
-        """Reason for the end of motion; "" while the stick works."""
+        """Reason why motion ended; "" while the stick works."""
         return self._stick.ended
 
     def __call__(self, /, **arguments: Reading) -> None:
-        """Set the arguments of the held command; missing arguments use their defaults.
+        """Set the held command's arguments; missing arguments use their defaults.
 
         Raises:
             MotionEnded: motion has ended; the message has the reason.
@@ -344,10 +344,10 @@ class SyncStick:
         self._loop.call_soon_threadsafe(self._stick.wake)
 
     def hold(self, seconds: float, /, **arguments: Reading) -> None:
-        """Keep the same arguments for a time; the call returns afterwards.
+        """Keep the same arguments for the given time, then return.
 
         Raises:
-            MotionEnded: motion has ended before the time was over.
+            MotionEnded: motion ended before the time had passed.
         """
         ends_s = time.monotonic() + seconds
         while (left_s := ends_s - time.monotonic()) > 0:
@@ -357,10 +357,10 @@ class SyncStick:
             raise MotionEnded(self.ended)
 
     def release(self) -> None:
-        """Stop the robot and keep the controls; the next call of the stick moves the robot again.
+        """Stop the robot and keep the controls; the next call to the stick moves the robot again.
 
         Raises:
-            MotionEnded: motion has ended already.
+            MotionEnded: motion has already ended.
         """
         if self.ended:
             raise MotionEnded(self.ended)

@@ -1,1 +1,1 @@
-"""Conversion of YAML documents to a checked, linked and compiled model."""
+"""Converts YAML documents to a checked, linked and compiled model."""

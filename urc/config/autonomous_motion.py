@@ -1,4 +1,4 @@
-"""Parser and checks for commands with autonomous motion."""
+"""Parser and checks for commands that start autonomous motion."""
 
 from collections.abc import Mapping
 
@@ -68,7 +68,7 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report a command with autonomous motion that `part` would run automatically."""
+    """Report a command that starts autonomous motion and that `part` would run automatically."""
     if runs_what_moves(command, arguments):
         problems.error(
             part,

@@ -21,7 +21,7 @@ class CodePage(NamedTuple):
     why: str
     """The problem's effect or cause."""
     example: str
-    """All or part of a document with the problem, or a description in words."""
+    """A document or part of a document with the problem, or a description in words."""
     instead: str
     """Corrected example, or instructions in words."""
 
@@ -31,14 +31,14 @@ class CodePage(NamedTuple):
 
 
 def pages() -> dict[str, CodePage]:
-    """Return every page by its code, in the order of the file."""
+    """Return all pages, keyed by code, in the order of the file."""
     _, *texts = _FILE.read_text("utf-8").split("\n## ")
     found = [_page(text) for text in texts]
     return {page.code: page for page in found}
 
 
 def summaries() -> dict[str, str]:
-    """Return a summary of each code, in one sentence."""
+    """Return a one-sentence summary of each code."""
     return {page.code: page.what for page in pages().values()}
 
 
@@ -52,7 +52,7 @@ def _page(text: str) -> CodePage:
 
 
 def _unfenced(text: str) -> str:
-    """Return the code in a fenced block; join other text into one line."""
+    """Return the content of a fenced block; return any other text as one line."""
     _, fence, code = text.partition("```yaml\n")
     return code.partition("```")[0] if fence else " ".join(text.split())
 

@@ -21,7 +21,7 @@ from urc.model.widget import Widget
 __all__ = ["automatic_slots", "default_interface"]
 
 MOST_PLAIN: Final = 24
-"""Maximum number of signals with separate cells; a table shows all further signals."""
+"""Maximum number of signals with their own cells; a table shows the remaining signals."""
 MOST_COMMANDS: Final = 16
 
 _BATTERY: Final = re.compile(r"batter|charge|\bsoc\b", re.IGNORECASE)
@@ -60,7 +60,7 @@ _BIG: Final = frozenset(
 _GROUNDS: Final = ("camera", "pano360", "map")
 """Widgets that can fill the background, in order of preference."""
 _ACROSS: Final = (0, 4, 1, 3, 2)
-"""Columns in front of a background, in the order in which displays fill them."""
+"""Columns in front of a background, in the order in which they are filled with displays."""
 _MOST_OVER: Final = 14
 """Maximum number of widgets in front of a background."""
 _STEERED: Final = 2
@@ -68,7 +68,7 @@ _STEERED: Final = 2
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, with displays of signals before controls."""
+    """Return the widget of each slot, with signal displays before controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
     for use in _grouped(left, registry):
@@ -232,7 +232,7 @@ def _held(command: Command, registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _is_complete(use: WidgetUse, command: Command) -> bool:
-    """Return whether the control provides every required argument of its command."""
+    """Return whether the control provides every argument that its command requires."""
     given = {name for one in use.given.values() for name in one.names}
     needed = {
         name for name, one in command.arguments.items() if one.is_required and one.default is None
@@ -245,7 +245,7 @@ def _says(name: str, words: tuple[str, ...]) -> bool:
 
 
 def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -> WidgetUse | None:
-    """Bind the widget to the command by its first output that has the values in `names`."""
+    """Bind the command to the widget's first output that provides the values in `names`."""
     if widget is None or any(port.is_required for port in widget.inputs.values()):
         return None
     is_held = command.hold is not None
@@ -298,7 +298,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
 
 
 def _ground(slots: Mapping[str, WidgetUse]) -> str:
-    """Return the background slot; "" without a suitable widget or with too many other widgets."""
+    """Return the background slot; "" if no widget is suitable or too many others exist."""
     if not 1 < len(slots) <= _MOST_OVER + 1:
         return ""
     found = {use.widget: name for name, use in reversed(list(slots.items()))}

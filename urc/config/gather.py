@@ -27,7 +27,7 @@ class LoadedSources(NamedTuple):
     """The parts and problems of a loaded profile."""
 
     sources: Sources | None
-    """The parts of the profile; None on error and for a partial document."""
+    """The parts of the profile; None after an error, and for a partial document."""
     problems: list[Problem]
     kind: str
     files: tuple[str, ...]

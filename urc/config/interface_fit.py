@@ -26,7 +26,7 @@ class InterfaceFit(NamedTuple):
     widgets: Mapping[str, Widget] = NOTHING
     """All widgets of the interface, by name."""
     fault: str = ""
-    """Reason for the rejection, in one line; "" if the interface fits."""
+    """One-line reason for the rejection; "" if the interface fits."""
 
 
 class _CombinedWidgets(WidgetFolder):

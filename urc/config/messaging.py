@@ -1,6 +1,6 @@
 """Message transports and their allowed forms of messages.
 
-`MESSAGING` contains only built-in transports. Transports of packages allow every form.
+`MESSAGING` contains only built-in transports. Transports from packages allow every form.
 """
 
 from typing import Final, NamedTuple

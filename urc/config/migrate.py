@@ -1,4 +1,4 @@
-"""Migration of documents: only old keys and values are replaced."""
+"""Migrates documents: replaces old keys and values, and changes nothing else."""
 
 import re
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class Migrated(NamedTuple):
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with new names; the file stays unchanged.
+    """Return the content of a file with new names, without changing the file.
 
     Raises:
         ProblemsError: the file cannot be read, is not a document, or has a key under both names.

@@ -37,7 +37,7 @@ class KeyRename(NamedTuple):
 
     content: Content
     place: str
-    """Pattern of the path to the mapping with the key, with slashes as separators."""
+    """Pattern for the path to the mapping that contains the key, with slashes as separators."""
     old: str
     new: str
     types: tuple[str, ...] = ()

@@ -106,6 +106,6 @@ def _slashed(file: str) -> str:
 
 
 def _uri(file: str) -> str:
-    """Return a file as a URI reference, either relative to the folder of the run or absolute."""
+    """Return a file's URI reference, either absolute or relative to the folder of the run."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(_slashed(file))

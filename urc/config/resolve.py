@@ -116,7 +116,7 @@ def _tree(part: Node) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
-    """Return the slot's keys that stay valid for another widget, without the options."""
+    """Return the slot's keys that remain valid for another widget, without the options."""
     widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]

@@ -8,7 +8,7 @@ __all__ = ["closest", "did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Tolerance, in words: lists are shortened only above their maximum plus this number."""
+"""How many words a list may have beyond its maximum before it is shortened."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:

@@ -63,9 +63,9 @@ def sliced(value: Any, start: Any, stop: Any) -> Any:
 @lru_cache(maxsize=512)
 def compiled(source: str, test: str) -> "Pattern":
     """Return the pattern, anchored at the start for ``match``, or raise `PatternError`."""
-    from urc._patterns import compile_pattern  # takes 2 ms; only needed for such tests
+    from urc._patterns import compile_pattern  # takes 2 ms, and only these tests need it
 
-    pattern = compile_pattern(source)  # first, so that errors refer to the written text
+    pattern = compile_pattern(source)  # done first, so that errors refer to the original text
     return compile_pattern(f"^(?:{source})") if test == "match" else pattern
 
 

@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """Error: there are fewer bytes than the number needs."""
+    """Error: the data has too few bytes for the number."""
 
 
 @cache  # there are few type names

@@ -217,7 +217,7 @@ class Filter(NamedTuple):
     gives_bytes: bool = False
     """Whether the filter returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
-    """Function that checks a constant first argument, and returns the error or ""."""
+    """Function that checks a constant first argument, and returns an error message or ""."""
 
 
 FILTERS: dict[str, Filter] = {

@@ -28,7 +28,7 @@ _ENTER_S: Final = 5.0
 
 
 class _Clock:
-    """The monotonic clock of this machine, shared with the engine's process."""
+    """This machine's monotonic clock, shared with the engine's process."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop

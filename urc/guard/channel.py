@@ -41,7 +41,7 @@ class ChannelListener(Protocol):
         """Handle a message from the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:
-        """Handle the end of the guard process, which closes every connection."""
+        """Handle the guard process's end, which closes every connection."""
 
 
 class Channel(Protocol):
@@ -70,7 +70,7 @@ class Channel(Protocol):
         """
 
     def drop(self, slot: str) -> None:
-        """Discard the unsent message of a slot."""
+        """Discard a slot's unsent message."""
 
     async def ready(self) -> None:
         """Return once a guard is ready."""

@@ -91,9 +91,9 @@ class GuardClient:
             )
             for spec in lines
         }
-        """Guarded transports by name, for the links of the session."""
+        """Guarded transports by name, used by the session's links."""
         self.on_stand: Stands = _unheard
-        """Callback with the counters of a transport, and whether all of the engine's frames with
+        """Callback with a transport's counters, and whether all of the engine's frames with
         counters were sent.
         """
         self._held = dict(held)
@@ -145,7 +145,7 @@ class GuardClient:
         self.channel.post(tick, slot=command)
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of `command` without arming it."""
+        """Replace the stop frame of `command` without arming the command."""
         control = self._controls.get(command)
         if control is not None:
             control.terms = terms = control.terms.stopped_by(stop)
@@ -188,7 +188,7 @@ class GuardClient:
         self.stop(stops)
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may be moving, or its stop may still be repeated."""
+        """Return whether `command` may be moving or its stop may still be repeated."""
         control = self._controls.get(command)
         if control is None:
             return False
@@ -253,7 +253,7 @@ class GuardClient:
                 self._tick_again(message)
 
     def lost(self, reason: str) -> None:
-        """Handle the end of the guard, which also ends every connection."""
+        """Handle the guard's end, which also ends every connection."""
         for transport in self.transports.values():
             transport.lost(reason)
 

@@ -1,11 +1,11 @@
 """The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
-closes it. The engine requests the opening and the closing of the connection. The guard sends
-received data to the engine within the engine's flow-control credit. If the connection is lost while
-the robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead.
-The guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection
-is then kept for the engine's next attempt.
+closes it. The engine requests that the connection be opened or closed. The guard sends received
+data to the engine within the engine's flow-control credit. If the connection is lost while the
+robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead. The
+guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection is
+then kept for the engine's next attempt.
 """
 
 import asyncio
@@ -37,17 +37,17 @@ __all__ = ["WINDOW_BYTES", "GuardedConnection"]
 WINDOW_BYTES: Final = 65536
 """Maximum number of bytes sent to the engine before an acknowledgement."""
 _GRACE_S: Final = 1.0
-"""Grace period for a transport that exceeds its own timeout, in seconds."""
+"""Grace period for a transport that exceeds its timeout, in seconds."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
-"""Time limit of a rescue, in seconds. After a failed rescue, only the engine tries to connect."""
+"""Time limit for a rescue, in seconds. After a failed rescue, only the engine tries to connect."""
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
 """Minimum interval between connection attempts, in seconds; five times that for slow transports."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
-"""Maximum timeout of one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout
+"""Maximum timeout for one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout
 is a multiple of the usual duration of successful attempts. A short timeout is needed because an
 attempt that begins before the robot is reachable fails, and delays the next attempt.
 """
@@ -56,13 +56,12 @@ _TIMES: Final = 4.0
 _LOG_IN_S: Final = 6.0
 _GROWTH: Final = 1.25
 _LONG_S: Final = 0.5
-"""Maximum timeout of connection attempts that cannot overlap, in seconds. The timeout grows with
+"""Maximum timeout for connection attempts that cannot overlap, in seconds. The timeout grows with
 each attempt.
 """
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
-"""Maximum time for the repeats of a stop, including the last repeat on a slow connection, in
-seconds."""
+"""Maximum time for repeating a stop, including the last repeat on a slow connection, in seconds."""
 _PAUSE_S: Final = 0.01
 
 Emit = Callable[[messages.FromGuard], int]
@@ -122,16 +121,16 @@ class GuardedConnection:
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """Durations of the last successful attempts, in seconds."""
+        """Durations of the most recent successful attempts, in seconds."""
         self._hurry = ConnectRace(_SHORTEST_S)
         self._credit = 0
         self._credited = asyncio.Event()
         self._is_reading = False
         self._acked = 0
         self._counted = 0
-        """Number of the newest sent frame of the engine that contains counters."""
+        """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """Number of times that the engine's frames were refused because of used counter values."""
+        """How often the engine's frames were refused because their counter values were used."""
 
     # -- requests of the engine
 
@@ -192,7 +191,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard the other frames of this round, because their counter values are used up."""
+        """Discard this round's other frames, because their counter values are used up."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
@@ -203,7 +202,7 @@ class GuardedConnection:
             self._credited.set()
 
     def settle(self) -> None:
-        """Report the results of a batch of messages, and watch liveness during motion."""
+        """Report the results of a message batch, and watch liveness during motion."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))
@@ -430,7 +429,7 @@ class GuardedConnection:
             self._switch(self._recover("the engine has not requested the connection"))
 
     def _in_vain(self) -> None:
-        """Report the timeout to an engine that waits for a rescue."""
+        """Report the timeout to an engine that is waiting for a rescue."""
         if self._waiting is not None:
             self._forget_waiting()
             fault = self._fault or f"no answer from {self.transport.address}"

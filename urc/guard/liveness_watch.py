@@ -1,4 +1,4 @@
-"""Detection of a frozen program at the other end of a connection during motion."""
+"""Detection of programs that freeze at the other end of a connection during motion."""
 
 import asyncio
 from collections.abc import Callable

@@ -53,7 +53,7 @@ class LocalChannel:
         """Return at once."""
 
     def now(self) -> float:
-        """Return the current time of the clock, in seconds."""
+        """Return the clock's current time, in seconds."""
         return self._clock.now()
 
     def _emit(self, message: messages.FromGuard) -> int:

@@ -1,8 +1,8 @@
 """The messages between the engine's process and the guard process.
 
-Each message is a MessagePack array that begins with the message type. `line` is the name of a
-transport, and `control` is the name of a held command. `turn` counts how often the engine has
-opened the connection. Messages with an earlier `turn` are dropped.
+Each message is a MessagePack array that begins with the message type. `line` is a transport's name,
+and `control` is a held command's name. `turn` counts how often the engine has opened the
+connection. Messages with an earlier `turn` are dropped.
 """
 
 from collections.abc import Mapping
@@ -49,13 +49,13 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
 
     line: str
     factory: str
-    """Factory of the transport as ``module:attribute``, as listed in the table of transports."""
+    """The transport's factory as ``module:attribute``, as listed in the table of transports."""
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
     """Name of the previously created tunnel that carries this transport; "" without a tunnel."""
     stalled_s: float
-    """Age of unsent motion data, in seconds, at which a connection counts as stalled and is reset.
+    """Age of unsent motion data at which a connection counts as stalled and is reset, in seconds.
     """
     is_strict: bool
     """Whether the transport is slow to open; if so, a frame is written only when no byte is unsent.
@@ -97,7 +97,7 @@ class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
 
 
 class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
-    """The acknowledgement that the engine has processed `amount` bytes from a connection."""
+    """The engine's acknowledgement that it has processed `amount` bytes from a connection."""
 
     line: str
     turn: int
@@ -113,7 +113,7 @@ class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
 
 
 class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
-    """A tick of sampled input that renews the lease of a control."""
+    """A tick of sampled input, which renews a control's lease."""
 
     control: str
     number: int
@@ -147,7 +147,7 @@ class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
 
 
 class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
-    """Replace the stop frame of a control, because the old frame's counter value is used up."""
+    """Replace a control's stop frame, because the old frame's counter value is used up."""
 
     control: str
     stop: Payload
@@ -216,7 +216,7 @@ class LineClosed(msgspec.Struct, array_like=True, frozen=True, tag=27):
 
 
 class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
-    """The stop frame of a control was written."""
+    """A control's stop frame was written."""
 
     control: str
     reason: Reason
@@ -246,7 +246,7 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
 
 
 class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
-    """The refusal of a `SendBytes` with used counter values, and of all later `SendBytes`."""
+    """A `SendBytes` with used counter values, and all later `SendBytes`, were refused."""
 
     line: str
     turn: int

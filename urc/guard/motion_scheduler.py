@@ -52,20 +52,20 @@ class MotionScheduler:
         sent_counters: SentCounters | None = None,
         counted: Callable[[list[tuple[str, int]]], None] | None = None,
     ) -> None:
-        """Create the scheduler; nothing is written before the call of `begin`.
+        """Create the scheduler; nothing is written before `begin` is called.
 
         Args:
             transport: the transport, with optional support for `SupportsUnsent`, `SupportsOffer`
-            and `SupportsForget`.
+                and `SupportsForget`.
             clock: the time.
             stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
             is_strict: whether motion waits until all earlier bytes are sent.
             told: callback for each written stop, with the control, the reason and the number of the
-            newest tick.
+                newest tick.
             failed: callback with the reason when the connection stalls or refuses data.
             sent_counters: counter values sent on the connection; None to create new counters.
-            counted: callback after a change of the counters, with the control and number of each
-            obsolete tick.
+            counted: callback after the counters have changed, with the control and number of each
+                obsolete tick.
         """
         self._clock = clock
         self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
@@ -77,11 +77,11 @@ class MotionScheduler:
         self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
-        """Effect of each control's newest tick on the counters, by control."""
+        """How each control's newest tick affects the counters, by control."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
-        """Queue of the frames that the transport cannot accept immediately."""
+        """Queue of frames that the transport cannot accept immediately."""
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
@@ -104,7 +104,7 @@ class MotionScheduler:
 
     @property
     def is_settled(self) -> bool:
-        """Whether no control moves, and every stop and its repeats were handed to the transport."""
+        """Whether no control moves and all stops, with repeats, were handed to the transport."""
         return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property

@@ -27,7 +27,7 @@ UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
 
 
 class Pipe:
-    """A reader and writer of messages on a connected socket; the pipe owns the socket."""
+    """A message reader and writer on a connected socket, which the pipe owns."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class Pipe:
         self._space = memoryview(bytearray(_READ_BYTES))
         self._held = bytearray()
         self._is_behind = False
-        """Whether received messages are waiting for the next iteration of the event loop."""
+        """Whether received messages are waiting for the event loop's next iteration."""
         self._rest = b""
         """Unsent bytes of a message that was written in part."""
         self._urgent: deque[bytes] = deque()
@@ -71,7 +71,7 @@ class Pipe:
         self._is_writing = False
         self.is_open = True
         self.taken_bytes = 0
-        """Size of the message being handled, in bytes; equal to the result of `post` at the sender.
+        """Size of the message being handled, in bytes, as `post` returned it to the sender.
         """
         self._loop.add_reader(line, self._readable)
 
@@ -117,7 +117,7 @@ class Pipe:
         return size
 
     def drop(self, slot: str) -> None:
-        """Discard the unsent message of a slot."""
+        """Discard a slot's unsent message."""
         self._newest.pop(slot, None)
 
     def close(self) -> None:

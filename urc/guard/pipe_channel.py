@@ -32,7 +32,7 @@ _START_LOOKS: Final = 100
 """Maximum number of checks before the first heartbeat, because Python starts slowly on a busy
 machine."""
 _STEADY_S: Final = 0.5
-"""Lifetime after which a guard counts as successfully started, in seconds. A guard that has opened
+"""Age at which a guard counts as successfully started, in seconds. A guard that has opened
 a connection also counts as successfully started."""
 _AT_ONCE: Final = 3
 """Number of short-lived guards that are replaced immediately. The replacement of further
@@ -78,7 +78,7 @@ class PipeChannel:
 
     @property
     def pid(self) -> int:
-        """Process ID of the guard; 0 without a process."""
+        """The guard's process ID; 0 without a process."""
         return 0 if self._process is None else self._process.pid
 
     # -- messages
@@ -89,7 +89,7 @@ class PipeChannel:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
 
     def drop(self, slot: str) -> None:
-        """Discard the unsent message of a slot."""
+        """Discard a slot's unsent message."""
         if self._pipe is not None:
             self._pipe.drop(slot)
 

@@ -123,7 +123,7 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
 
 
 class ProcessState(NamedTuple):
-    """The state of a process, as reported by the system."""
+    """A process's state, as reported by the system."""
 
     wants_to_run: bool = False
     """Whether the process is running or waiting for a processor or a disk; false for a sleeping or
@@ -134,7 +134,7 @@ class ProcessState(NamedTuple):
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
-    """Return the state of a process from ``/proc`` on Linux; on other systems, return a default."""
+    """Return a process's state from ``/proc`` on Linux; on other systems, return a default."""
     try:
         # The name before the state may contain any characters, including brackets and spaces.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]

@@ -1,6 +1,6 @@
 """The engine's proxy for a transport in the guard; the proxy has the members of `Transport`.
 
-The turn is the number of the connection; messages of an earlier turn are ignored.
+The turn is the connection's number; messages from an earlier turn are ignored.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ Stands = Callable[[str, Mapping[str, int], bool], None]
 
 @dataclass(slots=True)
 class _Sent:
-    """Data that the guard has not yet reported as passed to the transport."""
+    """Data that, according to the guard's reports, has not been passed to the transport yet."""
 
     number: int
     size: int
@@ -60,12 +60,12 @@ class GuardedTransport:
         """Prepare.
 
         Args:
-            name: name of the transport.
-            address: address of the robot, for display.
+            name: the transport's name.
+            address: the robot's address, for display.
             post: function that sends a message to the guard without waiting.
             ready: function that waits until a guard is ready.
             stands: callback with the transport's counters, and whether all frames with counters are
-            sent.
+                sent.
         """
         self._stands = stands
         self._name = name
@@ -123,7 +123,7 @@ class GuardedTransport:
             raise ConnectFailed(fault)
 
     async def receive(self) -> Payload:
-        """Return the next received data; raise `PeerClosed` after the end of the connection."""
+        """Return the next received data; raise `PeerClosed` when the connection has ended."""
         while not self._receiver:
             if not self._is_open:
                 raise PeerClosed(self._ended)
@@ -134,7 +134,7 @@ class GuardedTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Send `data` after a wait for space; raise `TransportError` on a broken connection."""
+        """Wait for space, then send `data`; raise `TransportError` on a broken connection."""
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -197,7 +197,7 @@ class GuardedTransport:
     # -- messages of the guard
 
     def lost(self, reason: str) -> None:
-        """Record the end of the guard, which closes every connection."""
+        """Record the guard's end, which closes every connection."""
         self._end(reason)
         self._is_known = False
         if self._opening is not None and not self._opening.done():
@@ -205,7 +205,7 @@ class GuardedTransport:
         self._closed()
 
     def handle(self, said: messages.FromGuard, size: int) -> None:
-        """Handle a message about this transport; both sides count the message as `size` bytes."""
+        """Handle a message about this transport; both sides count its size as `size` bytes."""
         match said:
             case messages.BytesReceived(turn=turn, data=data) if (
                 turn == self._turn and self._is_open

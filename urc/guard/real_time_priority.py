@@ -62,7 +62,7 @@ class RealTimePriority:
     def __init__(self) -> None:
         """Create the object without requesting real-time priority."""
         self._again_s: float | None = None
-        """Time of the next request after an excessively long run, in seconds; None without a pause.
+        """Time of the next request after an excessive run, in seconds; None without a pause.
         """
 
     def request(self) -> str:
@@ -76,7 +76,7 @@ class RealTimePriority:
         return refusal
 
     def retry(self) -> None:
-        """Request the priority again after the pause; must be called regularly."""
+        """Request the priority again after the pause; call this method regularly."""
         if self._again_s is not None and time.monotonic() >= self._again_s:
             self._again_s = None
             _ask()
@@ -87,7 +87,7 @@ class RealTimePriority:
 
 
 def why_not() -> str:
-    """Return the reason why a guard on this machine cannot get the priority, or ""."""
+    """Return the reason why a guard on this machine cannot get the priority; "" if it can."""
     if os.environ.get(REAL_TIME, "").lower() == "no":
         return f"{REAL_TIME} is no"
     refusal = _ask()

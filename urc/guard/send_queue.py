@@ -59,8 +59,7 @@ class SendQueue(Generic[_Tag]):
         Args:
             sender: the transport.
             clock: the time.
-            done: callback for each frame; the arguments are the tag of the frame, and the error or
-                None.
+            done: callback for each frame; the arguments are the frame's tag, and the error or None.
             after: queue whose frames are sent before this queue's frames; None for no other queue.
         """
         self._sender = sender
@@ -101,7 +100,7 @@ class SendQueue(Generic[_Tag]):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     def end(self) -> list[_Tag]:
-        """Stop sending; return the tags of the unsent frames."""
+        """Stop sending, and return the unsent frames' tags."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()

@@ -22,7 +22,7 @@ class SentCounters:
         """Whether some sent values have not been reported to the engine yet."""
 
     def reset(self) -> None:
-        """Prepare for a new connection, on which no counter value has been sent."""
+        """Prepare for a new connection, on which no counter value has been sent yet."""
         self.stand = {}
         self.is_changed = False
 
@@ -40,7 +40,7 @@ class SentCounters:
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop frame with the next counter values, or else the last stop frame.
+        """Return the stop frame with the next counter values; if none fits, return the last one.
 
         A stop with a wrong counter value is better than no stop.
         """

@@ -90,8 +90,8 @@ class Item(NamedTuple):
     until: bytes = b""
     """Terminator of bytes or text without a declared size."""
     trim: int | None = None
-    """Padding byte of a trimmed struct. The end of the struct may lack any number of these
-    bytes."""
+    """Padding byte of a trimmed struct. Any number of these bytes may be missing at the end of the
+    struct."""
     is_lsb_first: bool = False
     """Whether the first item of ``bits`` contains the least significant bits."""
     items: tuple["Item", ...] = ()
@@ -110,7 +110,7 @@ class Switch(NamedTuple):
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """Items for values without a case; None means that a frame with such a value does not match."""
+    """Items for values without a case; if None, frames with these values do not match."""
 
 
 def packed_size(number: Number, count: Extent) -> int:

@@ -1,4 +1,4 @@
-"""Mapping of a widget's output values to a command's arguments. Pure.
+"""Maps a widget's output values to a command's arguments. Pure.
 
 The loader and the dashboard both call `targets`, so both map output values in the same way.
 """
@@ -11,7 +11,7 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
-    """Map the name of each command argument to the name of an output argument.
+    """Map the name of each command argument to the name of an output value.
 
     An explicit binding takes precedence. Without a binding, a value goes to the argument of the
     same name. A single output value goes to the command's only free argument, even under a

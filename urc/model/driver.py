@@ -168,7 +168,7 @@ class Argument(NamedTuple):
     """Whether a string may contain control characters, such as the end of a frame."""
     description: str = ""
     items: ElementType = "number"
-    """Type of the elements of an array; range and choices apply to each element."""
+    """Type of an array's elements; range and choices apply to each element."""
     size: int | None = None
     """Required number of elements of an array; None means any number up to `MOST_ELEMENTS`."""
     confirm: Mapping[str, Confirm] = NOTHING
@@ -206,13 +206,13 @@ class Command(NamedTuple):
     """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. `moves` is also true for a sequence with a held
-    command or a command that starts autonomous motion."""
+    """Whether the command starts autonomous motion. `moves` is also true for a sequence that runs a
+    held command or a command that starts autonomous motion."""
     moves_if: Template | None = None
     """Condition on the arguments under which a call starts autonomous motion; None means that every
     call does if `moves` is true."""
     stops: bool = False
-    """Whether STOP sends this command; each STOP sends the command once."""
+    """Whether STOP sends this command; each STOP sends it once."""
     role: Role = "drive"
     """Role that a visitor needs for the command: ``drive``, ``maintain`` or ``administer``. A
     sequence requires at least the roles of the commands that it runs. STOP requires no role."""

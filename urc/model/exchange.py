@@ -38,7 +38,7 @@ replies."""
 
 
 class Queue(NamedTuple):
-    """Limits of the request queue of one connection."""
+    """Limits of one connection's request queue."""
 
     in_flight: int = 1
     """Maximum number of requests in flight at the same time, 1 to 64."""
@@ -60,8 +60,7 @@ class Keepalive(NamedTuple):
     """The robot's watchdog timeout as specified by its manufacturer, in seconds. After a watchdog
     timeout, the robot closes the connection or stops."""
     after: tuple[str, ...] = ()
-    """Commands that reset the watchdog of the robot; () means that every frame resets the
-    watchdog."""
+    """Commands that reset the robot's watchdog; () means that every frame resets it."""
 
 
 class ErrorReply(NamedTuple):
@@ -107,9 +106,9 @@ class Hold(NamedTuple):
     release: Mapping[str, Reading] = NOTHING
     """Arguments that stop the motion; omitted arguments have their default values."""
     lease_s: float = 0.25
-    """Duration of the motion lease without a renewal by the operator, 0.1 to 1.0 s."""
+    """How long the motion lease lasts unless the operator renews it, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
-    """Watchdog timeout of the robot, in seconds: motion continues for this time after the last
+    """The robot's watchdog timeout, in seconds: motion continues for this time after the last
     setpoint. ``inf`` means that the robot has no watchdog; None means that the watchdog is unknown.
     Only the loader's rules use the watchdog timeout."""
     slew: Mapping[str, float] = NOTHING

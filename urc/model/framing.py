@@ -51,8 +51,8 @@ class Salt(NamedTuple):
     table: Mapping[Any, bytes] = NOTHING
     """Secret bytes, keyed by the selecting number in the frame."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Handling of a frame whose number is not in `table`: report and drop (``fault``),
-    drop silently (``skip``), or accept unchecked (``pass``)."""
+    """Handling of frames whose number is not in `table`: report and drop (``fault``), drop
+    silently (``skip``), or accept unchecked (``pass``)."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
         """Return the number that selects the secret bytes; None if the frame is too short."""
@@ -174,8 +174,7 @@ class FrameLayout(NamedTuple):
     """Trailing checksum, checked first in a received frame and added last to a sent frame."""
     digits: Digits = ""
     """Notation of the bytes between the start and end markers. All positions and `checksums` refer
-    to the
-    decoded bytes."""
+    to the decoded bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:

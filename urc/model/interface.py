@@ -47,7 +47,7 @@ class WidgetUse(NamedTuple):
 
 
 class Slot(NamedTuple):
-    """A rectangle of a layout, with 0-based row and column and spans of at least 1."""
+    """A rectangle of a layout, with a 0-based row and column, and spans of at least 1."""
 
     name: str
     row: int

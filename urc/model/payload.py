@@ -49,7 +49,7 @@ class Envelope(NamedTuple):
 
 
 NUMBERED: Final = frozenset(("call", "goal", "request"))
-"""Verbs of requests. The ``response`` to a request has the ``id`` of the request."""
+"""Verbs of requests. The ``response`` to a request has the request's ``id``."""
 
 Payload = bytes | Envelope
 """The content of one frame, without its framing."""

@@ -109,7 +109,7 @@ class DialogueStep(NamedTuple):
     """URC's expected output since the previous check, keyed by transport; () means no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
-    """Expected reply values of the oldest completed command that no step has checked."""
+    """Expected reply values of the oldest completed command that no step has checked yet."""
     of: str = ""
     """Name of the command that `reply` or `fails` refers to; "" means any command."""
     fails: str = ""
@@ -181,7 +181,7 @@ class SimulatorRule(NamedTuple):
     """Text pattern or form for the received frames; None means that the rule does not match frames
     by content."""
     request: str = ""
-    """Name of a command or poll; the rule matches the requests of the command or poll."""
+    """Name of a command or poll; the rule matches its requests."""
     every_s: float | None = None
     """Period of a timed rule, in seconds; None means that the rule is not timed."""
     when: Template | None = None

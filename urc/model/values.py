@@ -153,9 +153,9 @@ class Signal(NamedTuple):
     conversion: Conversion = PLAIN
     """Conversion from the raw value to `unit`, applied to each element of an array."""
     items: ElementType = "number"
-    """Type of the elements of an array."""
+    """Type of an array's elements."""
     size: int | None = None
-    """Number of elements of an array, or maximum number of bytes of an image or blob."""
+    """Number of elements in an array, or maximum size of an image or blob in bytes."""
     axes: Axes = ""
     """Axis convention of the value."""
     formula: Template | None = None

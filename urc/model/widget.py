@@ -63,11 +63,10 @@ class Widget(NamedTuple):
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
-    """Minimum number of columns and minimum number of rows of the slot."""
+    """Minimum number of columns and rows of the slot."""
     footprint: Footprint = "instrument"
     is_dead_man: bool = False
-    """Whether the widget is a dead-man control; no motion is sent while a dead-man control is
-    released."""
+    """Whether the widget is a dead-man control; while it is released, no motion is sent."""
     summary: str = ""
     licence: str = ""
     """SPDX licence identifier of the widget, from the manifest."""

@@ -1,7 +1,7 @@
 """Freshness checks for control inputs, independent of the browser's clock.
 
 The server sends numbered heartbeats to every page. Each input contains the number of the newest
-heartbeat that its page has received, its lease epoch, and a sequence number. The server can
+heartbeat received by its page, the epoch of its lease, and a sequence number. The server can
 therefore refuse inputs that were buffered, recorded and replayed, or sent under an earlier lease.
 The clocks of different machines are never compared.
 """
@@ -17,7 +17,7 @@ _KEPT: Final = 64
 
 
 class ControlInput(NamedTuple):
-    """The sequence numbers that a page sends with every tick of a held control."""
+    """The numbers that a page sends with every tick of a held control."""
 
     epoch: int
     """Epoch of the lease under which the input was sent."""
@@ -43,13 +43,13 @@ class Freshness:
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a new heartbeat, for the caller to send to the page immediately."""
+        """Return the number of a new heartbeat; the caller must send it to the page immediately."""
         self._number += 1
         self._issued.append(now)
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return the reason to refuse an input; for a valid input, store its number and return "".
+        """Return the reason to refuse an input, or store a valid input's number and return "".
 
         Args:
             given: the numbers sent with the input.
@@ -84,7 +84,7 @@ class DuplicateElimination:
         self._newest: dict[str, int] = {}
 
     def accept(self, about: str, number: int) -> bool:
-        """Return whether `number` is the highest number so far for `about`; if so, store it."""
+        """Return whether `number` is the highest number so far for `about`, and store it if so."""
         if number <= self._newest.get(about, 0):
             return False
         self._newest[about] = number

@@ -10,8 +10,8 @@ would override other sources of motion.
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
 are refused. The operator must release the control and press it again to rearm it.
 
-If the connection is lost while the robot may be moving, the control owes a stop. The owed stop is
-the first frame on the restored connection. All other unsent values are dropped.
+If the connection is lost while the robot may be moving, the control owes a stop. This stop is the
+first frame sent on the restored connection. All other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -39,12 +39,12 @@ class HoldTerms(NamedTuple):
     """
 
     stop: Payload
-    """Complete frame that stops the motion. Empty for a robot that moves in steps, because each
-    step ends without a stop frame."""
+    """Complete frame that stops the motion. Empty for a robot that moves in steps, because its
+    steps end without a stop frame."""
     period_s: float
     """Minimum average time between two writes, in seconds."""
     lease_s: float = LEASE_S
-    """Time that motion continues after the last tick, 0.1 to 1.0 seconds."""
+    """How long motion continues after the last tick, 0.1 to 1.0 seconds."""
     is_lossy: bool = False
     """Whether the transport may lose frames, such as datagrams; if so, the stop is repeated."""
     stops: tuple[Numbered, ...] = ()
@@ -74,7 +74,7 @@ class HoldToRun:
         self.is_armed = False
         """Whether ticks are accepted."""
         self.reason: Reason | None = None
-        """Reason of the last stop."""
+        """Reason for the last stop."""
         self.is_told = True
         """Whether the last stop was reported; set by the owner of the connection."""
         self.owes_stop = False
@@ -87,7 +87,7 @@ class HoldToRun:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a value has not been written yet."""
+        """Whether a value is waiting to be written."""
         return self._waiting is not None
 
     def must_stop(self, now: float) -> bool:
@@ -121,8 +121,8 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        Without `data`, the tick renews the lease but drops any unsent value, because the new input
-        value cannot be sent.
+        If there is no `data`, the tick renews the lease but drops any unsent value, because the new
+        input value cannot be sent.
 
         Returns:
             Whether the tick was accepted. If not, the control must be rearmed.
@@ -131,7 +131,7 @@ class HoldToRun:
             self.stop("expired", now)  # a tick after the lease belongs to no motion
         if not self.is_armed or self.owes_stop:
             return False
-        self.state = "moving"  # also from the repeats of the stop that a release began
+        self.state = "moving"  # also during the repeated stops after a release
         self._waiting = data
         self._expires_at = now + self.terms.lease_s
         return True
@@ -161,9 +161,9 @@ class HoldToRun:
 
         Args:
             now: the time.
-            is_clear: whether the connection has no unsent bytes. A motion frame waits for a clear
-                connection; meanwhile, newer values replace the waiting value. A stop frame never
-                waits.
+            is_clear: whether all bytes on the connection have been sent. A motion frame waits for a
+                clear connection; meanwhile, newer values replace the waiting value. A stop frame
+                never waits.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)

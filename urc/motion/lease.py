@@ -1,10 +1,10 @@
 """The lease of one robot: the exclusive right of one operator to drive the robot.
 
 Theory of operation. At most one operator holds the lease. Every change of holder and every stop
-first sends a stop to the robot and increments the lease's epoch. Inputs with an older epoch are
-refused, so that no motion continues by mistake. A holder who sends no input for `SILENT_S` seconds
-loses the lease. STOP requires no lease and latches: the robot does not move until an operator
-resets the latch. A reset never starts motion.
+begins by sending a stop to the robot and incrementing the lease's epoch. Inputs with an older epoch
+are refused, so motion cannot continue by mistake. A holder who sends no input for `SILENT_S`
+seconds loses the lease. STOP does not require a lease, and it latches: the robot does not move
+until an operator resets the latch. A reset never starts motion.
 """
 
 from typing import Final, NamedTuple
@@ -16,7 +16,7 @@ __all__ = ["LeaseChanged", "Operator", "Lease", "LeaseState", "LeaseRefused", "W
 
 WATCHES: Final = "this page only watches"
 SILENT_S: Final = 60.0
-"""Time without input after which the holder loses the lease, in seconds."""
+"""How long the holder can send no input before losing the lease, in seconds."""
 SHORTEST_REQUEST_S: Final = 3.0
 REQUEST_S: Final = 10.0
 LONGEST_REQUEST_S: Final = 60.0
@@ -30,11 +30,11 @@ class Operator(NamedTuple):
     name: str = ""
     """Name shown to other operators."""
     role: Role | None = "drive"
-    """Role at the last check; None without any rights."""
+    """Role at the last check; None if the person has no rights."""
     who: str = ""
-    """Name of the person, device or program; "" without a sign-in."""
+    """Name of the person, device or program; "" if not signed in."""
     principal: str = ""
-    """Identifier of the person, device or program; "" without a sign-in."""
+    """Identifier of the person, device or program; "" if not signed in."""
     person: str = ""
     """Identifier of the person: a device's owner, otherwise the principal; "" if unknown."""
     way: str = ""
@@ -111,8 +111,8 @@ class Lease:
     def interlock(self, client: Operator, stops: int | None = None) -> str:
         """Return the reason to refuse autonomous motion, or "".
 
-        Autonomous motion needs no lease, because no control is held. A latched stop or another
-        operator's lease prevents autonomous motion.
+        Autonomous motion does not need a lease, because no control is held. A latched stop or
+        another operator's lease prevents autonomous motion.
 
         Args:
             client: the operator who issues the command.
@@ -153,7 +153,7 @@ class Lease:
     def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
-        """Ask the holder for the lease; without an answer, it is granted after `for_s` seconds."""
+        """Ask the holder for the lease, and grant it after `for_s` seconds without an answer."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
@@ -204,7 +204,7 @@ class Lease:
     def reset(self, client: Operator) -> LeaseChanged | LeaseRefused:
         """Reset the latch, so that operators can drive the robot again.
 
-        A reset starts no motion.
+        A reset does not start motion.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("viewers can stop the robot, and cannot reset it")

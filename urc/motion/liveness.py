@@ -11,11 +11,11 @@ from typing import Final
 __all__ = ["ASKED_EVERY_S", "SILENCE_S", "Liveness"]
 
 SILENCE_S: Final = 0.5
-"""Silence after which a probed program counts as frozen, in seconds."""
+"""How long a probed program can be silent before it counts as frozen, in seconds."""
 ASKED_EVERY_S: Final = 0.05
 """Interval between a reply and the next probe, in seconds."""
 _ON_THE_WAY_S: Final = 0.03
-"""Time allowed for the delivery of a reply, or for the reset after a missing reply, in seconds."""
+"""Time allowed for delivering a reply, or for a reset if no reply arrives, in seconds."""
 
 
 class Liveness:
@@ -27,7 +27,7 @@ class Liveness:
         """Create the watch.
 
         Args:
-            silent_s: maximum silence without a probe, in seconds; None for no limit.
+            silent_s: maximum silence without a probe, in seconds; None means no limit.
         """
         self._silent_s = inf if silent_s is None else silent_s
         self._heard_s = -inf

@@ -1,7 +1,7 @@
 """A slew rate limit for held commands that limits acceleration but never braking.
 
 Distances are measured from rest, the value at which the robot stands still. A change towards rest
-is applied immediately. A change away from rest is limited. A change across rest reaches rest
+is applied immediately. A change away from rest is limited. A change that crosses rest reaches rest
 immediately, and only the part beyond rest is limited.
 """
 

@@ -24,21 +24,21 @@ __all__ = [
 SHORTEST_CUT_S: Final = 0.2
 """Shortest network interruption for which `STOP_WITHIN_S` is guaranteed, in seconds."""
 STOP_WITHIN_S: Final = 0.1
-"""Maximum time from the end of a network interruption to the stop, in seconds."""
+"""Maximum time between the end of a network interruption and the stop, in seconds."""
 TICK_S: Final = 0.05
-"""Period of the ticks of a held control, in seconds. The first write after an interruption begins
-may be delayed by one tick."""
+"""Period of the ticks of a held control, in seconds. After an interruption begins, up to one tick
+may pass before the first write."""
 AFRESH_S: Final = 0.03
 """Time to reset and reopen a nearby connection and write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
 """Age of unsent bytes at which a connection counts as stalled, in seconds. A stalled connection is
 reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte written one tick
-after the start of the shortest interruption reaches this age just in time."""
+after the shortest interruption begins reaches this age just in time."""
 WAITED_S: Final = 1.0
 """Age of unsent bytes at which a connection that is slow to open counts as stalled, in seconds."""
 IN_FLIGHT_S: Final = 0.15
 """Maximum age of unacknowledged bytes on a healthy connection, in seconds. Operating systems delay
-acknowledgements: Linux by up to 40 ms, small TCP stacks until a second segment arrives."""
+acknowledgements: Linux by up to 40 ms, and small TCP stacks until a second segment arrives."""
 _TOGETHER_S: Final = 0.005
 _MOST: Final = 256
 
@@ -96,7 +96,7 @@ class StallWatch:
         self._written = self._taken = 0
 
     def reset(self) -> None:
-        """Reset the watch to the state without unsent bytes."""
+        """Reset the watch, as if all bytes had been sent."""
         self._marks.clear()
         self._written = self._taken = 0
 

@@ -80,7 +80,7 @@ def name_fault(path: str) -> str:
 
 
 def names_fault(paths: Sequence[str]) -> str:
-    """Return an error message for paths that some systems cannot distinguish, or ""."""
+    """Return an error message if some systems cannot distinguish the paths, otherwise ""."""
     seen: dict[str, str] = {}
     for path in paths:
         other = seen.setdefault(path.casefold(), path)
@@ -131,11 +131,11 @@ _TYPES: Final = {0o120000: "a link", 0o060000: "a device", 0o020000: "a device",
 
 
 def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) -> bytes:
-    """Return the archive of the given files.
+    """Return an archive that contains the given files.
 
     Args:
         files: file contents by path; paths are relative and use '/'.
-        limits: limits of the archive.
+        limits: the archive's limits.
         name: archive name in error messages.
 
     Raises:
@@ -147,7 +147,7 @@ def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) 
 
 
 def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
-    """Return the file contents of an archive by path, sorted by path.
+    """Return the contents of an archive's files by path, sorted by path.
 
     Raises:
         PackageError: the archive is invalid.
@@ -169,7 +169,7 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
 
 
 def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
-    """Check the end record and the number of entries before the directory is parsed."""
+    """Check the end record and the number of entries before parsing the directory."""
     if not data.startswith(b"PK"):
         raise PackageError(f"{name}: this is not a package: expected a ZIP archive")
     end = data[-_END_BYTES:]

@@ -22,7 +22,7 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
     """Write a file atomically: a power failure leaves either the old or the new content.
 
     Args:
-        file: path of the file; missing folders are created.
+        file: the file's path; missing folders are created.
         data: complete content of the file.
         work: folder on the same file system, for incomplete files.
 
@@ -89,7 +89,7 @@ def discard(path: Path, work: Path) -> None:
 
 
 def clear(work: Path) -> None:
-    """Delete the incomplete files of an interrupted change."""
+    """Delete incomplete files left by an interrupted change."""
     if work.is_dir():
         for entry in work.iterdir():
             if entry.is_dir():
@@ -100,7 +100,7 @@ def clear(work: Path) -> None:
 
 @contextmanager
 def exclusive(file: Path) -> Iterator[None]:
-    """Lock out other processes while the context is active.
+    """Exclude other processes while the context is active.
 
     A crash of this process releases the lock.
 

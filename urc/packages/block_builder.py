@@ -1,4 +1,4 @@
-"""The block list of a repository's folder, in ``blocks.json``, for the maintainer's commands."""
+"""The block list in a repository's ``blocks.json``, for the maintainer's commands."""
 
 from pathlib import Path
 from secrets import token_hex
@@ -16,12 +16,12 @@ __all__ = ["block", "export_blocks", "unblock"]
 
 
 def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
-    """Add an entry to the block list of a repository, and sign the index; return the index.
+    """Add an entry to a repository's block list, and sign the index; return the index.
 
     The new entry replaces an entry with the same subject.
 
     Args:
-        folder: folder of the repository.
+        folder: the repository's folder.
         new: the entry.
         index_signer: maintainer's signer.
 
@@ -32,7 +32,7 @@ def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
 
 
 def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Index:
-    """Withdraw an entry of the block list, and sign the index; return the index.
+    """Withdraw an entry from the block list, and sign the index; return the index.
 
     Raises:
         PackageError: as for `block`, or no entry has this subject.
@@ -41,7 +41,7 @@ def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Ind
 
 
 def export_blocks(folder: Path, index_signer: IndexSigner | None) -> BlockFile:
-    """Return the signed block list of a repository for machines without a network.
+    """Return a repository's signed block list for machines without a network.
 
     Raises:
         PackageError: the maintainer has no key, or nothing was ever blocked.

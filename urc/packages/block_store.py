@@ -25,7 +25,7 @@ _LISTS_MOST: Final = 64
 
 
 class KeyHolder(Protocol):
-    """The name and the public key of a signer."""
+    """A signer's name and public key."""
 
     @property
     def by(self) -> str:
@@ -37,17 +37,17 @@ class KeyHolder(Protocol):
 
 
 class KnownBlocks(msgspec.Struct, frozen=True):
-    """A block list with its maintainer and origin."""
+    """A block list with its maintainer and its origin."""
 
     by: str
-    """Name of the maintainer, which is confirmed only by the key."""
+    """The maintainer's name; only the key confirms the name."""
     key: str
-    """Public key of the maintainer, 32 bytes in base64."""
+    """The maintainer's public key, 32 bytes in base64."""
     number: int
     """Number of the index that contains the list."""
     listed: BlockList
     place: str
-    """URL of the repository, or path of the imported file."""
+    """The repository's URL, or the imported file's path."""
 
     @property
     def maintainer(self) -> str:
@@ -87,13 +87,13 @@ class BlockStore:
         return self._read[1]
 
     def keep(self, by: KeyHolder, number: int, listed: BlockList, place: str) -> None:
-        """Store a verified list instead of an older list with the same key and id.
+        """Store a verified list, which replaces an older list with the same key and id.
 
         Args:
             by: holder of the trusted key that signed the list.
             number: number of the index that contains the list.
             listed: the list.
-            place: URL of the repository, or path of the file.
+            place: the repository's URL, or the file's path.
 
         Raises:
             PackageError: a newer list is known, or too many lists are known.
@@ -128,8 +128,8 @@ class BlockStore:
         """Return one line for each blocked package in a lock, with the maintainer and the reason.
 
         Args:
-            lock: lock of an installed or planned package.
-            signature_of: function that returns the signature of an archive by its digest.
+            lock: the lock of an installed or planned package.
+            signature_of: function that returns an archive's signature by its digest.
 
         Raises:
             PackageError: the file with the block lists is damaged.

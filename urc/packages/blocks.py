@@ -1,4 +1,4 @@
-"""The block list of a repository: packages that must not be used, even if they are installed.
+"""A repository's block list: packages that must not be used, even if they are installed.
 
 A maintainer signs the list, either in the index or in a file for machines without a network.
 """
@@ -78,21 +78,21 @@ class BlockList(msgspec.Struct, frozen=True):
 
 
 class BlockFile(msgspec.Struct, frozen=True):
-    """A signed block list in a file of its own."""
+    """A signed block list in a separate file."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
-    """Number of the index with the same list; an older list is not accepted."""
+    """Number of the index that contains the same list; an older list is not accepted."""
     listed: BlockList
     signature: Signature
 
     def to_bytes(self) -> bytes:
-        """Return the content of the file."""
+        """Return the file's content."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
 def sign_blocks(listed: BlockList, number: int, index_signer: IndexSigner) -> BlockFile:
-    """Return the file of a block list, signed with the maintainer's key."""
+    """Return a block list's file, signed with the maintainer's key."""
     signer = index_signer.signer
     return BlockFile(1, number, listed, signer.signs(_statement(listed, number, signer.by)))
 

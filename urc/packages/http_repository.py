@@ -20,7 +20,7 @@ _TOTAL_S: Final = 120.0
 """Timeout for the whole transfer of a file, in seconds."""
 _ANSWER_BYTES: Final = 65536
 _CHECKED_S: Final = 90.0
-"""Timeout for the repository's check of an upload, in seconds."""
+"""Timeout while the repository checks an upload, in seconds."""
 
 
 class HttpResponse(NamedTuple):
@@ -33,7 +33,7 @@ class HttpResponse(NamedTuple):
 
 
 def repository_url(text: str) -> str:
-    """Return the normalized URL of a repository; raise `PackageError` if invalid."""
+    """Return a repository's normalized URL; raise `PackageError` if the URL is invalid."""
     try:
         url = httpx2.URL(text)
     except httpx2.InvalidURL:
@@ -60,10 +60,10 @@ def fetch_archive(url: str, entry: IndexEntry) -> bytes:
 def ask(
     url: str, most: int, etag: str = "", total_s: float = _TOTAL_S, *, may_lack: bool = False
 ) -> HttpResponse:
-    """Return the file at a URL, up to `most` bytes.
+    """Return the file at a URL, with a size of at most `most` bytes.
 
     Args:
-        url: URL of the file; redirects are not followed.
+        url: the file's URL; redirects are not followed.
         most: maximum size of the file, in bytes.
         etag: ETag of the local copy.
         total_s: timeout for the whole transfer, in seconds.

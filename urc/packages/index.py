@@ -97,14 +97,14 @@ class Index(msgspec.Struct, frozen=True):
         return self.blocks if isinstance(self.blocks, BlockList) else None
 
     def to_bytes(self) -> bytes:
-        """Return the content of the index file: equal indexes have the same bytes."""
+        """Return the index file's content: equal indexes have the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
 def entry_of(
     package: Package, signature: Signature | None = None, notes: Notes | None = None
 ) -> IndexEntry:
-    """Return the index entry of a package."""
+    """Return a package's index entry."""
     notes = notes or Notes()
     said = package.manifest
     return IndexEntry(
@@ -158,7 +158,7 @@ def check_entries(entries: Iterable[IndexEntry]) -> None:
 
 
 def search(entries: Iterable[IndexEntry], words: Sequence[str], kind: str = "") -> list[IndexEntry]:
-    """Return the newest version of each package that contains all words.
+    """Return the newest version of each package whose entry contains all words.
 
     Matches in package names precede other matches. Withdrawn versions are omitted.
     """

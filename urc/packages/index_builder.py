@@ -1,4 +1,4 @@
-"""The folder of a repository: source packages, and files for any web server.
+"""A repository's folder: source packages, and files that any web server can serve.
 
     DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
     DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
@@ -75,11 +75,11 @@ def make_index(
     examine: Callable[[Path], list[str]],
     index_signer: IndexSigner | None = None,
 ) -> IndexListing:
-    """Check every package in a folder, list the valid packages and write `index.json`.
+    """Check every package in a folder, list the valid packages, and write `index.json`.
 
     Args:
-        folder: folder of the repository.
-        name: name of the repository.
+        folder: the repository's folder.
+        name: the repository's name.
         examine: function that returns the errors of a package's document, one per line.
         index_signer: maintainer's signer for the index and for new source packages.
 
@@ -109,7 +109,7 @@ def make_index(
 
 @contextmanager
 def changing(folder: Path) -> Iterator[Path]:
-    """Lock a repository against other processes; yield a folder for incomplete files.
+    """Lock a repository against other processes, and yield a folder for incomplete files.
 
     Raises:
         PackageError: another process holds the lock for more than ten seconds.
@@ -164,7 +164,7 @@ def withdraw(
     """Withdraw a version or make it available again; return the version's index entry.
 
     Args:
-        folder: folder of the repository.
+        folder: the repository's folder.
         key: the package.
         version: its version.
         why: reason shown to users of the version; "" to make the version available again.
@@ -223,19 +223,19 @@ def write_index(
     work: Path,
     index_signer: IndexSigner | None = None,
 ) -> Index:
-    """Write the index of a repository, then its head.
+    """Write a repository's index, then its head.
 
-    After an interruption, every served file is complete. The next call repairs missing files.
+    Every served file is complete, even after an interruption. The next call repairs missing files.
 
     Args:
-        folder: folder of the repository, locked against other processes.
-        name: name of the repository.
+        folder: the repository's folder, locked against other processes.
+        name: the repository's name.
         entries: all versions.
         work: folder for incomplete files.
         index_signer: maintainer's signer, for the head.
 
     Raises:
-        PackageError: the index is signed with another key; nothing has changed.
+        PackageError: the index is signed with another key; no file has been changed.
         OSError: writing failed, for example because the disk is full.
     """
     before, number = _before(folder)
@@ -306,7 +306,7 @@ def _take(
     examine: Callable[[Path], list[str]],
     signer: Signer | None,
 ) -> list[str]:
-    """Write the archive of a new version; return its errors."""
+    """Write a new version's archive; return its errors."""
     try:
         package = pack_folder(home)
     except PackageError as error:
@@ -333,7 +333,7 @@ def _take(
 
 
 def _known(folder: Path) -> dict[str, IndexEntry]:
-    """Return the entries of the last index by file, so known archives need no parsing."""
+    """Return the last index's entries by file, so that known archives need no parsing."""
     try:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -378,7 +378,7 @@ def read_signature(archive: Path) -> Signature | None:
 
 
 def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:
-    """Return the description of a package in the format of figure B.2 of the URC thesis."""
+    """Return a package's description in the format of figure B.2 of the URC thesis."""
     needed = [key for key in map(parse_key, said.needs) if key.kind in _THESIS]
     styles = sorted(path for path in files if path.endswith(".css"))
     found: dict[str, object] = {

@@ -1,4 +1,4 @@
-"""The head of an index: number, digest, signature and expiry time.
+"""An index's head: number, digest, signature and expiry time.
 
 A maintainer with a key signs the head, and therefore the digest of the whole index. The signature
 of a head expires after some days. An attacker cannot hide newer versions from clients after the
@@ -91,7 +91,7 @@ def read_head(data: bytes, where: str) -> IndexHead:
 
 
 def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
-    """Raise `PackageError` if the key of the current signed head is not available.
+    """Raise `PackageError` if the key that signed the current head is not available.
 
     Clients have pinned the key, so they would reject a head with another key.
     """
@@ -106,16 +106,16 @@ def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
 def next_head(
     old: IndexHead | None, number: int, digest: str, index_signer: IndexSigner | None
 ) -> IndexHead:
-    """Return a new head of an index, or the old head while it is still valid.
+    """Return a new head for an index, or the old head while it is still valid.
 
     Args:
         old: current head; None without a valid head.
         number: number of the index.
-        digest: digest of the index file.
+        digest: the index file's digest.
         index_signer: maintainer's signer; None for an unsigned head.
 
     Raises:
-        PackageError: the key of the signed old head is not available.
+        PackageError: the key that signed the old head is not available.
     """
     signed = old.signed if old is not None else None
     is_same = old is not None and (old.number, old.sha256) == (number, digest)

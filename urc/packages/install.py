@@ -1,4 +1,4 @@
-"""Install plans for packages requested by users."""
+"""Install plans for the packages that users request."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -38,13 +38,13 @@ def plan_requirement(
     *,
     takes_withdrawn: bool = False,
 ) -> InstallPlan:
-    """Return the install plan of a requirement, with all archives.
+    """Return the install plan for a requirement, with all archives.
 
     Args:
         required: the requirement.
         sources: package sources, in the order of requests.
         store: store with archives that need no download.
-        complain: callback for warnings to the user.
+        complain: callback that receives warnings for the user.
         pinned: lock with the only accepted versions and digests, even if a version was withdrawn
             later.
         takes_withdrawn: whether withdrawn versions are accepted.
@@ -71,7 +71,7 @@ def plan_requirement(
 def plan_file(
     source: FileSource, others: Sequence[Source], store: Store, complain: Callable[[str], None]
 ) -> InstallPlan:
-    """Return the install plan of the package in a file or folder.
+    """Return the install plan for the package in a file or folder.
 
     Other sources are used only for missing dependencies.
     """
@@ -95,7 +95,7 @@ def plan_file(
 def plan_root(
     root: PackageId, wanted: str, found: Found, store: Store, pinned: Lock | None = None
 ) -> InstallPlan:
-    """Return the install plan of one package, with all archives.
+    """Return the install plan for one package, with all archives.
 
     Args:
         root: the package.
@@ -145,7 +145,7 @@ def check_names(chosen: Iterable[PackageId]) -> None:
 
 
 def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
-    """Return one line for each package, with its origin and signer."""
+    """Return one line for each package, stating its origin and signer."""
     keys = store.state().keys
     lines: list[str] = []
     for name, pin in plan.lock.packages.items():
@@ -165,7 +165,7 @@ def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
 
 
 def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
-    """Return one line for each withdrawn package in a lock, with the reason."""
+    """Return one line for each withdrawn package in a lock, stating the reason."""
     return [
         phrase("{package} was withdrawn: {why}", package=entry, why=entry.why_withdrawn)
         for name, pin in lock.packages.items()
@@ -185,12 +185,12 @@ def without_blocked(found: Found, store: Store) -> Found:
 
 
 def _blocked(entry: IndexEntry, store: Store) -> list[str]:
-    """Return the reasons why a version is blocked, one per line."""
+    """Return why a version is blocked, with one reason per line."""
     return store.blocks.lines(lock_of(entry.key, {entry.key: entry}), lambda _: entry.signed)
 
 
 def _remark(entry: IndexEntry) -> str:
-    """Return the repository's remarks about a version."""
+    """Return the repository's remarks on a version."""
     said: list[str] = []
     if entry.why_withdrawn:
         said.append(phrase("WITHDRAWN: {why}", why=entry.why_withdrawn))

@@ -1,4 +1,4 @@
-"""An install plan: a lock with new archives and their signatures."""
+"""An install plan: a lock, the new archives and their signatures."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class InstallPlan(NamedTuple):
     waived: frozenset[str] = frozenset()
     """Packages that the user accepts without a signature in this installation."""
     remarks: Mapping[str, str] = {}
-    """Remarks of repositories about withdrawals and origins, by digest."""
+    """The repositories' remarks about withdrawals and origins, by digest."""
 
     @property
     def told(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""The lock of a package: versions and digests of the package and its dependencies."""
+"""A package's lock: versions and digests of the package and its dependencies."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final
@@ -63,7 +63,7 @@ class Lock(msgspec.Struct, frozen=True):
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """Return the content of the lock file: equal locks have the same bytes."""
+        """Return the lock file's content: equal locks have the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self, order="sorted"), indent=1) + b"\n"
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""``package.yaml``: the manifest of a package."""
+"""``package.yaml``: a package's manifest."""
 
 from typing import Any, Final, NamedTuple
 
@@ -40,7 +40,7 @@ class Manifest(NamedTuple):
 
 
 def parse_manifest(content: bytes, file: str) -> Manifest:
-    """Return the content of a manifest.
+    """Return a manifest's content.
 
     Raises:
         PackageError: the manifest is invalid; the message contains the line.
@@ -71,7 +71,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
 
 
 class _Reader:
-    """A reader of manifest values; errors contain the line."""
+    """A reader for manifest values; its errors contain the line."""
 
     def __init__(self, document: Document) -> None:
         self._document = document

@@ -18,12 +18,12 @@ __all__ = [
 
 KINDS: Final = ("driver", "interface", "widget", "robot")
 FOLDERS: Final = {f"{kind}s": kind for kind in KINDS}
-"""Kind of the packages in each folder, by folder name."""
+"""Kind of package in each folder, by folder name."""
 NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
 class PackageError(UrcError):
-    """A failed operation on a package, a repository or the store, with a one-line message."""
+    """A failed operation on a package, a repository or the store; the message is one line."""
 
 
 class PackageId(NamedTuple):
@@ -41,7 +41,7 @@ class PackageRequirement(NamedTuple):
     """A requirement from a command line."""
 
     kind: str
-    """Kind of the package; "" for any kind."""
+    """The package's kind; "" for any kind."""
     name: str
     range: str = "*"
 

@@ -1,4 +1,4 @@
-"""Upload of a package to a repository."""
+"""Uploads of packages to a repository."""
 
 import base64
 import ipaddress
@@ -18,7 +18,7 @@ __all__ = ["Published", "is_overheard", "publish"]
 
 
 class Published(msgspec.Struct, frozen=True):
-    """Response of a repository to an upload."""
+    """A repository's response to an upload."""
 
     listed: str
     """Listed version, such as ``drivers/puppet 1.0.0``."""
@@ -52,11 +52,11 @@ def publish(
     """Upload a package to a repository. The repository checks, tests and lists the package.
 
     Args:
-        url: URL of the repository. Redirects are not followed, to protect the token.
+        url: the repository's URL. Redirects are not followed, to protect the token.
         package: the package.
-        signature: signature of the package; None for an unsigned package.
+        signature: the package's signature; None for an unsigned package.
         token: upload token from the maintainer.
-        provenance: origin of the package, shown before installation; None if unknown.
+        provenance: the package's origin, shown before installation; None if unknown.
 
     Raises:
         PackageError: the repository rejects the upload or is unreachable.

@@ -23,7 +23,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""Number of attempts; a repository may change between the requests for head and index."""
+"""Number of attempts; a repository may change between the two requests for head and index."""
 
 
 class _RepositoriesFile(msgspec.Struct, frozen=True):
@@ -33,7 +33,7 @@ class _RepositoriesFile(msgspec.Struct, frozen=True):
 
 class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Digest of the index to which the stored ETags belong."""
+    """Digest of the index that the stored ETags belong to."""
     index: str = ""
     """ETag of the index."""
     head: str = ""
@@ -46,8 +46,8 @@ class Repository:
 
     The last index is stored for use while the repository is unreachable.
 
-    The index number never decreases. For an index with a lower number, URC reports an error and
-    uses the stored index. The first signing key is pinned. An index with another key or without a
+    The index number never decreases. If an index has a lower number, URC reports an error and uses
+    the stored index. The first signing key is pinned. An index with another key or without a
     signature is rejected.
     """
 
@@ -79,7 +79,7 @@ class Repository:
         return by.key if by is not None else ""
 
     def known(self) -> tuple[IndexEntry, ...]:
-        """Return the entries of the stored index without a request; () without a stored index."""
+        """Return the stored index's entries without a request; () without a stored index."""
         kept = self._kept()
         return kept[0].packages if kept is not None else ()
 
@@ -117,7 +117,7 @@ class Repository:
         )
 
     def _keep_blocks(self, index: Index) -> None:
-        """Store the block list of an accepted index; the list of an unsigned index is ignored."""
+        """Store the block list of an accepted index; an unsigned index's list is ignored."""
         listed, by = index.block_list, self._trust.signer
         if listed is None or by is None:
             return

@@ -1,8 +1,8 @@
-"""Dependency resolution: the choice of a version for every required package.
+"""Dependency resolution, which chooses a version for every required package.
 
 The search uses `resolvelib`, the resolver of pip. The resolver backtracks after a conflict, and
-reports conflicts without a solution. This module defines packages, dependencies and the preferred
-version, which is the newest match.
+reports conflicts that have no solution. This module defines packages, dependencies and the
+preferred version, which is the newest match.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""HTTP server for a repository's listed files and the lists in figure B.3 of the URC thesis.
+"""HTTP server for a repository's listed files, and for the lists in figure B.3 of the URC thesis.
 
 Only files in the index are served. The server reads the index again after each change, so new
 packages need no restart.
@@ -201,7 +201,7 @@ def repository_app(
     """Return the web application that serves the repository in a folder.
 
     Args:
-        folder: folder of the repository.
+        folder: the repository's folder.
         tokens: upload tokens; None to refuse uploads.
         examine: function that checks uploads, as in `urc.packages.submission.take`.
         index_signer: signer of the index after uploads, with the maintainer's key.

@@ -2,7 +2,7 @@
 
 A signature states that the key's holder declares these bytes to be this version of this package.
 URC does not verify the identity of the key's holder. The first installation of a package pins its
-key. Later versions with another key are rejected. SSH treats host keys in the same way.
+key. Later versions with another key are rejected. SSH handles host keys in the same way.
 """
 
 import base64
@@ -34,7 +34,7 @@ __all__ = [
 PUBLISHER: Final = "publisher.pem"
 """File with the user's private key, in the data folder."""
 SIGNATURE: Final = "urc-signature"
-"""Header of an upload: the signature as JSON, in base64."""
+"""Upload header that contains the signature as JSON, in base64."""
 _STATEMENT: Final = "URC package signature 1\n{package}\n{version}\n{sha256}\n{by}\n"
 _NAMED: Final = "Publisher: "
 _KEY_BYTES: Final = 16384
@@ -89,7 +89,7 @@ class Signature(msgspec.Struct, frozen=True):
 
 
 SignatureOf = Callable[[str], Signature | None]
-"""Function that returns the signature of an archive by its digest; None without a signature."""
+"""Function that returns an archive's signature by its digest; None without a signature."""
 
 
 class Signer:
@@ -106,7 +106,7 @@ class Signer:
         return fingerprint(self.key)
 
     def sign(self, package: PackageId, version: str, sha256: str) -> Signature:
-        """Return the signature of a package. The same package always has the same signature."""
+        """Return a package's signature. The same package always has the same signature."""
         return self.signs(_statement(package, version, sha256, self.by))
 
     def signs(self, statement: bytes) -> Signature:
@@ -122,7 +122,7 @@ class Signer:
 
 
 def fingerprint(key: str) -> str:
-    """Return the fingerprint of a public key, in the format of SSH."""
+    """Return a public key's fingerprint, in SSH's format."""
     digest = hashlib.sha256(base64.b64decode(key)).digest()
     return "SHA256:" + base64.b64encode(digest).decode().rstrip("=")
 

@@ -1,4 +1,4 @@
-"""Package sources with one interface: repositories, bundles, archives and folders."""
+"""Package sources that share one interface: repositories, bundles, archives and folders."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -64,12 +64,12 @@ class FileSource:
         return tuple(self._packages.values())
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return an archive of the source."""
+        """Return an archive from the source."""
         return self._packages[entry.sha256].data
 
 
 def open_source(path: Path) -> FileSource:
-    """Return the folder, archive or bundle at a path; raise `PackageError` on failure."""
+    """Return the source (folder, archive or bundle) at a path; raise `PackageError` on failure."""
     if path.is_dir():
         packages = _pack_with_needs(path)
         return FileSource(str(path), packages, [packages[0].manifest.key], is_folder=True)
@@ -105,7 +105,7 @@ def _pack_with_needs(folder: Path) -> list[Package]:
 def make_bundle(
     root: PackageId, archives: Mapping[str, bytes], signatures: Mapping[str, Signature], name: str
 ) -> bytes:
-    """Return the bytes of a bundle: a small repository in one file.
+    """Return the bytes of a bundle, which is a small repository in one file.
 
     Args:
         root: package to install.
@@ -167,12 +167,12 @@ def merged(
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
     """Return every version of every package with its source, including withdrawn versions.
 
-    All versions of a package are from the first source that contains the package. A source that is
-    added later therefore cannot offer a newer version of a known package.
+    For each package, all versions come from the first source that contains the package. A source
+    that is added later therefore cannot offer a newer version of a known package.
 
     Args:
         sources: package sources, in the order of requests.
-        complain: callback for an error message about each unreachable source.
+        complain: callback that receives an error message about each unreachable source.
     """
     found: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}
     for source in sources:

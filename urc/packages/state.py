@@ -1,4 +1,4 @@
-"""The state of installed packages in ``state.json``, with pure functions from state to state."""
+"""The state of installed packages in ``state.json``, and pure functions that return a new state."""
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated
@@ -19,11 +19,11 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
-    """Public key of the first installation, by package, such as ``drivers/puppet``. Removing a
+    """Public key from the first installation, by package, such as ``drivers/puppet``. Removing a
     package does not delete its key, because a reinstallation would then bypass the key check.
     """
     before: dict[str, Lock] = {}
-    """Previous lock for undoing the last update, by digest of the installed lock."""
+    """Previous lock, with which the last update can be undone, by digest of the installed lock."""
     waived: tuple[str, ...] = ()
     """Packages that the user accepts without a signature in every installation, sorted."""
 
@@ -37,7 +37,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, lock), self.before, plan)
 
     def with_update(self, old: Lock, plan: InstallPlan) -> "StoreState":
-        """Return the state after replacing the lock `old`, with an undo step for `old`."""
+        """Return the state after replacing the lock `old`, with an undo step restoring `old`."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
@@ -117,7 +117,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
             )
 
     def lacking(self, plan: InstallPlan) -> list[str]:
-        """Return the packages of a plan without the required signature.
+        """Return a plan's packages that lack the required signature.
 
         Packages from a named folder, packages with a waiver, and the exact bytes of installed
         packages need no signature.
@@ -133,7 +133,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         ]
 
     def _check_known(self, name: str, pin: Pin) -> None:
-        """Reject different bytes of a known version, because the change would be silent."""
+        """Reject different bytes for a known version, because users would not notice the change."""
         for lock in self.kept:
             known = lock.packages.get(name)
             if known and known.version == pin.version and known.sha256 != pin.sha256:
@@ -145,7 +145,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     def _next(
         self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: InstallPlan | None
     ) -> "StoreState":
-        """Return the next state: sorted, with new keys, without undo steps of removed locks."""
+        """Return the next state: sorted, with new keys, without undo steps for removed locks."""
         digests = {lock.digest for lock in installed}
         keys = dict(self.keys)
         if plan is not None:

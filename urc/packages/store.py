@@ -57,7 +57,7 @@ class Store:
         return self.state().installed
 
     def state(self) -> StoreState:
-        """Return the state of the store; raise `PackageError` on failure."""
+        """Return the store's state; raise `PackageError` on failure."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)
@@ -69,7 +69,7 @@ class Store:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
 
     def previous(self, lock: Lock) -> Lock | None:
-        """Return the lock from before the update to `lock`, or None without an update."""
+        """Return the lock from before the update to `lock`, or None if there was no update."""
         return self.state().before.get(lock.digest)
 
     def find(self, required: PackageRequirement) -> Lock | None:
@@ -103,7 +103,7 @@ class Store:
         _check_blocks(self.blocked(lock))
 
     def place(self, lock: Lock) -> Path:
-        """Return the folder of a lock's files."""
+        """Return the folder with a lock's files."""
         return self.folder / "ecosystems" / lock.digest
 
     def blob(self, digest: str) -> bytes:
@@ -124,11 +124,11 @@ class Store:
         return self.blob_file(digest).is_file()
 
     def blob_file(self, digest: str) -> Path:
-        """Return the path of an archive. The archive may be missing."""
+        """Return an archive's path. The archive may be missing."""
         return self.folder / "blobs" / f"{digest}.zip"
 
     def signature(self, digest: str) -> Signature | None:
-        """Return the unverified signature of an archive, or None."""
+        """Return an archive's unverified signature, or None."""
         try:
             with open(self._signature_file(digest), "rb") as file:
                 return msgspec.json.decode(file.read(4096), type=Signature)
@@ -136,13 +136,13 @@ class Store:
             return None
 
     def keep_signature(self, digest: str, signature: Signature) -> None:
-        """Store the signature of an archive. Only `StoreTransaction` may call this method."""
+        """Store an archive's signature. Only `StoreTransaction` may call this method."""
         if self.signature(digest) != signature:
             data = msgspec.json.encode(signature) + b"\n"
             atomic_files.put_file(self._signature_file(digest), data, self.work)
 
     def make(self, lock: Lock) -> Path:
-        """Return the folder of a lock's files; extract incomplete files again.
+        """Return the folder with a lock's files; extract incomplete files again.
 
         The caller must hold the lock of `changing`.
 
@@ -176,7 +176,7 @@ class Store:
         atomic_files.put_file(self._state, data + b"\n", self.work)
 
     def _files(self, lock: Lock) -> dict[str, bytes]:
-        """Return the expected files of a lock's folder."""
+        """Return the files that a lock's folder should contain."""
         files = {LOCK: lock.to_bytes()}
         for key, pin in lock.packages.items():
             for path, data in read_archive(self.blob(pin.sha256), PACKAGE, key).items():
@@ -207,10 +207,11 @@ class StoreTransaction:
         self._store = store
 
     def stage(self, plan: InstallPlan) -> Path:
-        """Extract the files of a plan for a preview, without installing the packages.
+        """Extract a plan's files for a preview, without installing the packages.
 
         Returns:
-            The folder of the files, with a subfolder for each kind: ``drivers/puppet/driver.yaml``.
+            The folder with the files, which has a subfolder for each kind:
+            ``drivers/puppet/driver.yaml``.
 
         Raises:
             PackageError: an archive differs from the lock or from an installed version, or a
@@ -281,7 +282,7 @@ class StoreTransaction:
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
     def forget_key(self, key: PackageId) -> None:
-        """Delete the pinned key of a package; raise `PackageError` on failure.
+        """Delete a package's pinned key; raise `PackageError` on failure.
 
         The next installation accepts any valid signature of the package.
         """
@@ -322,10 +323,10 @@ def ecosystem_of(document: Path) -> Path | None:
 
 
 def blocked_lines_of(document: Path) -> list[str]:
-    """Return one line for each blocked package of an installed document.
+    """Return one line for each blocked package that an installed document uses.
 
     Raises:
-        PackageError: the lock of the document, or the file of the block lists, is damaged.
+        PackageError: the document's lock or the file with the block lists is damaged.
     """
     folder = ecosystem_of(document)
     if folder is None:

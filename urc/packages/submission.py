@@ -50,10 +50,10 @@ def take(
     """Check an untrusted package, and list it in the repository's index.
 
     Args:
-        folder: folder of the repository.
+        folder: the repository's folder.
         entry_file: path of the upload, such as ``archives/drivers/puppet/1.0.0.zip``.
         data: the archive.
-        signature: signature of the package; None for an unsigned package.
+        signature: the package's signature; None for an unsigned package.
         examine: function that returns the errors of a document in a folder of packages.
         provenance: declared origin of the package, if any.
         index_signer: signer of the index, with the maintainer's key.

@@ -1,4 +1,4 @@
-"""Upload tokens of a repository. Only digests of the tokens are stored."""
+"""A repository's upload tokens. Only digests of the tokens are stored."""
 
 import re
 import secrets
@@ -73,7 +73,7 @@ class UploadTokens:
         return found
 
     def add(self, name: str, may: tuple[str, ...]) -> str:
-        """Generate a token and return its text. Only the digest of the token is stored.
+        """Generate a token and return its text. Only the token's digest is stored.
 
         Raises:
             PackageError: the name is in use or invalid, or `may` contains an invalid package.
@@ -114,12 +114,12 @@ class UploadTokens:
 
 
 def new_token() -> str:
-    """Return the text of a new token with 256 random bits."""
+    """Return the text of a new token, which contains 256 random bits."""
     return f"urc_{secrets.token_urlsafe(32)}"
 
 
 def read_token(file: Path) -> str:
-    """Return the token text in a file; raise `PackageError` on failure."""
+    """Return the text of the token in a file; raise `PackageError` on failure."""
     try:
         with open(file, "rb") as opened:
             text = opened.read(1024).decode("utf-8", "replace").strip()

@@ -1,4 +1,4 @@
-"""The pinned key of a repository: the first key that signed its index."""
+"""A repository's pinned key: the first key that signed its index."""
 
 import time
 from collections.abc import Callable
@@ -32,13 +32,13 @@ class _Pin(msgspec.Struct, frozen=True):
 
 
 class PinnedKey:
-    """The pinned key of one repository."""
+    """One repository's pinned key."""
 
     def __init__(self, url: str, file: Path, now: Callable[[], float] = time.time) -> None:
         """Initialize without reading the file.
 
         Args:
-            url: URL of the repository, for messages.
+            url: the repository's URL, for messages.
             file: file that stores the pinned key.
             now: function that returns the current time in seconds since the epoch.
         """
@@ -65,10 +65,10 @@ class PinnedKey:
         return pin.number if pin is not None else 0
 
     def check(self, head: IndexHead | None) -> None:
-        """Raise `PackageError` unless a head has the pinned key, is valid now and is not outdated.
+        """Raise `PackageError` unless a head has the pinned key, is valid, and is not outdated.
 
         Args:
-            head: head of the repository; None for a missing or damaged head.
+            head: the repository's head; None for a missing or damaged head.
         """
         signature = head.signed if head is not None else None
         if head is not None and not head.is_sound():

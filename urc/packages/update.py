@@ -60,11 +60,11 @@ class PackageSummary(Protocol):
 
 
 Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
-"""Function that returns a preview, given the document, the package's folder and widget names."""
+"""Function that returns a preview from the document, the package's folder and the widget names."""
 
 
 class UpdateDiff(NamedTuple):
-    """The changes of an update."""
+    """The changes that an update makes."""
 
     versions: list[str]
     """Changed versions, such as ``widgets/dial 1.0.0 → 1.1.0``."""
@@ -81,7 +81,7 @@ class UpdateDiff(NamedTuple):
 def newer(
     store: Store, sources: Sequence[Source], complain: Callable[[str], None]
 ) -> list[AvailableUpdate]:
-    """Return the available updates; download only the indexes of the repositories.
+    """Return the available updates; download only the repositories' indexes.
 
     If several versions of a package are installed, only the newest version is compared with the
     sources.
@@ -89,7 +89,8 @@ def newer(
     Args:
         store: store with the installed packages.
         sources: repositories, in the order of requests.
-        complain: callback for a message about each unreachable repository and dependency conflict.
+        complain: callback that receives a message about each unreachable repository and each
+            dependency conflict.
 
     Raises:
         PackageError: the store cannot be read.
@@ -116,10 +117,10 @@ def plan_update(
     complain: Callable[[str], None],
     wanted: str = "*",
 ) -> InstallPlan | None:
-    """Return the install plan of the newest version with its archives; None without an update.
+    """Return the install plan for the newest version, with its archives; None without an update.
 
     Args:
-        old: lock of the installed package.
+        old: the installed package's lock.
         sources: package sources, as for `newer`.
         store: its store.
         complain: receives warnings for the user.
@@ -139,11 +140,11 @@ def plan_update(
 def staged_difference(
     old: Lock, plan: InstallPlan, store: Store, staged: Path, look: Look
 ) -> UpdateDiff:
-    """Return the changes of a staged update.
+    """Return the changes that a staged update makes.
 
     Args:
-        old: lock of the installed package.
-        plan: install plan of the update.
+        old: the installed package's lock.
+        plan: install plan for the update.
         store: store with both versions.
         staged: result of `StoreTransaction.stage` for the plan.
         look: function that returns the preview of a package's documents.
@@ -166,7 +167,7 @@ def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str],
 
 
 def headline(old: Lock, new: Lock) -> str:
-    """Return the version change of a package as text, such as ``drivers/puppet 1.0.0 → 1.1.0``."""
+    """Return a package's version change as text, such as ``drivers/puppet 1.0.0 → 1.1.0``."""
     return str(old) if old.version == new.version else f"{old} → {new.version}"
 
 
@@ -212,7 +213,7 @@ def _newest(locks: Iterable[Lock]) -> list[Lock]:
 
 
 def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
-    """Return the lock of the newest version; None if it does not update `old`."""
+    """Return the newest version's lock; None if this lock does not update `old`."""
     new = lock_of(old.key, settle(old.key, wanted, found))
     if new == old or new.number < old.number:
         return None

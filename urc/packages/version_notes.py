@@ -1,4 +1,4 @@
-"""Notes of a repository about a version: origin and withdrawal.
+"""A repository's notes on a version: origin and withdrawal.
 
 Notes are stored in the index and in a small file next to the archive.
 """
@@ -15,13 +15,13 @@ from urc.packages.names import PackageError
 __all__ = ["PROVENANCE", "Notes", "Provenance", "notes_beside", "read_notes", "write_notes"]
 
 PROVENANCE: Final = "urc-provenance"
-"""Header of an upload: the origin as JSON, in base64."""
+"""Upload header that contains the origin as JSON, in base64."""
 _LONGEST: Final = 300
 _COMMIT: Final = re.compile("[0-9a-f]{7,64}", re.ASCII)
 
 
 class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The origin of a package, as declared by its publisher.
+    """A package's origin, as declared by its publisher.
 
     An origin from another repository's index may violate the rules of `check`.
     """
@@ -48,7 +48,7 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """All notes about one version."""
+    """All notes on one version."""
 
     withdrawn: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
     """Reason for the withdrawal; "" for an available version."""
@@ -66,7 +66,7 @@ def notes_beside(archive: Path) -> Path:
 
 
 def read_notes(archive: Path) -> Notes:
-    """Return the notes about an archive; raise `PackageError` for a damaged file."""
+    """Return the notes on an archive; raise `PackageError` for a damaged file."""
     file = notes_beside(archive)
     try:
         with open(file, "rb") as opened:
@@ -78,7 +78,7 @@ def read_notes(archive: Path) -> Notes:
 
 
 def write_notes(archive: Path, notes: Notes, work: Path) -> None:
-    """Write the notes about an archive, or delete the file if the notes are empty."""
+    """Write the notes on an archive, or delete the file if the notes are empty."""
     if notes == Notes():
         notes_beside(archive).unlink(missing_ok=True)
     else:

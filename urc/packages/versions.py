@@ -80,7 +80,7 @@ class Range:
         return self.spans(version)
 
     def spans(self, version: Version) -> bool:
-        """Return whether a version is within the bounds of the range, even as a pre-release."""
+        """Return whether a version is within the range's bounds, even as a pre-release."""
         return all(bound.allows(version) for bound in self._bounds)
 
     @cached_property
@@ -147,7 +147,7 @@ def _after(low: Version, minor: int | None) -> Version:
 
 
 def _caret(major: int, minor: int | None, patch: int | None) -> Version:
-    """Return the first incompatible version, with the left-most nonzero number increased."""
+    """Return the first incompatible version, in which the leftmost nonzero number is increased."""
     if major or minor is None:
         return Version(major + 1, 0, 0, "0")
     if minor or patch is None:

@@ -1,6 +1,6 @@
 """The engine: the synchronous state machine of one driver.
 
-The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport passes
+The engine is pure: it has no I/O, clock, callbacks or tasks. The owner of a transport passes
 received data and the time to the engine, and executes the returned events. Live robots, document
 tests, playback and the simulator share this engine.
 
@@ -74,7 +74,7 @@ __all__ = ["Engine"]
 _PLAIN = frozenset(
     (Send, Violation, Open, Ready, Replied, Failed, NumbersUsed, MotionReady, MotionRefused)
 )
-"""Types of the events that the engine returns unchanged."""
+"""Event types that the engine returns unchanged."""
 
 
 class Engine:
@@ -86,9 +86,9 @@ class Engine:
         driver: a loaded driver, with compiled patterns and templates.
         settings: values of all settings in the profile, by name.
         fresh: sources of time and randomness for sent frames; fixed sources for tests.
-        is_compiled: whether to generate a function for each message and command. Generated
-            functions save time in live sessions, but cost more time than they save in short
-            document tests.
+        is_compiled: whether to generate a function for each message and command. This saves time in
+            live sessions. In short document tests, generating the functions takes longer than it
+            saves.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
@@ -143,7 +143,7 @@ class Engine:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next `tick`; minus infinity before the first one, None without a deadline."""
+        """Time of the next `tick`; minus infinity before the first tick, None if nothing is due."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None
@@ -163,7 +163,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay from received data or a command to any new deadline, in seconds."""
+        """Minimum time between a command or received data and any new deadline, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
@@ -225,7 +225,7 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """Stop every sequence and refuse autonomous motion; an empty `reason` allows motion again.
+        """Stop all sequences and refuse autonomous motion; an empty `reason` allows motion again.
 
         Login sequences continue, because a stop can reach the robot only after the login.
         """
@@ -238,7 +238,7 @@ class Engine:
         return self._settle([], now)
 
     def finish(self, now: float) -> list[Event]:
-        """Close all connections in an orderly way, each with a `Close` within `GOOD_BYE_S`."""
+        """Close all connections in an orderly way; each `Close` follows within `GOOD_BYE_S`."""
         events: list[LineEvent] = []
         self._schedule.stop()
         for line in self.lines.values():

@@ -48,7 +48,7 @@ class Send(NamedTuple):
     transport: str
     data: Payload
     is_secret: bool = False
-    """Whether `data` contains a secret, so that it must not be shown or logged."""
+    """Whether `data` contains a secret and must not be shown or logged."""
     counted: CountedFrame | None = None
     """The frame with its counter numbers if the guard also sends on the connection; otherwise
     None."""

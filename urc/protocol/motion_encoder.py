@@ -26,17 +26,17 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Number of counter numbers that other frames can use before the stops must be rendered again."""
+"""How many counter numbers other frames can use before the stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion is currently impossible; the message states the reason."""
+    """Motion is impossible at present; the message gives the reason."""
 
 
 class _Way:
-    """The encoder of one held command, prepared in advance because setpoints are frequent."""
+    """The encoder of one held command; it is built in advance, because setpoints are frequent."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -111,7 +111,7 @@ class MotionEncoder:
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop of `command` always has the same bytes.
 
-        The result is False for a stop with a counter, or with values from the robot or from
+        The result is False if the stop contains a counter, or values from the robot or from
         settings.
         """
         self._found(command)
@@ -137,9 +137,9 @@ class MotionEncoder:
     def stop_frame(self, command: str) -> Payload | FrameVariants:
         """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
 
-        Rendering a stop requires no connection. A stop with a counter is a series with one frame
-        for each possible next number. The series is long enough for the stops of all held commands
-        on the connection. The stop is empty for a robot that ends each motion step itself.
+        A stop can be rendered without a connection. A stop with a counter is a series with one
+        frame for each possible next number. The series is long enough for the stops of all held
+        commands on the connection. The stop is empty if the robot ends each motion step by itself.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -168,8 +168,8 @@ class MotionEncoder:
     ) -> Payload | CountedFrame:
         """Return the frame of `command` with `arguments`, ready to send.
 
-        In half-duplex mode, the result is empty while a reply is pending. This setpoint is skipped,
-        and the next setpoint is sent instead.
+        In half-duplex mode, the result is empty while a reply is pending. The setpoint is then
+        skipped, and the next setpoint is sent instead.
 
         On a shared connection, the frame's counter numbers are provisional until `set_counters`
         confirms them after the transmission.
@@ -177,7 +177,7 @@ class MotionEncoder:
         Args:
             command: name of a held command.
             arguments: values by name; missing arguments have their default values.
-            now: current time in seconds, for requirements on fresh signals.
+            now: current time in seconds, for requirements that need fresh signals.
             confirmed_by: names of the people who have confirmed the command, for the two-person
                 rule.
 

@@ -104,7 +104,7 @@ class KeepaliveState:
         Args:
             keepalive: the declaration.
             line: conversation on the connection to keep open.
-            ask: request of the keepalive; None for a keepalive that runs a command.
+            ask: request of the keepalive; None if the keepalive runs a command.
             known: state of the robot, for the keepalive's templates.
         """
         self._keepalive = keepalive
@@ -141,7 +141,7 @@ class KeepaliveState:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the end of the keepalive's command, which reports failures itself."""
+        """Record the end of the keepalive's command; the command itself reports any failure."""
         self._is_asked = False
         return []
 
@@ -172,7 +172,7 @@ class PollSchedule:
 
     @property
     def next_poll(self) -> float | None:
-        """Time of the next poll; None without a scheduled poll."""
+        """Time of the next poll; None if no poll is scheduled."""
         first: float | None = None
         for poll in self._polls:
             due = poll.due

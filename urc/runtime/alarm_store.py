@@ -32,9 +32,9 @@ __all__ = ["AlarmStore"]
 MOST_WAITING: Final = 20_000
 """Maximum number of waiting events."""
 _GATHER_S: Final = 0.02
-"""Time for collecting one batch, in seconds."""
+"""How long the thread collects changes for one batch, in seconds."""
 _RETRY_S: Final = 5.0
-"""Delay before the next attempt after a write error, in seconds."""
+"""Delay before another attempt after a write error, in seconds."""
 _CLOSE_S: Final = 2.0
 
 log = logging.getLogger(__name__)
@@ -45,7 +45,7 @@ class AlarmStore:
     """A writer of one alarm file, for all robots of a server."""
 
     def __init__(self, file: Path, *, most_events: int = MOST_EVENTS) -> None:
-        """Prepare the writer; the thread starts with the first change.
+        """Prepare the writer; the first change starts the thread.
 
         Args:
             file: path of the file.
@@ -55,7 +55,7 @@ class AlarmStore:
         self.fault = ""
         """Reason why alarms currently cannot be stored, or ""."""
         self.lost = 0
-        """Number of events lost from the history since the start."""
+        """Number of events that the history has lost since the start."""
         self._most_events = most_events
         self._known: dict[str, dict[str, AlarmRecord]] | None = None
         """Newest record of each alarm, by robot and signal; None before the first `load`."""
@@ -91,7 +91,7 @@ class AlarmStore:
         records: Mapping[str, AlarmRecord | None],
         events: Iterable[AlarmEvent],
     ) -> None:
-        """Queue changed records (by signal; None: no alarm) and events; return immediately."""
+        """Queue events and changed records (by signal; None: no alarm), and return immediately."""
         with self._wakes:
             self._records |= {(robot, signal): one for signal, one in records.items()}
             if self._known is not None:
@@ -115,7 +115,7 @@ class AlarmStore:
             )
 
     def close(self) -> None:
-        """Write the queued changes for at most two seconds, and end the thread."""
+        """Spend at most two seconds writing the queued changes, and end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()

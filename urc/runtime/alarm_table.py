@@ -1,4 +1,4 @@
-"""The SQLite file of alarms: the present states of all robots' alarms, and the history.
+"""The SQLite file of alarms: the current states of all robots' alarms, and their history.
 
 Layer 4. All functions block, so servers call them in a thread. The states are JSON objects, so a
 newer version of URC can add attributes. Older versions skip unknown attributes.
@@ -37,7 +37,7 @@ FILE: Final = "alarms.sqlite"
 MOST_EVENTS: Final = 100_000
 """Number of newest events to keep in the history."""
 _SPARE: Final = 1000
-"""Number of events beyond the limit that are deleted together."""
+"""Number of excess events that are deleted together."""
 _VERSION: Final = 1
 _LONGEST_S: Final = 5.0
 """Maximum time of one search, in seconds."""
@@ -78,11 +78,12 @@ class AlarmQuery(NamedTuple):
 
     robot: str
     text: str = ""
-    """Text in the signal, kind, condition, value or name; case does not matter for ASCII."""
+    """Text to find in the signal, kind, condition, value or name; case does not matter for
+    ASCII."""
     kinds: tuple[str, ...] = ()
     """Kinds of events; empty for all kinds."""
     signals: tuple[str, ...] = ()
-    """Names of signals that also match, because their titles contain `text`."""
+    """Names of signals that match because their titles contain `text`."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")
@@ -129,7 +130,7 @@ def _create(base: sqlite3.Connection) -> None:
 def save_records(
     base: sqlite3.Connection, records: Mapping[tuple[str, str], AlarmRecord | None]
 ) -> None:
-    """Write records by robot and signal, inside a transaction; None deletes a record."""
+    """Write records by robot and signal, inside a transaction; for None, delete the record."""
     gone = [key for key, record in records.items() if record is None]
     base.executemany("DELETE FROM states WHERE robot = ? AND signal = ?", gone)
     there = [
@@ -153,7 +154,7 @@ def prune_events(base: sqlite3.Connection, most: int = MOST_EVENTS) -> None:
 
 
 def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
-    """Return the stored records of all robots, each with its robot; [] without a file.
+    """Return all stored records, each with its robot; [] if there is no file.
 
     Raises:
         OSError: the file cannot be read.
@@ -169,7 +170,7 @@ def load_records(file: Path) -> list[tuple[str, AlarmRecord]]:
 def search_alarms(
     file: Path, query: AlarmQuery, longest_s: float = _LONGEST_S
 ) -> list[AlarmHistoryRow]:
-    """Return the newest events of a query, newest first; [] without a file.
+    """Return a query's newest events, newest first; [] if there is no file.
 
     Raises:
         OSError: the file cannot be read.
@@ -219,7 +220,7 @@ def _marks(values: Collection[str]) -> str:
 
 
 def _record(text: str) -> AlarmRecord | None:
-    """Return a stored record; None for a damaged record."""
+    """Return a stored record; None if the record is damaged."""
     try:
         given = json.loads(text)
         known = {name: given[name] for name in AlarmRecord._fields if name in given}

@@ -8,7 +8,7 @@ first.
 
 Each row contains a hash of itself and the previous row, so `urc.runtime.audit_check.check` detects
 a changed, removed or inserted row. The hashes do not protect against an attacker who rewrites the
-whole file. A copy exported to another place does protect against this.
+whole file. A copy exported to another place does protect against such an attacker.
 """
 
 import logging
@@ -34,7 +34,7 @@ MOST_WAITING: Final = 4096
 """Maximum number of queued entries."""
 _BATCH: Final = 512
 _GATHER_S: Final = 0.05
-"""Time for collecting the entries of one batch, in seconds; one commit writes the whole batch."""
+"""How long entries are collected for one batch, in seconds; one commit writes the whole batch."""
 _RETRY_S: Final = 5.0
 """Delay before the next attempt after a write error, in seconds."""
 _CLOSE_S: Final = 2.0
@@ -90,7 +90,7 @@ class AuditLog:
             return self._wakes.wait_for(lambda: not self._waiting and not self._is_busy, timeout_s)
 
     def close(self) -> None:
-        """Write the queued entries for at most two seconds, and end the thread."""
+        """Spend at most two seconds writing the queued entries, and end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()

@@ -1,10 +1,10 @@
-"""Check the audit log's hash chain, and export the log as JSON Lines that can be checked later.
+"""Check the audit log's hash chain, and export the log as JSON Lines for later checks.
 
 Layer 4. All functions block: servers call them in a thread.
 
-Each exported line has the link before its entry (``before``) and the link of the entry
-(``chain``). Each line can be checked on its own, so an export of single robots can also be checked.
-Lines with consecutive numbers must also match each other.
+Each exported line has the link before its entry (``before``) and the entry's own link (``chain``).
+Each line can be checked on its own, so an export for selected robots can also be checked. Lines
+with consecutive numbers must also match each other.
 """
 
 import json
@@ -37,9 +37,9 @@ class ExportCheck(NamedTuple):
     entries: int
     """Number of checked entries."""
     fault: str
-    """Message about the first fault; "" for an intact export."""
+    """Message about the first fault; "" if the export is intact."""
     gap: str
-    """Message about the first missing entry; exports of single robots have such gaps."""
+    """Message about the first missing entry; exports for selected robots have such gaps."""
     last: int = 0
     """Number of the last entry."""
     chain: str = ""
@@ -47,7 +47,7 @@ class ExportCheck(NamedTuple):
 
 
 def check(file: Path) -> str:
-    """Return a message about the first broken link of the hash chain, or "" for an intact file.
+    """Return a message about the first broken link of the hash chain, or "" if the file is intact.
 
     Raises:
         OSError: the file cannot be read.
@@ -133,9 +133,9 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
 
 
 def compare(file: Path, export: ExportCheck) -> str:
-    """Return a message if the audit log lacks an export's last entry, otherwise ""; see `check`.
+    """Return a message if the audit log lacks an export's last entry, or else ""; see `check`.
 
-    An export in another place therefore shows whether entries were cut off the end of the log.
+    An export kept elsewhere therefore shows whether entries were cut off the end of the log.
 
     Raises:
         OSError: the audit log cannot be read.
@@ -152,7 +152,7 @@ def compare(file: Path, export: ExportCheck) -> str:
 
 
 def _parsed(line: str) -> tuple[AuditRow, str | None]:
-    """Return an exported line as a row, and the link before the row; raise `ValueError`."""
+    """Return an exported line as a row, and the link before it; raise `ValueError` if invalid."""
     if len(line) > LONGEST_LINE:
         raise ValueError(f"more than {LONGEST_LINE} characters")
     found: Any = json.loads(line)
@@ -195,7 +195,7 @@ def _before_first(base: sqlite3.Connection, first: int) -> str | None:
 
 
 def _last_pruning(base: sqlite3.Connection) -> tuple[int, str]:
-    """Return the last deleted entry's number and link; 0 and "" without a deletion."""
+    """Return the last deleted entry's number and link; 0 and "" if no entry was deleted."""
     row = base.execute(
         "SELECT arguments FROM entries WHERE what = ? ORDER BY id DESC LIMIT 1", (PRUNED,)
     ).fetchone()

@@ -28,12 +28,13 @@ class AuditEntry(NamedTuple):
     what: str
     """Kind of event, such as ``moved``, ``STOP`` or ``signed in``."""
     who: str = ""
-    """Name of the person, device or program that caused the event; without a sign-in, the page."""
+    """Name of the person, device or program that caused the event, or of the page if not signed
+    in."""
     role: str = ""
     client: str = ""
     """Identifier of the page's connection to the server, or of a sign-in."""
     epoch: int = 0
-    """Epoch of the lease at the event."""
+    """Epoch of the lease at the time of the event."""
     command: str = ""
     """Name of the command, or of the action on a person, a package or a recording."""
     arguments: str = ""
@@ -46,7 +47,7 @@ class AuditEntry(NamedTuple):
     """Number of equal events that this entry represents."""
     lasted_s: float = 0.0
     principal: str = ""
-    """Identifier of the person, device or program; "" without a sign-in."""
+    """Identifier of the person, device or program; "" if not signed in."""
     kind: str = ""
     """Kind of the principal: ``person``, ``device``, ``program`` or ``guest``."""
     way: str = ""
@@ -73,7 +74,7 @@ def shown(data: bytes, most: int = 64) -> str:
 
 
 def cleaned(entry: AuditEntry) -> AuditEntry:
-    """Return an entry that the file can store without change: short UTF-8, finite numbers."""
+    """Return an entry that the file can store unchanged: short UTF-8 texts and finite numbers."""
     return AuditEntry._make(
         _text(one) if isinstance(one, str) else _number(one) if isinstance(one, float) else one
         for one in entry._replace(at=float(entry.at), lasted_s=float(entry.lasted_s))

@@ -79,7 +79,7 @@ class AuditRecorder:
 
         Args:
             robot: name of the robot.
-            note: callback for each entry; must not block.
+            note: callback for each entry; it must not block.
             utc: source of UTC time, in seconds since 1970.
             secrets: texts to redact, such as the values of secret settings.
         """
@@ -99,7 +99,7 @@ class AuditRecorder:
         self._cause: Operator | None = None
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Also report entries to the taps of a session's hub.
+        """Report each entry to the taps of a session's hub too.
 
         Passing None as the hub ends the reports.
         """
@@ -203,7 +203,7 @@ class AuditRecorder:
         data: Payload = b"",
         answer: Mapping[str, Reading] = NOTHING,
     ) -> None:
-        """Record a command without `hold`, with its outcome: ``done`` or a failure reason."""
+        """Record a command without `hold`; its outcome is ``done`` or the reason for a failure."""
         if answer:
             outcome = f"{outcome}: {_json(answer)}"
         self._record(
@@ -261,7 +261,7 @@ class AuditRecorder:
         return shown(shown_bytes) if shown_bytes else ""
 
     def _hidden(self, text: str) -> str:
-        """Return a text without the secrets in any of their encodings."""
+        """Return a text without the secrets, including their encoded forms."""
         return self._disguises.hide(text)
 
 

@@ -27,7 +27,7 @@ _TEXTS: Final = tuple(name for name in COLUMNS if AuditEntry.__annotations__[nam
 
 
 class SearchTimeout(UrcError):
-    """A search that takes too long."""
+    """The search took too long."""
 
 
 class AuditQuery(NamedTuple):
@@ -42,7 +42,7 @@ class AuditQuery(NamedTuple):
     what: tuple[str, ...] = ()
     """Kinds of events; empty for all."""
     text: str = ""
-    """Text in any column; case does not matter for ASCII."""
+    """Text to find in any column; case does not matter for ASCII."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")
@@ -54,7 +54,7 @@ class AuditQuery(NamedTuple):
 
 
 def search(file: Path, query: AuditQuery, longest_s: float = _LONGEST_S) -> list[AuditRow]:
-    """Return the newest entries of a query, newest first; return [] without a file.
+    """Return a query's newest entries, newest first; return [] if there is no file.
 
     Raises:
         OSError: the file cannot be read.

@@ -1,8 +1,8 @@
 """The SQLite table of the audit log: creation, migration, writing and deletion of old entries.
 
-Layer 4. Missing columns are added to a file of an older version in place. Its rows keep version 1,
-so their links stay valid. A deletion of old entries is itself an entry, with the link of the last
-deleted entry. The chain can therefore be checked from its new beginning.
+Layer 4. In a file of an older version, missing columns are added in place. Existing rows keep
+version 1, so their links stay valid. Deleting old entries adds an entry, which contains the link of
+the last deleted entry. The chain can therefore be checked from its new start.
 """
 
 import json
@@ -52,7 +52,7 @@ _INSERT: Final = (
 
 
 class AuditRow(NamedTuple):
-    """One entry with its place in the chain."""
+    """One entry and its place in the hash chain."""
 
     id: int
     version: int
@@ -70,8 +70,8 @@ class Retention(NamedTuple):
     most_age_s: float = 90 * 86_400.0
     """Maximum age of an entry, in seconds."""
     fewest: int = 1000
-    """Number of newest entries to keep regardless of their age. A clock that jumps ahead by years
-    therefore cannot cause the deletion of the whole log."""
+    """Number of newest entries to keep regardless of their age. Even if the clock jumps ahead by
+    years, the whole log is therefore not deleted."""
     group: int = 100
     """Minimum number of old entries to delete at once."""
 
@@ -96,7 +96,7 @@ def connected(file: Path) -> sqlite3.Connection:
 
 
 def select(base: sqlite3.Connection) -> str:
-    """Return the beginning of a query for `row_of`, including for tables of older versions."""
+    """Return the start of a query for `row_of`, which also suits tables of older versions."""
     has = _columns(base)
     later = [name if name in has else f"'' AS {name}" for name in COLUMNS[FIRST_COLUMNS:]]
     version = "version" if is_migrated(base) else "1 AS version"
@@ -188,8 +188,8 @@ def _delete(base: sqlite3.Connection, until: int, now: float, reason: str) -> No
     before = base.execute(
         "SELECT id, chain FROM entries WHERE id < ? ORDER BY id DESC LIMIT 1", (until,)
     ).fetchone()
-    # In the same transaction, with the link before the new beginning, so that the rest can be
-    # checked.
+    # Recorded in the same transaction, with the link before the new start, so that the remaining
+    # entries can be checked.
     count = base.execute("DELETE FROM entries WHERE id < ?", (until,)).rowcount
     append(base, [_pruning(count, before[0], before[1], now, reason)])
 

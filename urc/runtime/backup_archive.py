@@ -1,4 +1,4 @@
-"""The archive of a backup: one private ZIP file with a data folder's permanent content.
+"""A backup archive: one private ZIP file with the permanent content of a data folder.
 
 Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files of a backup. Other
 names, links and large files are refused, so a foreign archive cannot write outside the data folder.
@@ -49,7 +49,7 @@ LEFT_OUT: Final = re.compile(
     r"|simulator_host_key|audit-before-\w+\.sqlite|.*\.(?:new|broken)|.*\.sqlite-(?:wal|shm|journal)",
     re.ASCII,
 )
-"""Files that URC recreates, or that belong to a single run of a server."""
+"""Files that URC recreates, or that belong to only one run of a server."""
 MANIFEST: Final = "urc-backup.json"
 MOST_FILES: Final = 20_000
 MOST_BYTES: Final = 2_000_000_000
@@ -111,7 +111,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
 
 
 def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
-    """Write a backup of a data folder, and return the written and the unknown files.
+    """Write a backup of a data folder; return the files in the backup and the unknown files.
 
     The archive appears only when it is complete, and is readable only by its owner.
 
@@ -160,7 +160,7 @@ def _write_parts(archive: zipfile.ZipFile, data: Path, work: Path) -> tuple[list
 
 @contextmanager
 def _still(packages: Path) -> Iterator[None]:
-    """Keep other processes from changing the installed packages."""
+    """Prevent other processes from changing the installed packages."""
     if not packages.is_dir():
         yield
         return
@@ -204,7 +204,7 @@ class BackupReader:
     """An open archive with checked names and sizes."""
 
     def __init__(self, opened: IO[bytes], name: str) -> None:
-        """Check the archive's whole directory.
+        """Check the entire directory of the archive.
 
         Args:
             opened: the archive.

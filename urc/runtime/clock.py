@@ -48,7 +48,7 @@ class LoopClock:
 class PeriodicTimer:
     """A timer that repeats an action.
 
-    The action returns the delay until its next call in seconds, or None to end the timer.
+    The action returns the number of seconds until its next call, or None to end the timer.
     """
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:

@@ -1,8 +1,7 @@
-"""The cause of a failed connection, and the next step for the operator: one table for all pages.
+"""The causes of failed connections, each with advice for the operator, in one table for all pages.
 
-Layer 4. Pure. Transports report errors in the words of the operating system or of a library. The
-table recognises the usual errors. Pages translate a cause by its name
-(`core/connection_causes.js`).
+Layer 4. Pure. Transports report errors in the words of the operating system or a library. The table
+recognises the usual errors. Pages translate a cause by its name (`core/connection_causes.js`).
 """
 
 import re
@@ -34,7 +33,7 @@ class _CauseRow(NamedTuple):
     """Words in lower case; the error message contains at least one of them."""
     advice: str
     address: str = ""
-    """Prefix of the addresses to which the row applies; "": all addresses."""
+    """Prefix of the addresses to which the row applies; "" means all addresses."""
 
 
 CAUSES: Final = (
@@ -108,7 +107,7 @@ CAUSES: Final = (
 
 
 _NAMES: Final = re.compile(r"'[^']*'|[^\s:]+:\d+")
-"""Quoted names and addresses with a port, which must not be mistaken for causes."""
+"""Pattern for quoted names and addresses with a port, which must not be mistaken for causes."""
 
 
 def cause_of(text: str, address: str = "") -> Cause:
@@ -123,7 +122,7 @@ def cause_of(text: str, address: str = "") -> Cause:
 
 
 def advice_on(text: str, address: str = "") -> str:
-    """Return advice about a failed connection in one line; for the arguments, see `cause_of`."""
+    """Return one line of advice about a failed connection; for the arguments, see `cause_of`."""
     found = _known(text, address)
     return found.advice if found is not None else "check the settings of this transport"
 

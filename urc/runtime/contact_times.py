@@ -1,7 +1,8 @@
 """The times of each robot's last use and last data, stored across restarts.
 
-Layer 4. The store keeps the times in memory; `save` writes a small file and may block, so the
-server calls `save` in a thread. Without the file, only the order of robots on the menu is lost.
+Layer 4. The store keeps the times in memory. Its method `save` writes a small file and may block,
+so the server calls `save` in a thread. If the file is lost, only the order of the robots in the
+menu changes.
 """
 
 import logging
@@ -28,19 +29,19 @@ class ContactTimes(NamedTuple):
     """The times of a robot's last use and last data."""
 
     used_at: float | None = None
-    """UTC time at which a page or program last used the robot, in seconds since 1970; None:
+    """UTC time at which a page or program last used the robot, in seconds since 1970; None means
     never."""
     seen_at: float | None = None
-    """UTC time at which a connection to the robot was last live; None: never."""
+    """UTC time at which a connection to the robot was last live; None means never."""
 
     @property
     def newest(self) -> float:
-        """The later of both times; 0 without any contact."""
+        """The later of the two times; 0 if there was no contact."""
         return max(self.used_at or 0.0, self.seen_at or 0.0)
 
 
 NO_CONTACT: Final = ContactTimes()
-"""The times of a robot without any contact."""
+"""The times of a robot that has never had contact."""
 _Name = Annotated[str, msgspec.Meta(max_length=300)]
 
 
@@ -54,7 +55,8 @@ class _Stored(msgspec.Struct, frozen=True):
 class ContactStore:
     """The contact times of all robots of a server.
 
-    Emulated robots have separate times: `key` distinguishes them from real robots of the same name.
+    Emulated robots have their own times: `key` distinguishes them from real robots of the same
+    name.
     """
 
     def __init__(self, file: Path | None = None) -> None:
@@ -96,7 +98,7 @@ class ContactStore:
             del self._times[min(self._times, key=lambda each: self._times[each].newest)]
 
     def save(self) -> None:
-        """Write the file if a time has changed; after a failure, log it and retry on the next call.
+        """Write the file if a time has changed; log any failure, and retry on the next call.
 
         The call blocks. This method can run in another thread while the event loop records further
         times.

@@ -14,7 +14,7 @@ __all__ = ["Coverage", "Exercised", "measure", "summary"]
 
 _KINDS: Final[tuple[Kind, ...]] = ("command", "poll", "message")
 _NAMED_MOST: Final = 3
-"""Maximum number of names in the summary; further names are only counted."""
+"""Maximum number of names in the summary; other names are only counted."""
 
 
 class Coverage(NamedTuple):
@@ -38,7 +38,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return a short text about the untested parts, or "" for full coverage."""
+    """Return a short text about the untested parts, or "" if everything is tested."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

@@ -1,4 +1,4 @@
-"""Restore a backup into a data folder, completely or not at all.
+"""Restore a backup into a data folder, either completely or not at all.
 
 Layer 4. The files are extracted and checked in a separate folder, ``restoring-…``. Then the old
 files move to ``replaced-…``, and the new files replace them. After an error, the old files are
@@ -34,7 +34,7 @@ _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
 """Suffixes of the files that SQLite stores next to a database."""
 _LATCH_BYTES: Final = 4096
 _OLD: Final = "replaced-????????"
-"""Pattern for the folder name of replaced files."""
+"""Pattern for the name of the folder for replaced files."""
 
 
 def check_target(data: Path, *, replaces: bool) -> None:
@@ -61,7 +61,7 @@ def check_target(data: Path, *, replaces: bool) -> None:
 
 
 def is_interrupted(data: Path) -> bool:
-    """Return whether a power failure interrupted the restoration of a backup."""
+    """Return whether a power failure interrupted the restore of a backup."""
     return any(data.glob(_OLD))
 
 
@@ -75,7 +75,7 @@ def restore(reader: BackupReader, data: Path, adjust: Callable[[Path], None]) ->
 
     Raises:
         BackupError: the backup is damaged, or a file cannot be written. The folder is unchanged,
-        except that robots stopped in the backup are now stopped.
+            except that robots stopped in the backup are now stopped.
     """
     try:
         make_private(data)
@@ -105,7 +105,7 @@ def _folder(data: Path, purpose: str) -> Iterator[Path]:
 
 
 def _tidy(data: Path) -> None:
-    """Remove the folders of a restoration that a power failure interrupted; keep its audit log."""
+    """Remove the folders left by a restore that a power failure interrupted; keep its audit log."""
     for folder in data.glob(_OLD):
         _keep_audit(folder, data)
         shutil.rmtree(folder, ignore_errors=True)
@@ -150,7 +150,7 @@ def _merge_blocks(new: Path, old: Path) -> None:
 
 
 def _latch(file: Path) -> dict[str, Any] | None:
-    """Return the content of a latch file; None for a missing or damaged file."""
+    """Return the content of a latch file; None if the file is missing or damaged."""
     try:
         with file.open("rb") as opened:
             found = json.loads(opened.read(_LATCH_BYTES))

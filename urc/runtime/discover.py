@@ -36,7 +36,7 @@ class RosTopic(NamedTuple):
 
     name: str
     type: str
-    """Message type; "" if rosapi does not know it."""
+    """Message type; "" if unknown to rosapi."""
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:

@@ -1,7 +1,7 @@
 """The dispatcher: the only caller of a driver's engine.
 
-All calls to the engine run on the event loop, one after the other and never nested. Performing an
-event only changes the state of a `Link`, the hub or a future. The links' tasks react later. A
+All calls to the engine run on the event loop, one after another, and are never nested. Performing
+an event only changes the state of a `Link`, the hub or a future. The links' tasks react later. A
 driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
@@ -111,8 +111,8 @@ class PendingCommands:
 
 
 _SOONEST_S = 0.001
-"""Minimum delay before the next tick if work is overdue, in seconds, so that an engine cannot block
-the loop."""
+"""Minimum delay before the next tick when work is overdue, in seconds. The delay prevents an engine
+from blocking the loop."""
 _AFTER_A_BUG_S = 1.0
 
 log = logging.getLogger(__name__)
@@ -127,7 +127,7 @@ class EngineLike(Protocol):
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay of the deadlines that `receive` and `command` create, in seconds."""
+        """Minimum delay before any deadline that `receive` or `command` creates, in seconds."""
 
     def start(self, transport: str, now: float) -> Sequence[Event]:
         """Handle an opened transport."""
@@ -142,7 +142,7 @@ class EngineLike(Protocol):
         """Start a command."""
 
     def latch(self, reason: str, now: float) -> Sequence[Event]:
-        """End every sequence and refuse autonomous motion, until a call with an empty reason."""
+        """End all sequences, and refuse autonomous motion until a call with an empty reason."""
 
     def finish(self, now: float) -> list[Event]:
         """Start an orderly close of every connection."""
@@ -165,7 +165,7 @@ class LinkPort(Protocol):
         """Open the connection for a waiting request."""
 
     def want_close(self, reason: str) -> None:
-        """Close the connection after all output; with a `reason`, close immediately."""
+        """Close the connection after all output, or immediately if there is a `reason`."""
 
     def send(self, sent: Send) -> None:
         """Write bytes or a message; secret data is hidden from the traffic view."""
@@ -285,7 +285,7 @@ class Dispatcher:
             self._run(self._engine.tick)
 
     def latch(self, reason: str) -> None:
-        """End every sequence and refuse autonomous motion; an empty reason permits motion again."""
+        """End all sequences and refuse autonomous motion; an empty reason permits motion again."""
         self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
@@ -297,7 +297,7 @@ class Dispatcher:
         self._arm()
 
     def finish(self) -> None:
-        """Start an orderly close of every open connection; the engine finishes each close."""
+        """Start an orderly close of every open connection; the engine then completes each close."""
         try:
             events = self._engine.finish(self._clock.now())
         except Exception as bug:  # supervisor, as in `command`
@@ -314,7 +314,7 @@ class Dispatcher:
         self._waiting.close(reason)
 
     def _refusal(self, request: Request) -> Failed:
-        """Return the failure of a request that is refused without calling the engine."""
+        """Return the failure of a request that is refused before it reaches the engine."""
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:
@@ -368,7 +368,7 @@ class Dispatcher:
                 port.publish()
 
     def _change(self, event: Event) -> None:
-        """Pass an event to the link of the event's transport, which changes its state."""
+        """Pass an event to the link of the event's transport; the link changes its state."""
         match event:
             case Violation(transport):
                 self._ports[transport].count(event)
@@ -380,7 +380,7 @@ class Dispatcher:
                 self._ports[transport].want_close(reason)
 
     def _arm_after(self, now: float) -> None:
-        """Call `_arm` unless the timer already fires early enough."""
+        """Call `_arm` unless the timer will fire early enough."""
         # Without this check, a text poll costs 1.32 times as much as a hand-written driver, not 1.2
         # times (decision 30).
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:

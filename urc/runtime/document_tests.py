@@ -39,7 +39,7 @@ class TestReport(NamedTuple):
 class _Complaint(NamedTuple):
     text: str
     step: int | None = None
-    """Index of the failed step, from 0; None for a test without steps."""
+    """Index of the failed step, from 0; None if the test has no steps."""
 
 
 def exercise(profile: Profile) -> TestReport:
@@ -94,7 +94,7 @@ def _problem(profile: Profile, test: DocumentTest, complaint: _Complaint) -> Pro
 def _run(
     driver: Driver, settings: Mapping[str, Value], test: DocumentTest, used: set[Exercised]
 ) -> _Complaint:
-    """Return the failure text, or "" for a pass; add the used parts to `used`."""
+    """Return the failure text, or "" if the test passes; add the used parts to `used`."""
     used |= _asked(driver, test)
     try:
         trial = TestEngine(_narrowed(driver, test), settings, driver.polls)
@@ -147,7 +147,7 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
 
 
 def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
-    """Connect, send, and feed the reply; return the failure messages."""
+    """Connect, send the request and feed the reply; return the failure messages."""
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     checks = bool(test.expect or test.sent or test.fails is not None)
     asked = trial.driver.commands.get(command or "")
@@ -274,12 +274,12 @@ def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return a copy of the driver without connection steps or unprompted frames.
+    """Return a copy of the driver without connection steps or unsolicited frames.
 
     Args:
         driver: the loaded driver.
         keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. Byte
-        tests omit the conditions, because no robot reports the required signals.
+            tests omit the conditions, because no robot reports the required signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

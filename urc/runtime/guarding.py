@@ -1,4 +1,4 @@
-"""Create a session's guard client from the driver's transports and held commands."""
+"""Create a session's guard client for the driver's transports and held commands."""
 
 import logging
 from collections.abc import Mapping
@@ -79,11 +79,11 @@ def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
-    """Return the silence in seconds after which a transport is reset during motion; None for never.
+    """Return the seconds of silence after which a transport is reset during motion; None for never.
 
-    The result is slightly shorter than the engine's timeout, because the engine's output would
-    queue up behind the motion frames. A connectionless transport has no send buffer that a reset
-    could discard.
+    The result is slightly shorter than the engine's timeout, because otherwise the engine's output
+    would queue up behind the motion frames. A connectionless transport has no send buffer that a
+    reset could discard.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

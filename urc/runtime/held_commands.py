@@ -25,7 +25,7 @@ __all__ = [
 
 
 class MotionFrames(Protocol):
-    """The controller's interface to the engine: `urc.protocol.motion_encoder.MotionEncoder`."""
+    """The interface of `urc.protocol.motion_encoder.MotionEncoder` that the controller uses."""
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop frame of a held command is constant."""
@@ -34,7 +34,7 @@ class MotionFrames(Protocol):
         """Return whether the rendered stop frames of a held command are still valid."""
 
     def is_ready(self, command: str) -> bool:
-        """Return whether the command's transport is connected, with all connection steps done."""
+        """Return whether the command's transport is connected and all connection steps are done."""
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
         """Return the stop frame of a held command; raise `UrcError` on failure."""
@@ -58,7 +58,7 @@ class MotionBackend(Protocol):
         """Replace the stop frame of `command` without arming the command."""
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may be moving, or its stop may still be repeated."""
+        """Return whether `command` may still be moving, or its stop may still be repeated."""
 
     def is_open(self, command: str) -> bool:
         """Return whether the transport of `command` is connected, as last reported."""
@@ -90,7 +90,7 @@ class MotionSession(Protocol):
 
     @property
     def backend(self) -> MotionBackend | None:
-        """The motion backend; None for a robot without held commands."""
+        """The motion backend; None if the robot has no held commands."""
 
 
 @dataclass(slots=True)
@@ -118,7 +118,7 @@ class HeldControl:
     """Whether the stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False
     why: str = ""
-    """Reason why the control must be released before new motion; "" without one."""
+    """Reason why the control must be released before new motion; "" if there is no reason."""
     closed_epoch: int = -1
     """Epoch of the lease in which the command was stopped; motion requires a later epoch."""
 
@@ -141,14 +141,14 @@ class HeldControl:
         self.closed_epoch = epoch
 
     def limited(self, arguments: Mapping[str, Reading], now: float) -> Mapping[str, Reading]:
-        """Return the arguments, limited by the slew rate."""
+        """Return the arguments, with the slew rate limit applied."""
         if self.slew is None:
             return arguments
         return self.slew.limit({**self.defaults, **arguments}, now)
 
 
 def control_of(driver: Driver, command: Command) -> HeldControl:
-    """Return the initial state of one of `driver`'s held commands: at rest."""
+    """Return the initial state, at rest, of one of the held commands of `driver`."""
     hold = command.hold
     assert hold is not None  # noqa: S101 - callers pass only held commands
     slew, defaults = None, {}
@@ -176,7 +176,7 @@ def period_of(driver: Driver, command: Command) -> float:
 
 
 _LOSSY = frozenset(("udp", "serial", "mqtt", "ros"))
-"""Transport types on which a single stop frame may be lost."""
+"""Transport types that may lose a single stop frame."""
 
 
 def is_lossy(driver: Driver, transport: str) -> bool:

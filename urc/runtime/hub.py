@@ -1,4 +1,4 @@
-"""The latest value of every signal and the state of every link of one robot.
+"""The latest values of one robot's signals, and the states of its links.
 
 Layer 4. Readers always see the newest reading; a slow reader never receives a queue of old
 readings. Log entries (faults and state changes) are kept in a bounded list, with a count of the
@@ -44,7 +44,7 @@ STREAM_KEPT: Final = 500
 
 
 class SampleHistory:
-    """The last readings of selected signals, each with the hub revision of its arrival."""
+    """The last readings of selected signals, each with the hub revision at which it arrived."""
 
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
@@ -82,7 +82,7 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the sequence number of each signal's oldest reading in `names`."""
+        """Return, for each signal in `names`, the sequence number of its oldest reading there."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
@@ -133,7 +133,7 @@ class Traffic:
     direction: Literal["sent", "received"]
     data: bytes
     envelope: Envelope | None = None
-    """Message to which the bytes belong, on a transport with messages."""
+    """On a transport with messages, the message to which the bytes belong."""
 
 
 class HubSubscription:
@@ -164,7 +164,7 @@ class HubSubscription:
 
 @dataclass(frozen=True, slots=True)
 class SequenceProgress:
-    """Progress of a running or ended sequence."""
+    """Progress of a sequence that is running or has ended."""
 
     command: str
     place: int
@@ -198,7 +198,7 @@ Tapped: TypeAlias = Sample | LogEntry | Traffic | LinkStatus | MotionRecord | Au
 
 
 class EventTap:
-    """A complete, ordered stream of events for one reader, with a count of lost events."""
+    """A complete and ordered stream of events for one reader, with a count of lost events."""
 
     def __init__(self) -> None:
         self.dropped = 0
@@ -341,7 +341,7 @@ class Hub:
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
-        """Add traffic; hold back a possible beginning of a secret until more bytes arrive."""
+        """Add traffic, but hold back the possible beginning of a secret until more bytes arrive."""
         if self._redactor is not None:
             is_stream = traffic.envelope is None and traffic.transport in self._stream_lines
             if is_stream:
@@ -374,7 +374,7 @@ class Hub:
         self._wake()
 
     def latest(self, name: str) -> Sample | None:
-        """Return the newest reading of a signal, or None without a reading."""
+        """Return the newest reading of a signal, or None if it has no reading."""
         return self._latest.get(name)
 
     def changed_since(self, revision: int) -> Sequence[Sample]:
@@ -383,9 +383,9 @@ class Hub:
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
-        """Return the newest readings, and every streamed reading, after `revision`; oldest first.
+        """Return, oldest first, the newest readings and every streamed reading after `revision`.
 
-        Streamed readings from before `joined`, the reader's first revision, are omitted.
+        Streamed readings before `joined`, the reader's first revision, are omitted.
         """
         newest = self.changed_since(revision)
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest

@@ -1,4 +1,4 @@
-"""Previews of third-party documents in a separate process with limited memory and time.
+"""Preview third-party documents in a separate process with limited memory and time.
 
 ``python -m urc.runtime.isolation`` reads a task as JSON from standard input and prints the preview.
 An expensive document therefore cannot slow down the calling program.
@@ -40,7 +40,8 @@ def look_apart(
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: the document refers to an outside file, or exceeds the limits of memory or time.
+        UrcError: the document refers to a file outside the folder, or exceeds the limits of memory
+            or time.
     """
     asked = json.dumps([str(document), str(folder), list(widgets)])
     command = [sys.executable, *COMMAND]
@@ -80,9 +81,9 @@ class PreviewWorker:
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Limit the resources of this process, and lower its priority to less than motion.
+    """Limit the resources of this process, and give it a lower priority than motion.
 
-    On Windows, only the timeout of the caller applies.
+    On Windows, only the caller's timeout applies.
     """
     if sys.platform == "win32":
         return

@@ -1,7 +1,7 @@
-"""A small file for the part of a lease that survives a restart: latch, epoch and pending stop.
+"""A small file for the parts of a lease that survive a restart: latch, epoch and pending stop.
 
-Writing can be slow, or fail on a full disk; a stop must wait for neither. A thread therefore writes
-the newest state, and failures are reported without an exception.
+Writing can be slow, or fail on a full disk. A stop must not wait for the file. A thread therefore
+writes the newest state, and failures are reported without an exception.
 """
 
 import asyncio

@@ -4,13 +4,13 @@ Theory of operation. `run` is a loop with three waits. First, the loop waits for
 connect. A persistent link always has a reason; other links need an `Open` event or a request. Then
 the loop waits for the backoff delay, and finally for the end of the connection. A reader and a
 writer run while the connection is open. The robot, the engine or a rule of the link can end a
-connection. Every end goes through `_end`, and only `_serve` stops the reader and the writer.
+connection. Every connection ends through `_end`, and only `_serve` stops the reader and the writer.
 
-A connection counts as good after its first valid frame; only a good connection resets the backoff.
-URC therefore does not flood a robot that accepts every connection and then closes it. With
-``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
-greeting and then refuse the login. Pages show the `LinkState`. During failed attempts, only the
-number of attempts in the `LinkState` changes.
+A connection counts as good after its first valid frame, and only a good connection resets the
+backoff. URC therefore does not flood a robot that accepts every connection and then closes it. If
+there are ``on_connect`` steps, frames do not count until these are done, because a robot may refuse
+the login after a greeting. Pages show the `LinkState`. During failed attempts, only the number of
+attempts in the `LinkState` changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
@@ -38,19 +38,19 @@ __all__ = ["Link"]
 SLICE_BYTES = 4096
 """Maximum number of bytes that the engine processes before other tasks of the loop run."""
 SLICE_S = 0.001
-"""Maximum processing time of the engine before other tasks run, in seconds; a slower engine gets
-fewer bytes."""
+"""Maximum time that the engine can process bytes before other tasks run, in seconds; a slower
+engine gets fewer bytes."""
 _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
 """Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the
 loop."""
 HURRY_S = 1.0
-"""Shortest interval between two attempts requested by operators, in seconds. Repeated requests,
+"""Minimum interval between two attempts that operators request, in seconds. Repeated requests,
 even from many pages, therefore do not flood a robot that refuses connections."""
 SETTLE_S = 1.0
 """Age after which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
-"""Grace period for a transport that exceeds its own time limit, in seconds."""
+"""Extra time for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
 _NOTHING_YET = "connected; nothing received yet"
 _LOGGING_IN = "connected; the steps of the connection are not done yet"
@@ -107,7 +107,7 @@ class Link:
         self._hurried_s = float("-inf")
         """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """Future with the reason for the end of the connection; None without a connection."""
+        """Future for the reason why the connection ended; None if there is no connection."""
         self._forget_connection()
         self._is_overdue = False
         """Whether the robot has been silent since the last request."""
@@ -145,7 +145,7 @@ class Link:
         self._wanted.set()
 
     def reconnect(self) -> None:
-        """Try to reopen a lost connection now, not after the backoff, at most once in `HURRY_S`."""
+        """Reopen a lost connection without the backoff, at most once every `HURRY_S` seconds."""
         now = self._clock.now()
         if self.is_connected or now - self._hurried_s < HURRY_S:
             return
@@ -154,7 +154,7 @@ class Link:
         self._hurried.set()
 
     def want_close(self, reason: str) -> None:
-        """Close the connection after all output; with a `reason`, close immediately."""
+        """Close the connection after all output, or immediately if there is a `reason`."""
         if not self._is_persistent:
             self._wanted.clear()
         if self._ended is None:
@@ -216,10 +216,10 @@ class Link:
         self._report.publish()
 
     async def settle(self) -> str:
-        """Wait until all sent bytes are written and, if the transport can detect it, have arrived.
+        """Wait until all sent bytes are written and, if arrival can be detected, have arrived.
 
         Returns:
-            A message about undelivered bytes, or "". The wait takes a few seconds at most.
+            A message about undelivered bytes, or "". The wait lasts a few seconds at most.
         """
         until = self._clock.now() + STUCK_S
         while self.is_connected and not self._outgoing.is_written:
@@ -234,7 +234,7 @@ class Link:
         return ""
 
     async def run(self) -> None:
-        """Keep the link connected until cancelled, then close the transport."""
+        """Keep the link connected until the task is cancelled, then close the transport."""
         try:
             while True:
                 await self._wanted.wait()
@@ -329,7 +329,7 @@ class Link:
             self._report.show("connecting", _NOTHING_YET)
 
     def _conclude(self, reason: str) -> None:
-        """Set the state and the backoff after the end of a connection."""
+        """Set the state and the backoff after a connection has ended."""
         asked = self._close_reason
         is_flushed = self._outgoing.is_written
         self._outgoing.reset()
@@ -352,7 +352,7 @@ class Link:
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff
-        # The exponent is bounded: after a night of attempts, 2 ** attempts exceeds a float.
+        # The exponent is limited, because after a night of attempts, 2 ** attempts exceeds a float.
         doublings = min(self._report.attempts - 1, 30)
         wait_s = min(backoff.max_s, backoff.initial_s * 2**doublings)
         self._retry_s = self._clock.now() + wait_s * (1 - backoff.jitter * self._random())
@@ -466,7 +466,7 @@ class Link:
             self._report.show("live")
 
     def _check_idle(self) -> float | None:
-        """Close a connection that was silent too long; otherwise, return the remaining time."""
+        """Close a connection that was silent for too long, or else return the remaining time."""
         limit_s = self._spec.timeouts.idle_s or 0.0
         left_s = self._heard_s + limit_s - self._clock.now()
         if left_s > 0:

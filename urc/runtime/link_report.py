@@ -12,13 +12,13 @@ from urc.runtime.redaction import REDACTED
 __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 
 BURST = 4
-"""Number of log entries of one kind before the rate limit starts."""
+"""Number of log entries of one kind before the rate limit applies."""
 REFILL_S = 10.0
 """Minimum interval between further log entries of one kind, in seconds."""
 HELD_S = 0.3
 """Maximum time to hold back data that may be the beginning of a secret, in seconds."""
 KINDS = 64
-"""Maximum number of kinds of log entries; further kinds of a third-party engine share one rate
+"""Maximum number of kinds of log entries; further kinds from a third-party engine share one rate
 limit."""
 
 
@@ -74,7 +74,7 @@ class LinkReport:
 
     @property
     def is_well(self) -> bool:
-        """Whether another valid frame would leave the state unchanged."""
+        """Whether the state would stay the same after another valid frame."""
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "") -> None:

@@ -1,7 +1,7 @@
 """Detect host names of this machine or of a device attached to it.
 
-A package with a fixed local host would connect to local programs of the person who installs the
-package. A package may therefore address this machine only through a setting.
+A package with a fixed local host would connect to local programs of the person who installs it. A
+package may therefore address this machine only through a setting.
 """
 
 import ipaddress
@@ -19,7 +19,7 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Pattern for the beginning of a local host name, which settings complete."""
+"""Pattern for the start of a local host name that settings complete."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 

@@ -1,7 +1,7 @@
 """A watchdog for the event loop, because a blocked loop delays all work of this process.
 
-If the loop is blocked, the guard stops motion when the lease runs out. The watchdog detects, counts
-and reports each delay; after a long delay, operators must start a new gesture.
+If the loop is blocked, the guard stops motion when the lease expires. The watchdog detects, counts
+and reports each delay. After a long delay, operators must start a new gesture.
 """
 
 import logging
@@ -18,7 +18,7 @@ LATE_S: Final = 0.1
 TOO_LATE_S: Final = 0.5
 """Delay that stops motion regardless of the lease, in seconds."""
 QUIET_S: Final = 10.0
-"""Length of the interval in which several delays are reported as one, in seconds."""
+"""Length of the interval within which several delays are reported as one, in seconds."""
 
 log = logging.getLogger(__name__)
 
@@ -31,8 +31,8 @@ class LoopWatchdog:
 
         Args:
             clock: source of time.
-            late: callback with each counted delay in seconds, and whether the delay is the first of
-                a series.
+            late: callback with each counted delay in seconds, and with whether it is the first of a
+                series.
         """
         self._clock = clock
         self._late = late

@@ -1,7 +1,7 @@
 """The manual page of a profile in Markdown: the robot, its signals and its commands.
 
 Layer 4, pure. The same profile always produces the same page. The page is written for operators and
-quotes the descriptions of the document.
+quotes the document's descriptions.
 """
 
 import math
@@ -201,7 +201,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
-    """Return the bytes of a constant frame; None for a variable frame."""
+    """Return the bytes of a constant frame; None if the frame is variable."""
     if command.send.names or spec is None:
         return None
     try:
@@ -253,7 +253,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Describe the server's frames after a release or after the loss of the operator."""
+    """Describe what the server sends after a release, or after the operator is lost."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -270,7 +270,7 @@ def _releases(driver: Driver) -> Iterator[str]:
 
 
 def _by_itself(watchdog_s: float | None) -> str:
-    """Describe the robot's own behaviour when no further frames arrive, not even a release."""
+    """Describe what the robot itself does if no more frames arrive, not even for a release."""
     if watchdog_s is None:
         return "The document does not say whether the robot stops by itself."
     if math.isinf(watchdog_s):

@@ -1,13 +1,13 @@
 """The motion controller of one robot: the lease, and the state of each held command.
 
-Theory of operation. Pages send sampled input as ticks, and release messages. For each tick, the
-controller checks the lease of the page and the age of the tick; the engine checks the arguments.
-The controller then passes the frame to the motion backend, which owns the connection and enforces
-the time limits. The first tick of a gesture arms the control. The first tick also renders the stop
+Theory of operation. Pages send ticks of sampled input, and release messages. For each tick, the
+controller checks the page's lease and the age of the tick, and the engine checks the arguments. The
+controller then passes the frame to the motion backend, which owns the connection and enforces the
+time limits. The first tick of a gesture arms the control. The first tick also renders the stop
 frame, so that a stop needs neither the engine nor the document.
 
-After a stop without a release, the control stays disarmed until its page sends a release. A stick
-that is still held after a reconnection does not move the robot.
+If a control stops without a release, it stays disarmed until its page sends a release. A stick that
+is still held after a reconnection does not move the robot.
 
 A controller outlives the sessions of its robot, because the latch persists while the robot is
 disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
@@ -64,12 +64,12 @@ class MotionController:
     def __init__(
         self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
     ) -> None:
-        """Create a controller without an operator and without a session.
+        """Create a controller that has no operator and no session yet.
 
         Args:
             driver: the driver; commands with ``hold`` become controls.
             kept: the lease state from before a restart; a latched stop stays latched.
-            is_owed: whether the last stop has not reached the robot, so it must be sent first.
+            is_owed: whether the last stop has not reached the robot and must be sent first.
         """
         self.lease = Lease(kept)
         self._frames: MotionFrames | None = None
@@ -84,7 +84,7 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self.on_change: Callable[[LeaseState], None] = _ignore
-        """Callback after each change of the lease, and after the confirmation of a stop."""
+        """Callback after each change of the lease, and after a stop is confirmed."""
         self.on_moved: Moved = _unseen
         """Callback for each tick passed to the backend; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
@@ -160,7 +160,7 @@ class MotionController:
         self._screens[client.id] = _Screen(client)
 
     def change(self, client: Operator) -> None:
-        """Replace the rights of a page; without the right to drive, its lease and motion end."""
+        """Replace the rights of a page; if it may not drive, its lease and its motion end."""
         screen = self._screens.get(client.id)
         if screen is None:
             return
@@ -202,7 +202,7 @@ class MotionController:
         return ""
 
     def stop(self, by: str) -> None:
-        """Stop the robot and latch, regardless of the lease."""
+        """Stop the robot and latch the stop, regardless of the lease."""
         self._unconfirmed = {*self._holds, *self._stops}
         if self._backend is not None:
             self._backend.stop(self._stop_frames(self._holds))
@@ -224,7 +224,7 @@ class MotionController:
         return halted
 
     def _moving(self) -> list[str]:
-        """Return the commands with a tick after their last reported stop."""
+        """Return the commands that have had a tick since their last reported stop."""
         controls = self._controls.items()
         return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 
@@ -326,7 +326,7 @@ class MotionController:
         control = self._controls.get(command)
         if control is None:
             return
-        if control.motion_state == "ending":  # else it already moves again
+        if control.motion_state == "ending":  # otherwise, it already moves again
             control.motion_state = "rest"
         if reason not in ("released", "stopped"):
             self._close(control, _CUT if reason == "revoked" else LET_GO)
@@ -339,7 +339,7 @@ class MotionController:
     # -- renewed stops
 
     def _is_too_early(self, command: str, control: HeldControl) -> bool:
-        """Return whether a written stop may be ineffective, because the robot was not ready."""
+        """Return whether a written stop may have had no effect, because the robot was not ready."""
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return False
@@ -372,7 +372,7 @@ class MotionController:
             try:
                 stop = frames.stop_frame(name)
             except UrcError:
-                continue  # the old stop is better than none
+                continue  # the old stop is better than no stop
             if stop != control.stop:
                 control.stop = stop
                 backend.renew(name, stop)

@@ -22,15 +22,14 @@ from urc.runtime.running_servers import RunningServer, headers, open_connection,
 __all__ = ["MotionInterlock"]
 
 _ANSWER_S = 2.0
-"""Timeout for the reply of a server, in seconds. After the timeout, the server's state is
-unknown."""
+"""Timeout for a server's reply, in seconds. After the timeout, the server's state is unknown."""
 _LOOK_S = 0.1
 _ASK_S = 0.5
 _MOST_BYTES = 4096
 
 
 class MotionInterlock:
-    """Interlocks of a robot: the stored latch, and the servers with the same data folder."""
+    """A robot's interlocks: the stored latch, and the servers that use the same data folder."""
 
     def __init__(self, data: Path, robot: str, clock: Callable[[], float] = time.monotonic) -> None:
         """Prepare the interlocks of one robot without reading files.
@@ -50,10 +49,10 @@ class MotionInterlock:
         self._ask_s = float("-inf")
         self._driven = ""
         self.why = ""
-        """Reason for refusing motion at the last call of `look`; "" if motion is allowed."""
+        """Reason for refusing motion at the last call of `check`; "" if motion is allowed."""
 
     async def check(self) -> str:
-        """Read the interlocks, update the attribute `why` and return its value."""
+        """Read the interlocks, update `why`, and return its value."""
         return await asyncio.to_thread(self._check)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:

@@ -1,4 +1,4 @@
-"""Commands without a held control: permission checks, and the effect of STOP on these commands.
+"""Commands without a held control: their permission checks, and how STOP affects them.
 
 Layer 4. Only held commands require the lease. All other commands require the role of an operator: a
 watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
@@ -68,7 +68,7 @@ class CommandRefused(CommandFailed):
 
 
 def can_move(driver: Driver) -> bool:
-    """Return whether the robot can move; such a robot needs STOP and the latch."""
+    """Return whether the robot can move, and so needs STOP and the latch."""
     return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
@@ -133,7 +133,7 @@ class OneShotCommands:
     ) -> str:
         """Return the reason for refusing a command or sequence to the page now, or "".
 
-        `stops` is the number of STOPs known to the page at the operator's click; None means the
+        `stops` is the number of STOPs known to the page when the operator clicked; None means the
         current number.
         """
         known = self.driver.commands.get(command)
@@ -144,7 +144,7 @@ class OneShotCommands:
         return role_refusal(client, known.role if known is not None else "drive")
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return the reason for refusing control of a sequence.
+        """Return the reason for refusing to control a sequence.
 
         Any operator may pause or end a sequence.
         """
@@ -155,7 +155,7 @@ class OneShotCommands:
     # -- session
 
     async def serve(self, session: Drivable) -> None:
-        """Deliver STOP to a session, immediately if STOP is latched or not yet acknowledged."""
+        """Deliver STOP to a session, at once if STOP is latched or has not been acknowledged."""
         self._session = session
         self._pressed.clear()
         if self._controller().lease.latched or self._controller().owed:
@@ -180,7 +180,7 @@ class OneShotCommands:
             self._pressed.set()
 
     def reset(self) -> None:
-        """End the sending of stop commands after a reset."""
+        """Stop sending the stop commands after a reset."""
         if self._session is not None:
             self._session.latch("")
 

@@ -1,7 +1,7 @@
 """Load a robot's document, with local widgets and installed interfaces.
 
 Layer 4. A driver's document does not declare an interface. An installed driver uses the interfaces
-that were installed for the driver.
+that were installed for it.
 """
 
 from os import PathLike
@@ -20,7 +20,7 @@ __all__ = ["open_document"]
 
 _DRIVER: Final = "driver.yaml"
 _MADE: Final = "default"
-"""Name of the generated interface for a document without an interface."""
+"""Name of the interface that is generated for a document without an interface."""
 
 
 def open_document(path: str | PathLike[str]) -> Profile:
@@ -44,5 +44,5 @@ def open_document(path: str | PathLike[str]) -> Profile:
             interfaces[name] = found.interface._replace(name=name)
             widgets |= found.widgets
     if len(interfaces) > 1 and _MADE in interfaces:
-        interfaces[_MADE] = interfaces.pop(_MADE)  # the generated one comes last
+        interfaces[_MADE] = interfaces.pop(_MADE)  # the generated interface comes last
     return profile._replace(interfaces=interfaces, widgets=widgets)

@@ -22,7 +22,7 @@ MAX_QUEUED_BYTES = 262_144
 """Maximum size of the buffer, in bytes; beyond it, the connection is closed with a message.
 """
 STUCK_S = 5.0
-"""Time without accepted bytes after which the connection counts as stalled, in seconds."""
+"""How long the robot can accept no bytes before the connection counts as stalled, in seconds."""
 
 
 class _BufferedOutput(NamedTuple):
@@ -102,7 +102,7 @@ class OutputBuffer:
         return not self._bytes
 
     def reset(self, prompt: Prompt | None = None) -> None:
-        """Empty the buffer; `prompt` is the transport if it supports writing without waiting."""
+        """Empty the buffer; `prompt` is the transport if it can write without waiting."""
         self._prompt = prompt
         self._waiting.clear()
         self._bytes = 0
@@ -146,7 +146,7 @@ class OutputBuffer:
         self._report.saw("sent", data if item.shown is item.data else item.shown)
 
     def wake(self) -> None:
-        """Wake the writer, because the connection closes after all data is written."""
+        """Wake the writer, because the connection must close once all data is written."""
         self._has_some.set()
 
     async def run(self, is_closing: Callable[[], bool]) -> None:
@@ -173,7 +173,7 @@ class OutputBuffer:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Make the writer check that the kernel accepts the remaining data in time."""
+        """Make the writer check whether the kernel accepts the remaining data in time."""
         self._waiting.append(_BufferedOutput(b"", b""))
         self._has_some.set()
 

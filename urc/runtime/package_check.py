@@ -1,7 +1,7 @@
 """Check a package's document for a repository, including its tests.
 
 ``python -m urc.runtime.package_check DOCUMENT`` prints the errors as a JSON list. The process
-limits its own memory and time, so that a third-party document cannot block the repository.
+limits its own memory and time, so a third-party document cannot block the repository.
 """
 
 import json

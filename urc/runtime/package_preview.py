@@ -1,4 +1,4 @@
-"""A preview of a package's permissions and risks, before its installation or update.
+"""A preview of a package's permissions and risks, shown before it is installed or updated.
 
 Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted,
 but the person who installs the package must be informed. The preview therefore lists constants
@@ -173,7 +173,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
 
 
 def _own(value: Any, profile: Profile) -> str:
-    """Return the fixed text of an option, or "" for a text that depends on settings."""
+    """Return the fixed text of an option, or "" if the text depends on settings."""
     if value is None or value is False:
         return ""
     if not isinstance(value, Template):
@@ -190,7 +190,7 @@ def _own(value: Any, profile: Profile) -> str:
 
 
 def _fixed_host(options: Mapping[str, object]) -> str:
-    """Return the fixed host of a transport, or "" for a host that depends on settings."""
+    """Return the fixed host of a transport, or "" if the host depends on settings."""
     host, url = options.get("host"), options.get("url")
     text = host.source if isinstance(host, Template) and not host.settings else host
     if isinstance(text, str):
@@ -214,8 +214,8 @@ class PackagePreview(NamedTuple):
     permissions: list[str]
     """Permissions, one per line."""
     wire: Mapping[str, str]
-    """Values of all keys that affect sent bytes, the decoding of replies, or rights. They are
-    listed by key path, such as ``commands.beep.send``."""
+    """Values of all keys that affect sent bytes, the decoding of replies, or rights. The values are
+    stored by key path, such as ``commands.beep.send``."""
     risks: list[str]
     """Local resources that the package uses without a setting; see `risks_of`."""
 
@@ -246,7 +246,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
 
 
 def _flat(value: object, path: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and text of every leaf value of a document."""
+    """Yield the path and the text of every leaf value in a document."""
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from _flat(inner, f"{path}.{key}" if path else str(key))

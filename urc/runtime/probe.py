@@ -1,7 +1,8 @@
-"""A connection test of a robot, which opens each transport once.
+"""A connection test for a robot, which opens each transport once.
 
 Layer 4. The test opens an ordinary session, so it uses the driver's logins, polls and timeouts. The
-test sends no motion. An on-demand transport that no poll uses is opened and closed once.
+test does not send motion commands. An on-demand transport that no poll uses is opened and closed
+once.
 """
 
 import asyncio
@@ -20,11 +21,11 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""Maximum duration of a test, in seconds, for any driver, without the orderly close."""
+"""Maximum duration of a test of any driver, in seconds, not including the orderly close."""
 _ANSWER_S: Final = 4.0
-"""Time in which a connected robot must send a frame, in seconds."""
+"""Time within which a connected robot must send a frame, in seconds."""
 _FIRST_S: Final = 1.0
-"""Time after which an idle transport counts as unused by polls, in seconds."""
+"""How long a transport must be idle to count as unused by polls, in seconds."""
 _LOOK_S: Final = 0.05
 _CLOSE_S: Final = 2.0
 
@@ -39,14 +40,14 @@ class ProbeResult(NamedTuple):
     address: str
     """Address for people."""
     verdict: Verdict
-    """The result ``answers`` means that the transport is live. The result ``opens`` means a
-    connection without data from the robot, and ``fails`` means no connection."""
+    """The result ``answers`` means that the transport is live. The result ``opens`` means that it
+    is connected but the robot sends no data, and ``fails`` means that there is no connection."""
     text: str
     """Description of the result, in one line."""
     advice: str
-    """Advice in one line; "" for a good result."""
+    """Advice in one line; "" if the result is good."""
     cause: Cause = ""
-    """Cause of a failure; "" for an unknown cause and for a good result."""
+    """Cause of a failure; "" if the cause is unknown or the result is good."""
 
 
 async def probe(
@@ -105,7 +106,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
     Args:
         status: present state of the transport.
         since_s: time since the start of the test, in seconds.
-        connected_s: time since the connection opened, in seconds; None without a connection.
+        connected_s: time since the connection opened, in seconds; 0 before it opens.
     """
     if status is None:
         return False
@@ -117,7 +118,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
 
 
 async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, ProbeResult]:
-    """Open and close the transports that otherwise only requests open."""
+    """Open and close the transports that would otherwise open only for requests."""
     driver = session.profile.driver
     tried: dict[str, ProbeResult] = {}
     if not names:

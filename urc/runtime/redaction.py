@@ -2,8 +2,8 @@
 
 Layer 4, pure. The engine marks secret frames, and the link redacts these frames. For the hub, this
 module redacts other data, such as the echo of a password or a command with a token. An echo may
-arrive in a stream one character at a time. The possible beginning of a secret is therefore held
-back until more data arrives, or until a pause.
+arrive in a stream one character at a time. Bytes that may be the beginning of a secret are
+therefore held back until more data arrives, or until a pause.
 """
 
 import base64
@@ -28,13 +28,14 @@ _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
 """Minimum length of a truncated secret to redact; shorter parts occur in many words."""
 _SHORTEST_NUMBER = 4
-"""Minimum number of digits in a secret number to redact; shorter ones match too many readings."""
+"""Minimum number of digits in a secret number to redact; shorter numbers match too many
+readings."""
 _CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
 """Text after a truncated value: dots, a quotation mark, or the end."""
 
 
 def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the settings with placeholders instead of secrets, for a document's tests."""
+    """Return the settings for a document's tests, with placeholders in place of secrets."""
     return {
         name: "SECRET" if profile.settings[name].is_secret and isinstance(value, str) else value
         for name, value in settings.items()
@@ -70,8 +71,8 @@ class Redactor:
             for text in texts
             if len(text.encode("utf-8", "replace")) < _SHORTEST
         )
-        """Short secrets, redacted only as whole words in text; otherwise, most texts would be
-        unreadable."""
+        """Short secrets, which are redacted only as whole words in text; otherwise, most texts
+        would be unreadable."""
         self._numbers = frozenset(
             int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
         )
@@ -122,7 +123,7 @@ class Redactor:
         return None if value in self._numbers else value
 
     def _in_bytes(self, data: bytes) -> bytes:
-        """Return the redacted form of a blob, in which only long secrets are redacted."""
+        """Return the redacted form of a blob; only long secrets are redacted in blobs."""
         for secret in self._long:
             if len(secret) >= _SHORTEST_PART:
                 data = data.replace(secret, REDACTED)

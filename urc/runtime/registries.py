@@ -1,7 +1,7 @@
 """The built-in tables of transport types and framing types.
 
-This module imports no transport and no framing. Each transport and framing is imported at its first
-use.
+This module does not import any transports or framings. Each transport and framing is imported on
+first use.
 """
 
 from urc.registry import Registries

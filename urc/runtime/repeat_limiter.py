@@ -1,4 +1,4 @@
-"""Limit the entries about repeated events to one entry per second for each event, with a count.
+"""Limit the entries about a repeated event to one entry per second, which contains a count.
 
 Layer 4. Pure. A token bucket limits the entries about all events together. Hostile visitors with
 many addresses therefore cannot push older entries out of the log.
@@ -24,7 +24,7 @@ class _Repeat:
 
 
 class RepeatLimiter(Generic[_Key]):
-    """Counts of events without an entry so far."""
+    """A counter for repeated events that do not have an entry yet."""
 
     def __init__(self, burst: int = 16, per_s: float = 16.0) -> None:
         """Start without events.
@@ -45,7 +45,7 @@ class RepeatLimiter(Generic[_Key]):
         return len(self._known)
 
     def count(self, key: _Key, now: float) -> int:
-        """Count an event; return the number for an entry, or 0 if no entry may be written now.
+        """Count an event; return the count for an entry, or 0 if no entry may be written now.
 
         Args:
             key: the kind of event; equal events are counted together.
@@ -60,13 +60,13 @@ class RepeatLimiter(Generic[_Key]):
         return self._taken(known, now)
 
     def due(self, now: float) -> Iterator[tuple[_Key, int]]:
-        """Yield each event with a count that may be written now."""
+        """Yield each event that may be written now, with its count."""
         for key, known in self._known.items():
             if known.count and (count := self._taken(known, now)):
                 yield key, count
 
     def forgotten(self, now: float | None = None) -> int:
-        """Return the number of events whose separate counts were dropped, and reset the number.
+        """Return how many events are no longer counted separately, and reset this number.
 
         Return 0 if no entry may be written at the time `now`; None ignores the limits.
         """
@@ -77,7 +77,7 @@ class RepeatLimiter(Generic[_Key]):
         return count
 
     def rest(self) -> Iterator[tuple[_Key, int]]:
-        """Yield each event with a count, regardless of the limits, and remove all events."""
+        """Yield each event that has a count, regardless of the limits, and remove all events."""
         known, self._known = self._known, {}
         yield from ((key, one.count) for key, one in known.items() if one.count)
 

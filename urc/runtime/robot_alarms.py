@@ -1,11 +1,11 @@
-"""The alarms of one robot, which are detected in its hub, stored and announced.
+"""The alarms of one robot, which are detected from its hub's samples, stored and announced.
 
 Layer 4. Each sample includes its alarm, so a sample costs one comparison, and only changes are
-processed. The object belongs to a robot, not to a session. Without a session, all values are
+processed. The object belongs to a robot, not to a session. If there is no session, all values are
 unknown, and the alarms stay.
 
 While an expression `suppressed_when` is true, its alarms are suppressed by design. An expression
-with an unknown or stale value is false, except in the first seconds of a session, while the first
+with an unknown or stale value is false, except in the first seconds of a session, when the first
 values arrive.
 """
 
@@ -26,11 +26,11 @@ from urc.runtime.signal_sources import sources_of
 __all__ = ["CONNECTION", "AlarmMemory", "RobotAlarms"]
 
 LOOK_S: Final = 1.0
-"""Interval of the checks for old values and scheduled changes, in seconds."""
+"""Interval between checks for old values and scheduled changes, in seconds."""
 FIRST_VALUES_S: Final = 5.0
-"""Time for which an alarm waits for the first values of its `suppressed_when`, in seconds."""
+"""How long an alarm waits for the first values of its `suppressed_when`, in seconds."""
 LOST_S: Final = 30.0
-"""Time after which a monitored robot's lost connection causes an alarm, in seconds."""
+"""How long a monitored robot's connection must be lost to cause an alarm, in seconds."""
 CONNECTION: Final = Signal(
     "connection",
     "string",
@@ -48,7 +48,7 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""URC's own alarm about a monitored robot, so that a silent robot does not seem to be working."""
+"""URC's own alarm about a monitored robot, which prevents a silent robot from seeming to work."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 
@@ -80,7 +80,7 @@ class _Suppression(NamedTuple):
 
 
 class RobotAlarms:
-    """The alarm list of one robot, with values from the hub of its present session."""
+    """The alarm list of one robot, with values from the hub of its current session."""
 
     def __init__(
         self,
@@ -100,8 +100,8 @@ class RobotAlarms:
             utc: source of UTC time, in seconds since 1970.
             key: name of the robot in the store.
             memory: the store; None stores nothing.
-            is_monitored: whether the robot stays connected for its alarms, so that a lost
-            connection also causes an alarm.
+            is_monitored: whether the robot stays connected for its alarms; if so, a lost connection
+                also causes an alarm.
         """
         self._clock = clock
         self._utc = utc
@@ -111,11 +111,12 @@ class RobotAlarms:
         self.on_change: Callable[[], None] = _nothing
         """Callback after each change of the list, on the event loop."""
         self.on_events: Callable[[Sequence[AlarmEvent]], None] = _nothing_of
-        """Callback with new events of the history, on the event loop."""
+        """Callback for new events in the history, on the event loop."""
         self._hub: Hub | None = None
         self._names: Mapping[str, object] = NOTHING
         self._lost_s: dict[str, float] = {}
-        """Start time of each transport's loss, on `clock`; connection attempts do not change it."""
+        """Time at which each transport was lost, on `clock`; connection attempts do not change
+        it."""
         self._began_s = 0.0
         """Start time of the session on `clock`, in seconds."""
         self._timer: PeriodicTimer | None = None
@@ -126,7 +127,7 @@ class RobotAlarms:
         self.list.adopt(self._limits, utc())
         self._stored = 0
         self.edition = 0
-        """Number of the document's versions so far; each version may change causes and actions."""
+        """Number of document versions so far; each version may change causes and actions."""
         self._finish()
 
     def _use(self, driver: Driver, *, is_monitored: bool) -> None:
@@ -142,7 +143,7 @@ class RobotAlarms:
         self._limits = _limits(declared)
         self._sources = sources_of(driver)
         self._seen: dict[str, tuple[str, str]] = dict.fromkeys(self._limits, _UNKNOWN)
-        """Alarm and condition of the last processed sample, by signal."""
+        """Alarm and condition of each signal's last processed sample."""
         self._suppressions = tuple(_suppressions(self._limits))
         names = (one.expression.names for one in self._suppressions)
         inputs = frozenset(name for each in names for name in each) & driver.signals.keys()
@@ -164,7 +165,7 @@ class RobotAlarms:
     # The session
 
     def start(self) -> None:
-        """Start scheduled changes; call this method on the event loop."""
+        """Begin to make scheduled changes; call this method on the event loop."""
         if self._timer is None and (self._limits or self.list.records):
             self._timer = PeriodicTimer(self._clock, LOOK_S, self._check)
 
@@ -199,12 +200,12 @@ class RobotAlarms:
             self._finish()
 
     def _judge_all(self, samples: Sequence[Sample]) -> None:
-        """Process the samples with a changed alarm, after an evaluation of the suppression."""
+        """Update the suppression, and then process the samples whose alarm has changed."""
         if self._inputs:
             self._update_inputs(samples)
-        # Most samples end at this comparison, so it avoids calls and field names. Alarms of limits
-        # have no condition here. Several alarm states can share one alarm, so their samples are
-        # processed.
+        # Most samples end at this comparison, so it avoids calls and field names. Alarms from
+        # limits have no condition here. Several alarm states can share one alarm, so their samples
+        # are processed.
         seen = self._seen
         for sample in samples:
             before = seen.get(sample[0])
@@ -321,7 +322,7 @@ class RobotAlarms:
         return done
 
     def shelve(self, signals: Iterable[str], for_s: float, actor: AlarmActor) -> list[AlarmRecord]:
-        """Shelve alarms for a time in seconds; return the newly shelved alarms."""
+        """Shelve alarms for a number of seconds; return the newly shelved alarms."""
         now = self._utc()
         done = self.list.shelve(signals, now + for_s, actor, now)
         self._finish()

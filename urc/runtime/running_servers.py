@@ -49,7 +49,7 @@ def headers(server: RunningServer) -> dict[str, str]:
 
 
 def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
-    """Return a connection to `server`, which connects and verifies with its first request.
+    """Return a connection to `server` that connects and verifies on its first request.
 
     Args:
         server: the server.
@@ -113,8 +113,8 @@ def announced(data: Path, name: str, server: RunningServer) -> Iterator[None]:
 def servers(data: Path) -> dict[Path, RunningServer]:
     """Return the servers announced in the data folder, newest first.
 
-    Files of killed servers are removed. If the system cannot determine whether a process is
-    running, its server stays in the list, although the address may not respond.
+    Files of killed servers are removed. If the system cannot determine whether a server's process
+    is running, the server stays in the list, although its address may not respond.
     """
     found: dict[Path, RunningServer] = {}
     for file in _files(data):

@@ -1,7 +1,7 @@
 """Run a held command from a script for a limited time, under the normal rules of motion.
 
-The script samples no input, but renews the lease with regular ticks. If the script hangs, is killed
-or loses its connection, the lease expires, and the guard writes the stop.
+The script does not sample input, but renews the lease with regular ticks. If the script hangs, is
+killed or loses its connection, the lease expires, and the guard writes the stop.
 """
 
 import asyncio
@@ -25,9 +25,9 @@ dashboard."""
 _TICK_S: Final = 0.05
 _LOOK_S: Final = 0.01
 _STOP_OUT_S: Final = 10.0
-"""Maximum time for the transport to accept the stop, in seconds."""
+"""Maximum wait for the transport to accept the stop, in seconds."""
 _WORKED_OFF_S: Final = 0.5
-"""Time for a broker or bridge to forward the stop before the connection closes, in seconds."""
+"""Time given to a broker or bridge to forward the stop before the connection closes, in seconds."""
 _US: Final = Operator("send", "a program")
 
 
@@ -78,7 +78,7 @@ def _now() -> float:
 
 
 async def until_ready(session: Session, backend: MotionBackend, name: str) -> None:
-    """Wait until the transport is connected and its connection steps are done or failed."""
+    """Wait until the transport is connected and its connection steps have succeeded or failed."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
     while not (backend.is_open(name) and session.frames.is_ready(name)):
@@ -96,7 +96,7 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Send ticks until the end; return whether the robot moved, and why the hold ended early."""
+    """Send ticks until the end; return whether the robot moved, and the reason for an early end."""
     number, next_s = 0, _now()
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:

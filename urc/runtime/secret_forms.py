@@ -1,4 +1,4 @@
-"""The possible forms of a secret in sent data, plain or encoded."""
+"""The forms, plain or encoded, that a secret may have in sent data."""
 
 import base64
 import json
@@ -47,7 +47,7 @@ class SecretForms:
 
 
 def forms(secret: str) -> list[str]:
-    """Return the encoded forms of a secret: plain, JSON, URL, hex."""
+    """Return the plain, JSON, URL and hex forms of a secret."""
     found = [secret, json.dumps(secret, ensure_ascii=False)[1:-1], json.dumps(secret)[1:-1]]
     if _SHORTEST <= len(secret) <= _LONGEST:
         data = secret.encode("utf-8", "surrogatepass")

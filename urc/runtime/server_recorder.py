@@ -1,8 +1,8 @@
 """Audit entries of one server: sign-ins, people, settings, packages, recordings, start and end.
 
-Layer 4. The methods are thread-safe, never block and never raise an exception, because sign-ins and
-STOP call them. Failed sign-ins and STOPs of unknown visitors are combined into one entry per second
-and address, with a count.
+Layer 4. Sign-ins and STOP call the methods, so the methods are thread-safe, never block and never
+raise an exception. Failed sign-ins and STOPs by unknown visitors are combined into one entry per
+second and address, with a count.
 
 Secrets never reach the log. The name in a failed sign-in is recorded only if a person has this
 name, because people sometimes type passphrases into the wrong field.
@@ -30,7 +30,8 @@ CLOCK_JUMP_S: Final = 5.0
 _BURST: Final = 60
 """Maximum number of entries about unknown visitors in one burst."""
 _PER_S: Final = 0.1
-"""Rate of such entries in a long attack: in a day, they use 3 MB of the log's 100 MB."""
+"""Rate of entries about unknown visitors during a long attack: in a day, they use 3 MB of the log's
+100 MB."""
 _MOST_SECRETS: Final = 256
 _USERINFO: Final = re.compile(r"//[^/@\s\"]*@")
 """User name and passphrase in a URL."""
@@ -39,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class Actor(NamedTuple):
-    """The person, device or program behind an event, and the right by which it acted."""
+    """The person, device or program that caused an event, and the right to do so."""
 
     name: str = ""
     principal: str = ""
@@ -117,19 +118,20 @@ class ServerRecorder:
         Args:
             way: sign-in method of the attempt, such as ``passphrase``.
             place: network address.
-            reason: reason for display, without any input of the visitor.
+            reason: reason to display, which must not contain any of the visitor's input.
             name: name of the person, device or program in the attempt; "" for an unknown name.
-            principal: its identifier; without one, the name is not recorded.
+            principal: identifier of the person, device or program; without an identifier, the name
+                is not recorded.
         """
         actor = Actor(name if principal else "", principal, way=way, place=place)
         self._repeat(_Repeated("sign-in failed", actor, "", "", reason))
 
     def signed_out(self, actor: Actor) -> None:
-        """Record the end of a sign-in by its owner."""
+        """Record that the owner has ended a sign-in."""
         self._record("signed out", actor)
 
     def revoked(self, actor: Actor, what: str, **about: object) -> None:
-        """Record that another person has ended a sign-in, token or right.
+        """Record that a person other than the owner has ended a sign-in, token or right.
 
         Args:
             actor: the administrator.
@@ -141,7 +143,7 @@ class ServerRecorder:
     def paired(
         self, actor: Actor, step: Literal["code made", "code used"], **about: object
     ) -> None:
-        """Record the creation or the use of a pairing code; `about` never contains the code."""
+        """Record that a pairing code was made or used; `about` never contains the code."""
         self._record("pairing", actor, step, arguments=about)
 
     # Administration
@@ -206,12 +208,12 @@ class ServerRecorder:
             robot: name of the robot.
             step: the action: ``acknowledged``, ``shelved`` or ``unshelved``.
             signals: signals of the alarms.
-            about: further facts, such as the time of a shelf.
+            about: further facts, such as how long an alarm is shelved.
         """
         self._record("alarm", actor, step, robot, {"signals": [*signals], **about})
 
     def audit_exported(self, actor: Actor) -> None:
-        """Record the download of the audit log."""
+        """Record that the audit log was downloaded."""
         self._record("audit", actor, "exported")
 
     # The server
@@ -223,7 +225,7 @@ class ServerRecorder:
         self._record("server", NO_ACTOR, step, arguments={"version": version, **about})
 
     def stopped_by_unknown(self, robot: str, place: str) -> None:
-        """Record a press of STOP by a visitor without a sign-in; equal presses are counted."""
+        """Record a press of STOP by a visitor who is not signed in; equal presses are counted."""
         actor = Actor(place=place)
         self._repeat(_Repeated("STOP", actor, robot, "", "pressed without a sign-in"))
 
@@ -301,12 +303,12 @@ class ServerRecorder:
 
 
 def terminal_actor() -> Actor:
-    """Return the user of this process, who may administer because of access to the data folder."""
+    """Return this process's user, who may administer URC because of access to the data folder."""
     return Actor(f"{_user()} on this computer", "local", "person", "administer", "terminal")
 
 
 def _user() -> str:
-    """Return the name of the process's user, from the system instead of the environment."""
+    """Return the name of the process's user as known to the system, not from the environment."""
     try:
         if sys.platform == "win32":
             return getuser()

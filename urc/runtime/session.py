@@ -54,7 +54,7 @@ class FifoEvent:
         return self._event.is_set() and not self._waiting
 
     async def wait(self) -> None:
-        """Wait for the event and for all earlier callers; a cancelled caller leaves the queue."""
+        """Wait for the event and all earlier callers; a cancelled caller leaves the queue."""
         self._waiting += 1
         try:
             async with self._turn:
@@ -64,12 +64,12 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""The writer of motion frames: none, a guard in this process, or a guard process. Only a
-guard process stops the robot if URC fails."""
+"""The writer of motion frames: none, a guard in this process, or a guard process. Only a guard
+process can stop the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Function that creates a named tuple faster than the constructor; each command creates several
+"""Function that creates named tuples faster than their constructors; each command creates several
 named tuples."""
 _GRACE_S = 2.0
 """Tolerance added to the sum of a command's declared waits, in seconds."""
@@ -125,7 +125,7 @@ class Session:
         self.frames: MotionFrames = engine.motions
         """Renderer of held commands' frames."""
         self.backend = self._make_backend(engine, transports, motion)
-        """Writer of held-command frames; None without motion."""
+        """Writer of held-command frames; None if the session cannot hold commands."""
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -140,7 +140,7 @@ class Session:
         """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links whose first attempt has not ended; commands wait for these links, in order.
+        """Links whose first attempt has not ended; commands wait for them in order.
         """
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
@@ -228,7 +228,7 @@ class Session:
         self.hub.tell_rest(self._clock.now())
         for task in self._tasks:
             task.cancel()
-        # An error in the block is passed to the caller unchanged, outside of a group. Only a
+        # An error in the block is passed to the caller unchanged, not in an exception group. Only a
         # cancellation is passed to the task group, which may have requested the cancellation.
         if isinstance(error, asyncio.CancelledError):
             await self._group.__aexit__(kind, error, trace)
@@ -290,13 +290,13 @@ class Session:
         """Wait until all sent data has arrived; call this method before closing the session.
 
         Returns:
-            A message about undelivered bytes, or "". The wait takes a few seconds at most.
+            A message about undelivered bytes, or "". The wait lasts a few seconds at most.
         """
         found = await asyncio.gather(*(link.settle() for link in self._links.values()))
         return "; ".join(filter(None, found))
 
     def reconnect(self) -> None:
-        """Try to reopen all lost connections now, instead of after their backoff."""
+        """Try to reopen all lost connections without waiting for their backoff."""
         for link in self._links.values():
             link.reconnect()
 
@@ -309,7 +309,7 @@ class Session:
         self._dispatcher.pull(sequence, what)
 
     def latch(self, reason: str) -> None:
-        """End every sequence of the driver and refuse autonomous motion.
+        """End all of the driver's sequences and refuse autonomous motion.
 
         Args:
             reason: reason to display; "" permits autonomous motion again.
@@ -318,7 +318,7 @@ class Session:
         self._dispatcher.latch(reason)
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
-        """Wait until the links of a command have ended their first attempt, within a time limit.
+        """Wait, within a time limit, until the first attempt of a command's links has ended.
 
         Raises:
             CommandFailed: STOP was pressed during the wait for a command that moves the robot.

@@ -1,6 +1,7 @@
 """Conversion of an operator's settings from text to typed values.
 
-Every command that opens a robot uses this module. The module needs no network and no event loop.
+Every command that opens a robot uses this module. The module does not need a network or an event
+loop.
 """
 
 import math
@@ -34,7 +35,7 @@ _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
 
 
 def environment_name(name: str) -> str:
-    """Return the environment variable of a setting; for ``robot-host``, ``URC_SET_ROBOT_HOST``."""
+    """Return a setting's environment variable: ``URC_SET_ROBOT_HOST`` for ``robot-host``."""
     return SETTING + name.upper().replace("-", "_")
 
 
@@ -45,11 +46,11 @@ def resolve_settings(
     *,
     allows_any_port: bool = False,
 ) -> tuple[dict[str, Value], tuple[str, ...]]:
-    """Return the value of each setting, and the names of settings without a value.
+    """Return the value of each setting, and the names of the settings that have no value.
 
     Args:
         profile: profile with the settings.
-        given: texts of settings from ``--set``, by name; these texts override all other sources.
+        given: texts of settings from ``--set``, by name, which override all other sources.
         environ: environment variables; ``URC_SET_NAME`` overrides the default of a setting.
         allows_any_port: whether to permit port 0, for a server that lets the system choose.
 
@@ -90,7 +91,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
         allows_any_port: whether to permit port 0, for a server that lets the system choose.
 
     Raises:
-        UrcError: the text is invalid; the message shows the found and the expected value. Secret
+        UrcError: the text is invalid; the message shows the actual and the expected value. Secret
             values are not shown in the message.
     """
     if len(text) > _LONGEST:

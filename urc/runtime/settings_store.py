@@ -18,8 +18,8 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "StoredSettings", "SettingsStore", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages with settings, in order of precedence for equal names: a robot precedes a
-driver."""
+"""Kinds of packages with settings, in order of precedence for equal names: a robot takes precedence
+over a driver."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -43,7 +43,7 @@ class StoredSettings(msgspec.Struct, frozen=True):
     """Package to which the settings belong, such as ``drivers/puppet``; "" for a document given by
     path."""
     monitors_alarms: bool | None = None
-    """Whether the robot stays connected for its alarms; None for the server's choice."""
+    """Whether the robot stays connected for its alarms; None leaves the choice to the server."""
 
 
 class SettingsStore:
@@ -54,7 +54,7 @@ class SettingsStore:
         self.file = folder / f"{quote(name, safe='')}.json"
 
     def load(self) -> StoredSettings:
-        """Return the stored settings; without a file, return an empty `StoredSettings`.
+        """Return the stored settings; if there is no file, return an empty `StoredSettings`.
 
         Raises:
             UrcError: the file cannot be read, or is damaged.
@@ -100,7 +100,7 @@ class SettingsStore:
 
 
 def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
-    """Return the robots with settings that become obsolete when packages are removed.
+    """Return the robots whose settings become obsolete when packages are removed.
 
     Args:
         folder: folder with the settings files.
@@ -117,9 +117,9 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
 
 
 def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
-    """Return the installed package for a robot name, or None.
+    """Return the installed package for the robot `name`, or None.
 
-    The result is the version that the operator chose, or else the newest version. A robot takes
+    The result is the version chosen by the operator, or else the newest version. A robot takes
     precedence over a driver of the same name.
 
     Args:
@@ -143,7 +143,7 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
 
 
 def pin(folder: Path, lock: Lock) -> None:
-    """Pin a robot to its present version before an installation; raise `UrcError` on failure.
+    """Before an installation, pin a robot to its current version; raise `UrcError` on failure.
 
     Args:
         folder: folder with the settings files.

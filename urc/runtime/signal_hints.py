@@ -1,4 +1,4 @@
-"""Hints about signals that a test failed to set, with corrections for the test.
+"""Hints about signals that a test failed to set, with suggested corrections to the test.
 
 Layer 4, pure. This module is used only after a failed test.
 """
@@ -27,7 +27,7 @@ _WAITED_FOR: Final = {
     "xml": "for the end of the XML element",
     "regex": "for bytes that match the pattern",
 }
-"""Missing part of an incomplete frame, by framing type."""
+"""The part that an incomplete frame lacks, by framing type."""
 
 
 class _Asked(NamedTuple):
@@ -48,7 +48,7 @@ class SignalHints:
         self._in_steps = in_steps
 
     def of(self, signal: str) -> str:
-        """Return the reason, to append to the text "nothing set it"; "" for an unknown reason."""
+        """Return the reason to append to the text "nothing set it"; "" if the reason is unknown."""
         for transport in self._driver.transports:
             reason = self._of_line(transport, signal)
             if reason:
@@ -88,7 +88,7 @@ class SignalHints:
         return f"{text} waits {what}{passes}"
 
     def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return a hint about an unsent request that the frame may answer, or ""."""
+        """Return a hint about an unsent request to which the frame may be the reply, or ""."""
         spec = self._driver.transports[transport]
         for asked in self._could_ask():
             reads = [asked.reply.read, *(stage.read for stage in asked.reply.stages)]
@@ -103,7 +103,7 @@ class SignalHints:
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return a hint if the reply format of a sent request matches no received frame, or ""."""
+        """Return a hint if no received frame matches the reply format of a sent request, or ""."""
         spec = self._driver.transports[transport]
         for label, reply in self._were_asked(transport):
             reads = [reply.read, *(stage.read for stage in reply.stages)]

@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["LOCKED_S", "open_for_writing", "opened_for_reading", "set_aside"]
 
 LOCKED_S: Final = 1.0
-"""Time to wait for another server's transaction, in seconds."""
+"""How long to wait for another server's transaction, in seconds."""
 
 _AGAIN_S: Final = 0.01
 
@@ -42,7 +42,7 @@ def open_for_writing(file: Path) -> sqlite3.Connection:
 
 @contextmanager
 def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file for reading while a server may write it; yield None without a file or tables.
+    """Open a file that a server may be writing, for reading; yield None without a file or tables.
 
     Raises:
         OSError: the file cannot be read.

@@ -27,12 +27,12 @@ _SHOWN: Final = 3
 """Maximum number of reported failures per test."""
 _SHOWN_BYTES: Final = 48
 _BEFORE_BYTES: Final = 16
-"""Number of displayed bytes of a long frame before the first difference; `_SHOWN_BYTES` is the
-total number."""
+"""Number of bytes of a long frame that are displayed before the first difference; `_SHOWN_BYTES` is
+the total number."""
 
 
 def first(failures: list[str]) -> list[str]:
-    """Return the first failures, followed by the number of further failures."""
+    """Return the first failures, followed by the number of other failures."""
     more = len(failures) - _SHOWN
     return [*failures[:_SHOWN], f"and {more} more"] if more > 0 else list(failures)
 
@@ -77,7 +77,7 @@ def _wanted(state: ExpectedState) -> str:
 def check_bytes(
     trial: TestEngine, driver: Driver, sent: Mapping[str, Fed | tuple[Fed, ...]]
 ) -> Iterator[str]:
-    """Yield a message for each transport with unexpected sent data; discard compared data."""
+    """Yield a message for each transport that sent unexpected data; discard compared data."""
     for name, text in sent.items():
         found = trial.sent.pop(name, [])
         pieces = pieces_of(text)
@@ -176,7 +176,7 @@ def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
 
 
 def is_same(found: object, expected: object) -> bool:
-    """Compare values: 42 equals 42.0, true differs from 1, and fractions have a tolerance."""
+    """Compare values: 42 equals 42.0, true differs from 1, and fractions may differ slightly."""
     if isinstance(found, tuple) and isinstance(expected, tuple):
         return len(found) == len(expected) and all(map(is_same, found, expected))
     if isinstance(found, bool) != isinstance(expected, bool):
@@ -196,7 +196,7 @@ def _difference(transport: str, wanted: bytes, found: bytes) -> str:
 
 
 def _bytes_shown(data: bytes, start: int) -> str:
-    """Return the bytes from `start`, with dots for omitted bytes."""
+    """Return the bytes from `start`, with dots in place of omitted bytes."""
     if not data:
         return "nothing"
     part = data[start : start + _SHOWN_BYTES]

@@ -1,4 +1,4 @@
-"""A test bench for an engine, with a simulated clock and transports that always connect.
+"""A test bench for an engine, with a simulated clock, and transports that always connect.
 
 Layer 4. The module uses neither I/O nor asyncio. All output of the engine is collected for the
 test.
@@ -40,7 +40,7 @@ Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
 """Kind and name of a driver part that a test can use."""
 _TWO_PEOPLE: Final = ("author of the test", "operator")
-"""Confirmations of two people, so that tests can run every command."""
+"""Confirmations by two people, so that tests can run every command."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types with objects as messages; all other types transfer bytes."""
 _MOST_TICKS: Final = 20_000
@@ -77,7 +77,8 @@ class TestEngine:
     """One running test.
 
     Raises:
-        UrcError: raised by every method for an impossible action; the message is for display.
+        UrcError: an action is impossible; any method may raise this error, and the message is for
+            display.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class TestEngine:
         self.fresh: set[str] = set()
         """Signals set since the last call to `forget`, with their samples."""
         self.fed: dict[str, bytes] = {}
-        """All bytes received from the robot since the opening of the connection, by transport."""
+        """All bytes received from the robot since the connection was opened, by transport."""
         self.sent: dict[str, list[Payload]] = {}
         """Sent payloads that no check has read yet, by transport."""
         self.failures: list[str] = []
@@ -217,7 +218,7 @@ class TestEngine:
         raise UrcError(f"more than {_MOST_TICKS} deadlines are due within {seconds:g} s")
 
     def pass_to_deadline(self, end: float = float("inf")) -> bool:
-        """Advance to the next deadline before `end`; return whether a deadline exists."""
+        """Advance to the next deadline before `end`; return whether there was one."""
         due = self.engine.deadline
         if due is None or due > end:
             return False
@@ -226,7 +227,7 @@ class TestEngine:
         return True
 
     def perform(self, events: list[Event]) -> None:
-        """Perform events in the same way as a link."""
+        """Perform events as a link would."""
         for poll in self.driver.polls:
             if self.engine.lines[poll.transport].has(poll.name) or poll.reply is None:
                 self.used.add(("poll", poll.name))
@@ -256,7 +257,7 @@ class TestEngine:
                         self.failures.append(f"closed: {reason}")
 
     def forget(self) -> None:
-        """Begin a new collection of set signals."""
+        """Start a new collection of set signals."""
         self.fresh.clear()
 
 

@@ -1,4 +1,4 @@
-"""The transports of a driver; each tunnel precedes the transports that it carries."""
+"""A driver's transports, ordered so that each tunnel precedes the transports that it carries."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, cast

@@ -18,7 +18,7 @@ def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
     """Return the widgets for a document.
 
     An installed package uses the installed widgets. A package in development uses the widget
-    packages in the neighbouring folders. Any other document uses the folder ``widgets`` next to the
+    packages in neighbouring folders. Any other document uses the folder ``widgets`` next to the
     document.
     """
     home = ecosystem_of(Path(document)) or _packages_folder_of(Path(document))
@@ -36,7 +36,7 @@ def hidden_beside(document: str | PathLike[str]) -> list[Path]:
 
 
 def hidden_widget(manifest: str, name: str) -> Problem:
-    """Return the warning about a widget with the same name as a built-in widget."""
+    """Return the warning about a widget that has the same name as a built-in widget."""
     return Problem(
         "shipped-name",
         f"this widget is never used: the built-in widget {name!r} takes precedence",
@@ -61,7 +61,7 @@ class WidgetRegistry(WidgetFolder):
         self._brought = WidgetFolder(brought)
         self._brought.problems = self.problems
         self._hidden: set[str] = set()
-        """Requested widget names that are both built-in and installed."""
+        """Requested names that belong to both a built-in and an installed widget."""
 
     @property
     def files(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Automatic replies of an emulated robot to every request that the driver declares.
 
-The module uses no sockets and no clock. Each received frame is matched against all requests that
+The module does not use sockets or clocks. Each received frame is matched against all requests that
 the driver can send on its transport. Each reply is encoded from plausible values, with the driver's
 declaration for decoding the reply. A command argument with the name of a signal sets that signal.
 """
@@ -68,7 +68,7 @@ class SimulatedReply(NamedTuple):
     prompt: Pattern | None = None
     match: Template | None = None
     needed: frozenset[str] = frozenset()
-    """Names of internal fields that the acknowledgement uses."""
+    """Names of the internal fields that the acknowledgement uses."""
 
     def fits(self, fields: Mapping[str, object]) -> bool:
         """Return whether a frame can be encoded from these fields."""
@@ -94,7 +94,7 @@ class _Request(NamedTuple):
 
 
 class ReceivedRequest(NamedTuple):
-    """A received request and its decoded arguments."""
+    """A received request with its decoded arguments."""
 
     request: _Request
     arguments: Mapping[str, object]
@@ -126,7 +126,7 @@ class DefaultResponder:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: set values, or otherwise plausible values."""
+        """Return raw fields for a frame: values that were set, or else plausible values."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -247,7 +247,7 @@ class DefaultConnection:
 
         Args:
             frame: the received frame.
-            label: preferred command or poll if several send the same frame; "" for no preference.
+            label: command or poll to prefer if several send the same frame; "" for no preference.
         """
         near: ReceivedRequest | None = None
         best: ReceivedRequest | None = None
@@ -267,8 +267,8 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`; None if the best match has a reply.
 
-        Two declarations in a driver often have the same stop frame. Examples are the release of a
-        held command, a close message and a command without reply.
+        Two of a driver's declarations often have the same stop frame. Examples are the release of a
+        held command, a close message and a command that has no reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -279,7 +279,7 @@ class DefaultConnection:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return the labels of all requests that encode to this frame, else of the first match."""
+        """Return the labels of all requests that encode to this frame, or of the first match."""
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
@@ -386,7 +386,7 @@ class DefaultConnection:
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:
-        """Return a message period that keeps all the message's signals fresh."""
+        """Return a message period that keeps all of the message's signals fresh."""
         signals = self._robot.driver.signals
         ages = [signals[name].stale_after_s for name in read.fields if name in signals]
         return min(_SLOWEST_S, max(_FASTEST_S, min(ages, default=_SLOWEST_S) / 3))

@@ -38,7 +38,7 @@ class _ConnectionState(Protocol):
 
 
 class TimedSetters:
-    """Assignments of timed rules to connections.
+    """The connections to which timed rules are assigned.
 
     Only the assigned connection changes the robot's state.
     """
@@ -116,11 +116,11 @@ class EmulatedRobot:
 
     @property
     def body(self) -> SimulatedBody | None:
-        """The simulated body; None for a robot without a world."""
+        """The simulated body; None if the robot has no world."""
         return self._values.body
 
     def prepare(self) -> None:
-        """Load the image modules early, to avoid delaying the first image; the call may block."""
+        """Load the image modules early, so as not to delay the first image; the call may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
@@ -146,7 +146,7 @@ class EmulatedRobot:
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return the robot's camera image as JPEG; None without a working camera.
+        """Return the robot's camera image as JPEG; None if no camera works.
 
         `now_s` is the current time, in seconds since the epoch.
         """
@@ -157,7 +157,7 @@ class EmulatedRobot:
         return body.picture(name, now_s)
 
     def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
-        """Return a top view of the world as JPEG; None without a world or without Pillow.
+        """Return a top view of the world as JPEG; None if the world or Pillow is missing.
 
         Args:
             width: width of the image in pixels, 16 to 2000.
@@ -171,7 +171,7 @@ class EmulatedRobot:
         return body.world.top_view(width, height)
 
     def readings(self, now_s: float) -> Mapping[str, Reading]:
-        """Return the values of the robot's signals, without a connection.
+        """Return the values of the robot's signals; no connection is needed.
 
         `now_s` is the current time, in seconds since the epoch.
         """
@@ -181,7 +181,7 @@ class EmulatedRobot:
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
-    """Return the signal of each camera image, keyed by transport and topic."""
+    """Return the signal for each camera image, keyed by transport and topic."""
     return {
         (message.transport, topic_of(message.read, settings)): name
         for message in driver.messages.values()
@@ -205,7 +205,7 @@ class _Periodic:
     what: ReadyRule | DefaultMessage
     every_s: float
     left_s: float
-    """Time until the rule or message is due, in seconds."""
+    """Time until the rule or the message is due, in seconds."""
 
 
 class EmulatedConnection:
@@ -247,7 +247,7 @@ class EmulatedConnection:
 
     @property
     def due_in_s(self) -> float | None:
-        """Time until `advance` has data to send, in seconds; None without pending data."""
+        """Time until `advance` has data to send, in seconds; None if no data is pending."""
         if not self._is_greeted:
             return 0.0
         left = [one.left_s for one in self._periodic]
@@ -299,7 +299,8 @@ class EmulatedConnection:
     def advance(self, dt_s: float, now_s: float) -> list[Payload]:
         """Advance the time by `dt_s` seconds and return the robot's unsolicited frames.
 
-        A periodic rule sends at most once per call, so a late call causes no burst of frames.
+        A periodic rule sends at most once per call, so a late call does not cause a burst of
+        frames.
         """
         said = self._flawed(self._due(dt_s, now_s), now_s)
         return self._late.pop_due(now_s) + said if self.has_late else said
@@ -357,7 +358,7 @@ class EmulatedConnection:
         return said
 
     def _pass(self, now_s: float) -> None:
-        """Advance the world to the current time before its inputs change."""
+        """Advance the world to the current time, before the inputs change."""
         self._now_s = now_s
         if self._body is not None:
             self._body.world.advance(now_s)

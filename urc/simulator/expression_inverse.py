@@ -1,8 +1,8 @@
-"""Inversion of expressions: find the field value for which an expression has the wanted value.
+"""Invert expressions: find the field value for which an expression has the wanted value.
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
 first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. An
-expression without an inverse results in None.
+expression without an inverse has the result None.
 """
 
 import ast
@@ -48,7 +48,7 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
 
 
 def _takes_apart(template: Template) -> bool:
-    """Return whether the expression splits its field, so that the field cannot be a plain value."""
+    """Return whether the expression splits its field, which then cannot be a plain value."""
     return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
 
 
@@ -92,7 +92,7 @@ def _chain(python: str) -> list[Step]:
 
 
 def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
-    """Return the field's value, or some of its bytes with their offset."""
+    """Return the field's value, or some of its bytes and their offset."""
     at = 0
     for name, arguments in chain:
         if name in _TEXTS:

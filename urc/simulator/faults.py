@@ -105,7 +105,7 @@ class Faults:
         self.dropped = missing
         """Signals with failed sensors."""
         self.stuck: dict[str, Reading] = {}
-        """Last values of the stuck signals, keyed by name."""
+        """Last values of stuck signals, keyed by name."""
         self._frames = 0
 
     @property
@@ -158,7 +158,7 @@ class DelayLine:
 
     @property
     def due_s(self) -> float:
-        """Due time of the first frame, on the clock of `push`; ``inf`` if the queue is empty."""
+        """When the first frame is due, on the clock of `push`; ``inf`` if the queue is empty."""
         return self._waiting[0][0] if self._waiting else math.inf
 
     def push(self, frames: Sequence[Payload], due_s: float) -> None:

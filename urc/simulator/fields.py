@@ -1,4 +1,4 @@
-"""Raw fields for a frame of the emulated robot, and subsets of fields that fit into one frame.
+"""Raw fields for one of the emulated robot's frames, and subsets of fields that fit into a frame.
 
 Pure.
 """
@@ -25,7 +25,8 @@ class Fields(NamedTuple):
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own
-        # Some exclude each other: add them one by one while a frame with all of them exists.
+        # Some fields exclude each other: add fields one by one while a frame with all of them
+        # exists.
         most = dict(self.own)
         for name, raw in (self.numbers | self.others).items():
             for value in (raw, whole.get(name, raw)):

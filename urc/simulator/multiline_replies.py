@@ -1,4 +1,4 @@
-"""Multiline replies of an emulated robot, including their last line.
+"""Multiline replies from an emulated robot, including their last lines.
 
 Pure.
 """

@@ -24,17 +24,17 @@ _ONE_OF = re.compile(
     ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
     re.VERBOSE | re.ASCII,
 )
-"""Pattern of ``name in [constant, …]``, with groups for the name and the first constant."""
+"""Pattern for ``name in [constant, …]``, with groups for the name and the first constant."""
 
 
 _MATCH = re.compile(
     r"(?<![\w.])(_?[A-Za-z]\w*)\s+is\s+(?:match|search)\(\s*'([^']*)'\s*\)", re.ASCII
 )
-"""Pattern of ``name is match('…')``, with groups for the name and the regular expression."""
+"""Pattern for ``name is match('…')``, with groups for the name and the regular expression."""
 
 
 _HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
-"""Pattern of the filter ``ddmm``, with a group for the name of the hemisphere field."""
+"""Pattern for the filter ``ddmm``, with a group for the name of the hemisphere field."""
 
 
 def rule_for(driver: Driver, transport: str, label: str) -> str:
@@ -72,7 +72,7 @@ def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]
 
 
 class _Name(str):
-    """A name in an equality, as opposed to a text constant."""
+    """A name in an equality, as distinct from a text constant."""
 
     __slots__ = ()
 
@@ -172,6 +172,6 @@ def _as(kind: str, raw: object) -> object:
 
 
 def _is_whole(raw: str) -> bool:
-    """Return whether the text is an integer in the notation of expressions."""
+    """Return whether the text is an integer as written in expressions."""
     digits = raw.removeprefix("-")
     return digits.isdecimal() and digits.isascii() and str(int(raw)) == raw

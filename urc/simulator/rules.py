@@ -1,6 +1,6 @@
 """The simulator rules of a document, compiled for one transport.
 
-The module is pure: it uses no sockets and no clock.
+The module is pure: it does not use sockets or clocks.
 """
 
 from collections.abc import Mapping
@@ -55,7 +55,7 @@ class ReadyRule(NamedTuple):
 
 
 class RunningRule:
-    """The pending reactions of one rule."""
+    """A rule's pending reactions."""
 
     __slots__ = ("asked", "frame", "has_waited", "left_s", "names", "ready_reactions", "sets")
 
@@ -131,7 +131,7 @@ class RuleSet:
         )
 
     def match(self, frame: Frame, now_s: float) -> RunningRule | None:
-        """Return the reactions of the first rule that matches the frame; None without a match.
+        """Return the reactions of the first rule that matches the frame; None if no rule matches.
 
         Raises:
             Unanswered: a condition or field of a rule has no value.
@@ -147,7 +147,8 @@ class RuleSet:
             running_rule = self._running_rule(rule, names, asked, frame, now_s)
             if running_rule is not None:
                 return running_rule
-        # The first request with these bytes has no rule; another one with the same bytes may have.
+        # The first request with these bytes has no rule, but another request with the same bytes
+        # may have one.
         for rule in self.asked:
             asked = self._auto.asked_too(frame, rule.what.request) if rule.what.request else None
             names = None if asked is None else asked.arguments

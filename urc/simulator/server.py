@@ -1,4 +1,4 @@
-"""Servers for an emulated robot on real connections, for operators, tests and ``urc demo``.
+"""Servers that put an emulated robot on real connections, for operators, tests and ``urc demo``.
 
 The package `urc.simulator.servers` contains one server for each type of transport.
 """
@@ -74,7 +74,7 @@ async def serve(
                 name=name,
                 spec=spec,
                 options=_options_of(spec, settings),
-                # Only the robot itself connects to a transport behind another one.
+                # Only the robot itself connects to a transport behind another transport.
                 host=_LOOPBACK if spec.tunnel else host,
                 line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
@@ -107,7 +107,7 @@ def _server(context: ServerContext) -> SimulatedServer:
 
 
 def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
-    """Return the number of tunnels in front of this transport."""
+    """Return the number of tunnels through which this transport connects."""
     tunnel = transports[name].tunnel
     return 1 + _depth(transports, tunnel) if tunnel else 0
 

@@ -25,7 +25,7 @@ _KEPT = ("flies", "cut")
 For example, a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
-"""Sensors that need numpy or Pillow."""
+"""Pattern for references to sensors that need numpy or Pillow."""
 
 Evaluate = Callable[[Template, float], object]
 """Function that evaluates a template with the robot's signals and state at a given time."""
@@ -65,7 +65,7 @@ class SimulatedBody:
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Record the commands of a received frame."""
+        """Record the commands in a received frame."""
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False
 
@@ -138,7 +138,7 @@ def has_rendering() -> bool:
 
 
 def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> frozenset[str]:
-    """Return the signals of cameras and laser scanners, except those of the readings `without`."""
+    """Return the signals of cameras and laser scanners, except the readings in `without`."""
     found = {name: set(_LOOKS.findall(one.python)) for name, one in spec.senses.items()}
     return frozenset(name for name, readings in found.items() if readings - without)
 
@@ -146,7 +146,7 @@ def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> 
 def failsafe_of(driver: Driver) -> Failsafe | None:
     """Return a fail-safe from the `watchdog` or `step` of the held commands, or None.
 
-    Return None if there are no held commands, or if any held command has no finite time.
+    Return None if there are no held commands, or if any of them has no finite time.
     """
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]

@@ -88,7 +88,7 @@ def _quaternion(now_s: float) -> dict[str, Value]:
 
 
 _DIGITS: Final = 7
-"""Number of decimal places of world values; in degrees of latitude, the last place is about a
+"""Number of decimal places in world values; for a latitude in degrees, the last place is about a
 centimetre."""
 _DEEPEST: Final = 16
 """Maximum length of a chain of computed signals."""
@@ -110,7 +110,7 @@ class Values:
         *,
         is_plain: bool = False,
     ) -> None:
-        """Initialise the robot with `initial` signals and state variables, and a world if given."""
+        """Create the robot with `initial` signals and state variables, and a world if given."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
@@ -118,7 +118,7 @@ class Values:
         self.chosen: dict[str, Reading] = {}
         """Explicitly set signal values, keyed by name."""
         self.body: SimulatedBody | None = None
-        """The simulated body with its sensors; None without a world."""
+        """The simulated body and its sensors; None if there is no world."""
         self.senses: Mapping[str, object] = NOTHING
         """Signals that the world provides."""
         drawn = PLAIN if is_plain else frozenset[str]()
@@ -185,7 +185,7 @@ class Values:
 
 
 class Names(Mapping[str, object]):
-    """A namespace of given names, ``now``, ``settings``, state variables and signals."""
+    """A namespace that contains given names, ``now``, ``settings``, state variables and signals."""
 
     __slots__ = ("_depth", "_given", "_now_s", "_values")
 

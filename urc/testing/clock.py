@@ -8,7 +8,7 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Number of event loop turns after which all ready tasks have run. The number exceeds the length of
+"""Number of event loop turns within which all ready tasks run. The number exceeds the length of
 any chain of tasks in URC."""
 _QUIET_TURNS = 3
 """Number of consecutive turns without a ready task after which the event loop counts as idle."""

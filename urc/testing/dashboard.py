@@ -1,4 +1,4 @@
-"""A fake robot for the dashboard: profiles with widgets, and a session without transport."""
+"""A fake robot for the dashboard: profiles with widgets, and a session without a transport."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -86,7 +86,7 @@ def dashboard_profile(
     settings: Mapping[str, Setting] | None = None,
     commands: Mapping[str, Command] | None = None,
 ) -> Profile:
-    """Return a profile with all slots in one row; the default is the puppet's battery signal.
+    """Return a profile with all slots in one row; by default, it shows the puppet's battery signal.
 
     A widget's missing options have the defaults from its manifest.
     """
@@ -120,7 +120,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """A fake session, controlled by a test. The session counts the calls of `open`."""
+    """A fake session, controlled by a test. The session counts calls to `open`."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -136,13 +136,13 @@ class FakeRobot:
         self.reconnects = 0
         """Number of requests to reopen the connections immediately."""
         self.latched: list[str] = []
-        """Reasons of all latched stops, in order."""
+        """Reasons for all latched stops, in order."""
         self.frames = FakeFrames(profile.driver)
         self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Callback for the events of held commands."""
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
-        """Callback that returns the reply values of a command, or raises an error; None for replies
+        """Callback that returns a command's reply values or raises an error; None for replies
         without values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
@@ -195,7 +195,7 @@ class FakeRobot:
         self.hub.publish([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
     def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
-        """Set the state of the only transport, beginning `age_s` seconds ago."""
+        """Set the only transport's state; the state began `age_s` seconds ago."""
         since_s = self.clock.now() - age_s
         self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 

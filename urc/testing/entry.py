@@ -1,4 +1,4 @@
-"""Access to a test's dashboard, with known keys and the cookies of admitted browsers.
+"""Access to a test's dashboard, with known keys and the cookies of browsers that have access.
 
 For tests alone.
 """
@@ -22,7 +22,7 @@ CONTROL = AccessControl(STORE, key=KEY)
 ACCESS = Access(CONTROL, instance="test")
 """Access to a dashboard that requires a sign-in."""
 OPEN = Access(CONTROL, instance="test", anonymous="drive")
-"""Access to a dashboard that requires no sign-in, with the same admitted browsers."""
+"""Access to a dashboard that requires no sign-in; the same browsers have access."""
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
 """Cookies of a browser that has sent the start key."""

@@ -1,4 +1,4 @@
-"""A helper that tests a framing by splitting the same data in different ways."""
+"""A test helper for framings, which splits the same data in different ways."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar

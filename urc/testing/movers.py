@@ -1,4 +1,4 @@
-"""A fake motion backend, which records written frames with their times as readable text."""
+"""A fake motion backend, which records each written frame as readable text, with its time."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
@@ -55,7 +55,7 @@ class FakeFrames:
         return number
 
     def tell(self, event: MotionEvent) -> None:
-        """Report an event of the engine."""
+        """Report an event from the engine."""
         if self.on_motion is not None:
             self.on_motion(event)
 
@@ -102,7 +102,7 @@ class FakeMotionBackend:
         self.written: list[tuple[float, str]] = []
         """Time and text of each write; writes to a closed transport are not recorded."""
         self.reasons: list[Reason] = []
-        """Reasons of all stops, in order."""
+        """Reasons for all stops, in order."""
         self.ticked_s = float("-inf")
         """Time of the last accepted tick, in seconds."""
         self.is_up = True

@@ -45,14 +45,14 @@ def line_profile(
     transport: str = "tcp",
     max_bytes: int = 65536,
 ) -> Profile:
-    """Return a profile like the puppet's: line feeds, one number signal, one poll, two commands.
+    """Return a profile like the puppet's: line feeds, one number signal, one poll and two commands.
 
     Args:
         is_per_request: whether each request opens a separate connection.
         every_s: period of the poll, in seconds; None for a robot without polls.
         timeouts: timeouts of the only transport, which is named ``wire``.
         backoff: delays between attempts to reconnect; None for the defaults.
-        transport: type of the transport, as in the transports table.
+        transport: the transport's type, as in the transports table.
         max_bytes: maximum size of a frame, in bytes.
     """
     wire = TransportSpec(

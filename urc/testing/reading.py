@@ -1,4 +1,4 @@
-"""The form of a reply or message, built from YAML."""
+"""Forms of replies and messages, built from YAML."""
 
 from collections.abc import Collection
 

@@ -51,7 +51,7 @@ class MemoryTransport:
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Close the connection as the robot, after all data fed so far."""
+        """Close the connection as the robot, once all data fed so far has been received."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 

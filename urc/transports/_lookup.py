@@ -1,4 +1,4 @@
-"""Address lookups that block neither the event loop nor the exit of the program."""
+"""Address lookups that block neither the event loop nor the program's exit."""
 
 import asyncio
 import errno
@@ -17,11 +17,11 @@ _Connected = TypeVar("_Connected")
 
 
 class AddressLookup:
-    """A repeatable address lookup of one host and port.
+    """A repeatable address lookup for one host and port.
 
-    The thread pool of the event loop delays the exit of the program, and a resolver without a
-    network may take half a minute. Each lookup therefore runs in a separate thread. Only one lookup
-    runs at a time; a retry waits for the running lookup.
+    The event loop's thread pool delays the program's exit, and a resolver without a network may
+    take half a minute. Each lookup therefore runs in a separate thread. Only one lookup runs at a
+    time; a retry waits for the running lookup.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
@@ -82,7 +82,7 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
 
 
 def _numeric(host: str, port: int, kind: socket.SocketKind) -> list[Address] | None:
-    """Return the addresses of a numeric host, without starting a thread."""
+    """Return a numeric host's addresses, without starting a thread."""
     try:
         return _resolve(host, port, kind, socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):

@@ -25,7 +25,7 @@ FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, Loo
 """Exceptions that the library raises; a `LookupError` means that a server sent invalid RFC 2217
 data."""
 UNTAKEN_BYTES = 1_048_576
-"""Maximum number of unsent bytes of option replies to a server."""
+"""Maximum number of unsent bytes in option replies to a server."""
 if sys.platform != "win32":
     import termios
 
@@ -47,7 +47,7 @@ async def open_port(
     Args:
         port: a device path or name, or an address ``rfc2217://HOST:PORT``.
         arguments: settings under the library's names.
-        tune: function that configures the socket of a network port.
+        tune: function that configures a network port's socket.
 
     Raises:
         OSError, SerialException, termios.error, ValueError: the port cannot be opened or
@@ -70,14 +70,14 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """An RFC 2217 connection that skips the confirmation of unused notifications.
+    """An RFC 2217 connection that does not wait for the confirmation of unused notifications.
 
     The library would wait for a confirmation until its timeout, because the common server ser2net
     never sends a confirmation.
     """
 
     def _data_received(self, data: bytes) -> None:
-        """Process received data; invalid data or too many unsent replies end the connection."""
+        """Process received data; invalid data and too many unsent replies end the connection."""
         for start in range(0, len(data), _AT_ONCE):
             line, serial = self._tcp_transport, self._serial
             if line is None or serial is None or line.is_closing():
@@ -126,7 +126,7 @@ class SerialStream(asyncio.Protocol):
     # -- called by the library
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Store the transport of the opened port."""
+        """Store the opened port's transport."""
         assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - guaranteed by the library
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
@@ -155,7 +155,7 @@ class SerialStream(asyncio.Protocol):
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
         while not self._arrived_bytes:
             if self._ended is not None:
                 raise PeerClosed(self._ended)

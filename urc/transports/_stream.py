@@ -1,8 +1,8 @@
-"""An open TCP connection as a stream, and a base class for transports over a stream.
+"""An open TCP connection as a stream, and a base class for transports that use a stream.
 
 Each connection stores received data in one buffer of fixed size. While the buffer is full, the
 socket is not read, so a flooding robot fills only its own send queue. `write` returns after the
-kernel has accepted every byte, so the connection may be closed directly after the last write.
+kernel has accepted every byte, so the connection may be closed immediately after the last write.
 """
 
 import asyncio
@@ -45,10 +45,10 @@ READ_AHEAD_BYTES = 65536
 
 _KEEPALIVE_IDLE_S, _KEEPALIVE_EVERY_S, _KEEPALIVE_COUNT = 5, 2, 3
 _UNANSWERED_MS = 5000
-"""Timeout of TCP acknowledgements in milliseconds, which detects half-open connections and pulled
-cables."""
+"""Timeout for TCP acknowledgements, in milliseconds; the timeout detects half-open connections and
+pulled cables."""
 _UNSENT_BYTES = 16384
-"""Maximum number of unsent bytes in the kernel; more data would only become outdated."""
+"""Maximum number of unsent bytes in the kernel; further data would only become outdated."""
 _UNSENT = array("i", [0])
 """Output buffer for the system call that returns the number of unsent bytes."""
 _CAN_WRITE = os.name == "posix"
@@ -77,7 +77,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport: asyncio.Transport
         self._line: socket.socket | None = None
         self._number = -1
-        """File descriptor of the socket; -1 after the end of the connection."""
+        """The socket's file descriptor; -1 after the connection has ended."""
         self.sink: Callable[[bytes], bool] | None = None
         """Callback that receives data while the buffer is empty. The callback returns whether the
         data was accepted."""
@@ -85,7 +85,7 @@ class TcpStream(asyncio.BufferedProtocol):
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Store the transport of the opened connection."""
+        """Store the opened connection's transport."""
         # No isinstance check: the transports of uvloop have another base class.
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(high=0)
@@ -106,12 +106,12 @@ class TcpStream(asyncio.BufferedProtocol):
         self._arrived.set()
 
     def eof_received(self) -> bool:
-        """Record the end of the stream; the event loop then closes the connection."""
+        """Record that the stream has ended; the event loop then closes the connection."""
         self.end(HUNG_UP)
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Record the end of the connection."""
+        """Record that the connection has ended."""
         self.end(broke(exc) if exc else HUNG_UP)
         self._gone.set()
 
@@ -128,7 +128,7 @@ class TcpStream(asyncio.BufferedProtocol):
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
         while not self._filled:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -215,7 +215,7 @@ class StreamTransport:
         self._stream: ByteStream | None = None
 
     async def receive(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         return await self._stream.read()

@@ -52,7 +52,7 @@ class Tls:
         """Return the TLS settings of the option, or None without TLS.
 
         Args:
-            kind: type of the transport, for error messages.
+            kind: the transport's type, for error messages.
             option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
                 ``server_name`` and ``verify``. The values of ``ca``, ``cert`` and ``key`` are file
                 names or PEM texts.
@@ -228,7 +228,7 @@ def _no_password() -> str:
 
 
 def _pem(given: str) -> str:
-    """Return the contents of a file, or the given text if it is not a file name."""
+    """Return a file's contents, or the given text if it is not a file name."""
     return given if _PEM in given else Path(given).expanduser().read_text("ascii")
 
 

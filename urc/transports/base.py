@@ -1,4 +1,4 @@
-"""Interfaces of transports, and the errors that transports raise.
+"""Interfaces for transports, and the errors that transports raise.
 
 A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
 messages. A transport converts every exception of a library into one of the errors in this module.
@@ -39,8 +39,9 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of notices, the messages that a transport itself creates. The body of a notice is a one-line
-text about an error that the robot does not report. Notices are written to the robot's log and do
+"""Verb of notices, which are messages that a transport itself creates. A notice's body is a
+one-line text about an error that the robot does not report. Notices are written to the robot's log
+and do
 not prove that the robot is alive.
 """
 
@@ -69,7 +70,7 @@ class Transport(Protocol):
 
     @property
     def address(self) -> str:
-        """Target of the connection as display text, such as ``tcp 192.168.1.5:6789``."""
+        """The connection's target as display text, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
         """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
@@ -99,7 +100,7 @@ class ByteStream(Protocol):
     """One open connection inside a tunnel."""
 
     async def read(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
 
     async def write(self, data: bytes) -> None:
         """Wait for buffer space, then send `data`; raise `PeerClosed` on a broken connection."""
@@ -120,19 +121,19 @@ class TopicSubscription(NamedTuple):
 
     topic: str
     attributes: Mapping[str, Value] = NOTHING
-    """Options of the subscription, such as type, throttle and quality of service."""
+    """The subscription's options, such as type, throttle and quality of service."""
 
 
 class TransportSetup(NamedTuple):
-    """The arguments of a transport factory."""
+    """The arguments that a transport factory receives."""
 
     name: str
-    """Name of the transport in the driver."""
+    """The transport's name in the driver."""
     options: Mapping[str, object] = NOTHING
     """Options with evaluated templates: plain values, and lists and mappings of values."""
     subscriptions: tuple[TopicSubscription, ...] = ()
     tunnel: Tunnel | None = None
-    """Tunnel that carries the connection; None for the network of this machine."""
+    """Tunnel that carries the connection; None for this machine's own network."""
 
 
 # Optional capabilities. Callers check for each capability once with `isinstance`, and also work
@@ -149,7 +150,8 @@ class SupportsSettle(Protocol):
         The wait is limited to a few seconds.
 
         Returns:
-            One line about data that has not arrived; "" if all arrived or the state is unknown.
+            One line about data that has not arrived; "" if all data has arrived or its state is
+            unknown.
         """
 
 
@@ -158,7 +160,7 @@ class SupportsProbe(Protocol):
     """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
-        """Return after the remote program has sent any data since the call.
+        """Return once the remote program has sent any data after the call.
 
         Raises:
             TransportError: the connection broke.
@@ -229,7 +231,7 @@ class SupportsReset(Protocol):
 
 @runtime_checkable
 class SupportsEnd(Protocol):
-    """A stream that URC can end with a reason to display."""
+    """A stream that URC can end, stating a reason to display."""
 
     def end(self, why: str) -> None:
         """Make `read` and `write` raise `PeerClosed` with the reason `why` from now on."""

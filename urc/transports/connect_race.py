@@ -1,4 +1,4 @@
-"""Overlapping connection attempts to a robot that may become reachable at any moment.
+"""Overlapping attempts to connect to a robot that may become reachable at any moment.
 
 The operating system repeats a failed connection attempt only after a second, and later at longer
 intervals. If `HURRY` is set, new attempts start at short intervals. Earlier attempts continue,

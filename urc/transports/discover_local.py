@@ -1,4 +1,4 @@
-"""Detection of listening ports by one short connection to each port, without sending data."""
+"""Detection of listening ports: connect briefly to each port, without sending data."""
 
 import asyncio
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from contextlib import suppress
 __all__ = ["listening"]
 
 CONNECT_S = 1.0
-"""Timeout of one connection, in seconds; a reply from this machine is immediate."""
+"""Timeout for one connection, in seconds; this machine replies immediately."""
 _AT_ONCE = 16
 
 

@@ -34,7 +34,7 @@ PATIENCE_S = 1.0
 
 
 class HttpTransport:
-    """The web server of one robot; may be opened several times."""
+    """One robot's web server, which may be opened several times."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -56,7 +56,7 @@ class HttpTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``http http://192.168.4.1:80/``."""
+        """The transport's target as display text, such as ``http http://192.168.4.1:80/``."""
         place = self._place
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 
@@ -111,7 +111,7 @@ class HttpTransport:
         await self._talk.send(data)
 
     def unsent(self) -> int:
-        """Return the number of request bytes that have not been acknowledged."""
+        """Return the number of unacknowledged request bytes."""
         return 0 if self._talk is None else self._talk.unsent()
 
     def forget(self) -> None:
@@ -134,7 +134,7 @@ class HttpTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return an HTTP transport for the options of a document, or raise `TransportError`."""
+    """Return an HTTP transport for a document's options, or raise `TransportError`."""
     return HttpTransport(setup)
 
 
@@ -152,7 +152,7 @@ class _OpenConnection:
         self._number = 0
         self._is_looking = False
         self._requests: dict[int, asyncio.Task[None]] = {}
-        """Requests by number, oldest first: in progress, or with an unread response."""
+        """Requests that are in progress or have an unread response, by number, oldest first."""
         self._has_place = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
         """All running tasks, including the tasks of dropped requests."""

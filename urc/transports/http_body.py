@@ -1,4 +1,4 @@
-"""Size-limited reading of response bodies, and one-line messages for error responses."""
+"""Functions to read response bodies within a size limit and to describe error responses."""
 
 import zlib
 from http import HTTPStatus
@@ -17,7 +17,7 @@ _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
-    """Return the complete, decompressed body of a response.
+    """Return a response's complete, decompressed body.
 
     Raises:
         HttpFault: the body exceeds `max_bytes`, compressed or not, or has an unknown encoding.
@@ -63,7 +63,7 @@ async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def fault_of(response: httpx2.Response) -> str:
-    """Return the error of a stream request, or "" on success; the body of a success is not read."""
+    """Return a stream request's error, or "" on success; a successful body is not read."""
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return ""
     return complaint(response, await body_of(response, _COMPLAINT_BYTES))

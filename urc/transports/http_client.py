@@ -1,8 +1,8 @@
-"""An HTTP/1.1 client for one server, with the library `httpx2`: connections, logins, errors.
+"""An HTTP/1.1 client for one server, based on the library `httpx2`: connections, logins, errors.
 
-The client replaces the library's connection handling. Every connection is opened to the server of
-the document, even if a request names another host. Proxy settings of the environment and redirects
-are ignored. Address lookups do not delay the exit of the program.
+The client replaces the library's connection handling. Every connection is opened to the document's
+server, even if a request names another host. Proxy settings from the environment and redirects are
+ignored. Address lookups do not delay the program's exit.
 """
 
 import asyncio
@@ -132,7 +132,7 @@ class HttpClient:
 
     @property
     def _base(self) -> str:
-        """URL of the document, without a trailing slash."""
+        """The document's URL, without a trailing slash."""
         return self._origin + self._place.path.partition("?")[0].rstrip("/")
 
     def _built(
@@ -186,7 +186,7 @@ class HttpClient:
             raise HttpFault(f"{where} sent an invalid response ({_short(fault)})") from fault
 
     def unsent(self) -> int:
-        """Return the number of request bytes that have not been acknowledged."""
+        """Return the number of unacknowledged request bytes."""
         return self._backend.unsent()
 
     def forget(self) -> None:
@@ -262,7 +262,7 @@ class _Bearer(httpx2.Auth):
 
 
 class _Backend(httpcore2.AsyncNetworkBackend):
-    """A network backend that only connects to one server.
+    """A network backend that connects to only one server.
 
     The first request uses the connection opened by `reach`.
     """
@@ -271,7 +271,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
         self._dialer = dialer
         self._spare: ByteStream | None = None
         self._connections: set[_PooledStream] = set()
-        """Open connections in use by the library."""
+        """Open connections that the library is using."""
 
     def unsent(self) -> int:
         return sum(one.unsent() for one in self._connections)
@@ -387,7 +387,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
         return self.is_readable() if info == "is_readable" else None
 
     def is_readable(self) -> bool:
-        """Return whether `read` would return immediately; the pool closes such an idle stream.
+        """Return whether `read` would return immediately; if so, the pool closes the idle stream.
 
         A stream can only be tested by calling `read`; the call is cancelled if no data is
         available.
@@ -407,7 +407,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
 
 
 class _PoolTransport(httpx2.AsyncBaseTransport):
-    """A transport for the library that uses URC's connection pool and raises errors unchanged."""
+    """A transport for the library, which uses URC's connection pool and raises errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

@@ -26,7 +26,7 @@ class Event(NamedTuple):
     data: bytes
     """Data lines, joined by LF characters."""
     id: str
-    """Newest event id of the stream, from which a new connection resumes."""
+    """The stream's newest event id, from which a new connection resumes."""
 
 
 class LineSplitter:
@@ -66,7 +66,7 @@ class LineSplitter:
         return lines
 
     def end(self) -> bytes:
-        """Return the incomplete last line after the end of the body."""
+        """Return the incomplete last line when the body has ended."""
         rest = b"" if self._is_skipping else bytes(self._buffer)
         self._buffer.clear()
         return rest
@@ -103,7 +103,7 @@ class EventStreamParser:
         self._is_too_long = False
         self._next_id = last_id
         self.last_id = last_id
-        """Id of the newest event, sent as the header Last-Event-ID."""
+        """The newest event's id, sent as the header Last-Event-ID."""
         self.left_out = 0
         """Number of skipped events so far."""
         self.retry_s: float | None = None

@@ -1,4 +1,4 @@
-"""The bounded queue of received HTTP responses, images and events."""
+"""A bounded queue for received HTTP responses, images and events."""
 
 import asyncio
 from collections.abc import Mapping
@@ -21,8 +21,7 @@ class HttpReceiveQueue:
 
     def __init__(self) -> None:
         self._waiting: dict[object, Envelope] = {}
-        """Queued envelopes by key; the key is the topic of an image, or a number for other
-        envelopes."""
+        """Queued envelopes by key: an image's topic, or a number for other envelopes."""
         self._number = 0
         self._events = 0
         self._events_bytes = 0
@@ -39,7 +38,7 @@ class HttpReceiveQueue:
         self._arrived.set()
 
     def forget(self, place: int) -> None:
-        """Remove the unread response of a request."""
+        """Remove a request's unread response."""
         self._waiting.pop(("answer", place), None)
 
     def picture(self, topic: str, body: bytes) -> None:

@@ -36,8 +36,8 @@ SHORTEST_RETRY_S: Final = 0.2
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""Minimum silence of all streams before a refused connection means that the robot is unreachable,
-in seconds."""
+"""Minimum silence of all streams, in seconds, before a refused connection means that the robot is
+unreachable."""
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
 
 
 class LastActivity:
-    """Time of the last data from the robot on any connection."""
+    """Time at which the robot last sent data on any connection."""
 
     def __init__(self) -> None:
         self._clock = asyncio.get_running_loop().time
@@ -95,7 +95,7 @@ class LastActivity:
 
     @property
     def silence_s(self) -> float:
-        """Time since the last data, in seconds."""
+        """Time since data last arrived, in seconds."""
         return self._clock() - self._beat_s
 
 
@@ -115,7 +115,7 @@ class HttpStream:
         Args:
             spec: description of the stream.
             client: HTTP client that makes the requests.
-            queue: destination of the data.
+            queue: destination for the data.
             pulse: time of the transport's last activity.
             max_body_bytes: maximum size of one image, in bytes.
         """
@@ -202,7 +202,7 @@ class HttpStream:
             await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Pass an event to the topic with its name, or otherwise to the topic of the path."""
+        """Pass an event to the topic with its name; without such a topic, to the path's topic."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:
@@ -229,7 +229,7 @@ class HttpStream:
 
     @property
     def _shown(self) -> str:
-        """Name of the stream as display text."""
+        """The stream's name as display text."""
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:
@@ -240,7 +240,7 @@ class HttpStream:
         return wait_s * (1 - 0.25 * random.random())  # noqa: S311 - spreads attempts, no secret
 
     def _came(self) -> None:
-        """Record the arrival of valid data on this stream."""
+        """Record that valid data has arrived on this stream."""
         self._pulse.heartbeat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:

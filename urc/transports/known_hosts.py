@@ -1,4 +1,4 @@
-"""Trusted SSH host keys from URC's own file and from the transport options.
+"""Trusted SSH host keys, from URC's own file and from the transport options.
 
 URC's file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys to this file,
 after a person has confirmed the key with ``urc trust``.
@@ -56,7 +56,7 @@ class HostKeys:
         return bool(self._pinned)
 
     def known(self, host: str, port: int) -> HostKeyStatus:
-        """Return the known keys of a server.
+        """Return a server's known keys.
 
         Raises:
             TransportError: a file cannot be read.
@@ -83,7 +83,7 @@ class HostKeys:
 
 
 def remember(host: str, port: int, key: asyncssh.SSHKey) -> Path:
-    """Store `key` in URC's own file as the only key of a server; return the path of the file.
+    """Store `key` in URC's own file as the only key of a server; return the file's path.
 
     Raises:
         TransportError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""The factory of the MQTT transport, for robots behind an MQTT broker.
+"""The factory for the MQTT transport, for robots behind an MQTT broker.
 
 This module does not import the MQTT library itself, so that it can report a missing library.
 """
@@ -15,7 +15,7 @@ __all__ = ["from_setup"]
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return an MQTT transport for the options of a document; see docs/transports/mqtt.md.
+    """Return an MQTT transport for a document's options; see docs/transports/mqtt.md.
 
     Raises:
         TransportError: an option is missing or invalid, or the library is missing.

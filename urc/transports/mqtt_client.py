@@ -1,12 +1,12 @@
-"""A transport for robots behind an MQTT broker, with version 5 or 3.1.1 of MQTT.
+"""A transport for robots behind an MQTT broker, with MQTT version 5 or 3.1.1.
 
 Theory of operation. The library paho implements the protocol, but URC opens the network connection.
 Each `open` connects a socket and creates a paho client for this connection only. No message of an
 earlier connection can therefore be sent late. A reused paho client would store unacknowledged
 messages and send the messages again. The transport starts no thread.
 
-Every connection starts a clean MQTT session. The broker publishes the last will after every end of
-the connection, even if URC closes the connection. A will that repeats a stop is harmless.
+Every connection starts a clean MQTT session. The broker publishes the last will whenever the
+connection ends, even if URC closes it. A will that repeats a stop is harmless.
 """
 
 import asyncio
@@ -32,7 +32,8 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""Keepalive interval, in seconds. After twice this time without data, the broker counts as lost."""
+"""Keepalive interval, in seconds. After twice this time without data, the broker is considered
+lost."""
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a received message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
@@ -51,7 +52,7 @@ log = logging.getLogger(__name__)
 
 
 class MqttTransport:
-    """A transport to one broker; may be opened several times."""
+    """A transport to one broker, which may be opened several times."""
 
     def __init__(self, options: MqttOptions, dialer: Dialer) -> None:
         """Store the options and the dialer of a broker, without connecting."""
@@ -61,7 +62,7 @@ class MqttTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``mqtt 192.168.1.5:1883``."""
+        """The transport's target as display text, such as ``mqtt 192.168.1.5:1883``."""
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -80,7 +81,7 @@ class MqttTransport:
                 await self._dialer.close()
 
     async def receive(self) -> Envelope:
-        """Return the next message; raise `PeerClosed` after the end of the connection."""
+        """Return the next message; raise `PeerClosed` when the connection has ended."""
         if self._session is None:
             raise PeerClosed(CLOSED)
         return await self._session.queue.pop()
@@ -111,7 +112,7 @@ class MqttTransport:
         await self._dialer.close()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         return 0 if self._session is None else self._dialer.unsent(self._session.line)
 
     async def abort(self) -> None:
@@ -146,7 +147,7 @@ class _MqttSession:
         self.line = line
         self._loop = asyncio.get_running_loop()
         self._answered: asyncio.Future[str] = self._loop.create_future()
-        """Result of the login: "" for success, or the reason for a refusal."""
+        """Result of the login: "" for success, otherwise the reason for the refusal."""
         self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
         self._seen = 0
         self._writable: asyncio.Future[None] | None = None
@@ -343,7 +344,7 @@ class _PahoClient(Client):
         self._options = options
         self._given = line
         self.fault = ""
-        """The system's reason for the end of the connection, which paho only logs."""
+        """The system's reason why the connection ended, which paho only logs."""
 
     def start(self) -> None:
         """Send the log-in."""
@@ -363,7 +364,7 @@ class _PahoClient(Client):
         self.reconnect()
 
     def drop(self) -> None:
-        """Close the socket in every state of paho."""
+        """Close the socket, regardless of paho's state."""
         self._sock_close()
         self._given.close()
 
@@ -395,7 +396,7 @@ class _PahoClient(Client):
             return super()._sock_recv(min(bufsize, _READ_BYTES))
 
     def _sock_send(self, buf: bytes | bytearray) -> int:
-        """Send part of the packets, and keep the reason of a failure."""
+        """Send some of the packets, and keep the reason for a failure."""
         with self._explained():
             return super()._sock_send(buf)
 

@@ -1,7 +1,7 @@
 """The listening addresses of URC's own dashboard, to which no transport may connect.
 
-A document that connects to the dashboard would have the rights of a local program. The address of
-each open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
+A document that connects to the dashboard would have a local program's rights. The address of each
+open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
 address. Connections forwarded by a router, a proxy or another machine are not detected.
 """
 
@@ -23,7 +23,7 @@ class OwnAddressError(OSError):
 
 
 class OwnListeners:
-    """The listening addresses of this program."""
+    """This program's listening addresses."""
 
     def __init__(self) -> None:
         """Initialise without listeners."""
@@ -45,7 +45,7 @@ class OwnListeners:
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add the listening addresses of a related process, until this process ends."""
+        """Add a related process's listening addresses, until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))
@@ -82,4 +82,4 @@ def _address(text: str) -> Address:
 
 
 OWN_DOORS = OwnListeners()
-"""Listening addresses of this process, shared by the whole program."""
+"""This process's listening addresses, shared by the whole program."""

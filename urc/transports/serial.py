@@ -1,4 +1,4 @@
-"""The serial transport, for a port of this machine or of a server (``socket://``, ``rfc2217://``).
+"""The serial transport, for a port on this machine or on a server (``socket://``, ``rfc2217://``).
 
 The transport uses the library serialx from the extra ``serial``. A ``socket://`` address is a plain
 TCP connection to a server that has already configured the port.
@@ -45,7 +45,7 @@ class SerialSettings(NamedTuple):
 
 
 class SerialTransport(StreamTransport):
-    """A transport over one serial port; may be opened several times."""
+    """A transport over one serial port, which may be opened several times."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
         """Store the settings; `port` is a device path, a port name, or an address with a scheme."""
@@ -59,7 +59,7 @@ class SerialTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``serial /dev/ttyUSB0``."""
+        """The transport's target as display text, such as ``serial /dev/ttyUSB0``."""
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:
@@ -87,7 +87,7 @@ class SerialTransport(StreamTransport):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document.
+    """Return a transport for a document's options.
 
     Raises:
         TransportError: an option is missing or invalid, or the extra is not installed.

@@ -1,6 +1,6 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-The users of one shared SSH connection are the transport's own channel and all transports that name
+A shared SSH connection has several users: the transport's own channel, and all transports that name
 this transport in ``tunnel``. The first user opens the connection, the last user closes the
 connection, and a lost connection disconnects all users.
 """
@@ -140,12 +140,12 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
 
 
 _COLUMNS, _ROWS = 240, 24
-"""Columns and rows of the pseudo-terminal, which is wide enough to prevent shells from wrapping
-long lines."""
+"""The pseudo-terminal's columns and rows; it is wide enough to keep shells from wrapping long
+lines."""
 
 
 class SshTransport:
-    """A transport over one SSH server, also usable as a `Tunnel` of other transports."""
+    """A transport over one SSH server, which can also serve as a `Tunnel` for other transports."""
 
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
@@ -161,7 +161,7 @@ class SshTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``ssh 192.168.1.5:22``."""
+        """The transport's target as display text, such as ``ssh 192.168.1.5:22``."""
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -177,7 +177,7 @@ class SshTransport:
             self._connection = connection
 
     async def receive(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
         if self._channel is not None:
             return await self._channel.read()
         if self._connection is None:
@@ -185,7 +185,7 @@ class SshTransport:
         return await self._connection.ended()
 
     async def send(self, data: Payload) -> None:
-        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
+        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         if self._connection is None:
             raise PeerClosed(CLOSED)
         if self._channel is None:
@@ -205,7 +205,7 @@ class SshTransport:
             await self._shared.leave()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         return 0 if self._channel is None else self._channel.unsent()
 
     async def abort(self) -> None:
@@ -235,7 +235,7 @@ class SshTransport:
         return _Carried(channel, self._shared, self.break_off)
 
     async def look_at_key(self, timeout_s: float) -> OfferedHostKey:
-        """Return the host key of the server, without logging in.
+        """Return the server's host key, without logging in.
 
         Raises:
             ConnectFailed: no connection was possible within `timeout_s` seconds.
@@ -315,7 +315,7 @@ class _Carried:
 
 
 def from_setup(setup: TransportSetup) -> SshTransport:
-    """Return an SSH transport for the options of a document; see docs/transports/ssh.md.
+    """Return an SSH transport for a document's options; see docs/transports/ssh.md.
 
     Raises:
         TransportError: an option is missing or invalid.

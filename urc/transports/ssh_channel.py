@@ -19,12 +19,12 @@ __all__ = ["MAX_PACKET", "WINDOW", "SshChannel"]
 READ_AHEAD_BYTES = 65536
 """Size of the receive buffer, in bytes."""
 WINDOW = 262_144
-"""SSH window size of the channel without the receive buffer, in bytes."""
+"""SSH window size of the channel, excluding the receive buffer, in bytes."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
-"""Maximum wait for the exit of a program that has closed its output, in seconds."""
+"""Maximum wait until a program that has closed its output exits, in seconds."""
 _LAST_WORDS = 200
-"""Maximum size of the standard error output in the message about a program's end, in bytes."""
+"""Maximum size of standard error output in the message about a program's end, in bytes."""
 
 
 class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
@@ -35,7 +35,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
 
         Args:
             wire: socket of the SSH connection, which is full when the kernel accepts no more data.
-            program: name of the program in messages, such as ``the shell``; "" for a forwarded
+            program: the program's name in messages, such as ``the shell``; "" for a forwarded
                 connection.
         """
         self._wire = wire
@@ -73,7 +73,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._arrived.set()
 
     def exit_status_received(self, status: int) -> None:
-        """Record the exit status of the program."""
+        """Record the program's exit status."""
         self._outcome = f"{self._program} ended with status {status}"
 
     def exit_signal_received(self, signal: str, core_dumped: bool, msg: str, lang: str) -> None:
@@ -90,7 +90,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Record the end of the channel or of its connection."""
+        """Record that the channel or its connection has ended."""
         if exc is not None:
             self._wire.end(why_lost(exc))
         self._end(self._wire.fault or self._farewell())
@@ -106,7 +106,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
         while not self._parts:
             if self._ended is not None:
                 raise PeerClosed(self._ended)

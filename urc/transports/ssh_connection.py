@@ -21,7 +21,7 @@ from urc.transports.topic_socket import Address
 __all__ = ["SshConnection", "SharedConnection"]
 
 _GONE_WITHIN_S = 0.5
-"""Maximum wait for the end of a connection after its close, in seconds."""
+"""Maximum wait until a closed connection has ended, in seconds."""
 _LOOK_UP_S = 2.0
 
 
@@ -50,7 +50,7 @@ class SshConnection:
         return self._wire.fault
 
     async def ended(self) -> NoReturn:
-        """Wait for the end of the connection, then raise `PeerClosed`."""
+        """Wait until the connection has ended, then raise `PeerClosed`."""
         await self.ssh.wait_closed()
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
@@ -104,7 +104,7 @@ class SshConnection:
         return addresses[0]
 
     def _is_on_this_machine(self) -> bool:
-        """Return whether the server runs on this machine, according to its address."""
+        """Return whether the server is running on this machine, judging by its address."""
         peer = self.ssh.get_extra_info("peername")
         place = str(peer[0]) if isinstance(peer, tuple) and peer else self._address.host
         try:
@@ -127,7 +127,7 @@ class SshConnection:
             await when_closed()
 
     def reset(self) -> None:
-        """Reset the connection; do not send a close message, which would also flush unsent data."""
+        """Reset the connection without a close message, which would also flush unsent data."""
         self._wire.reset()
 
     async def _opened(

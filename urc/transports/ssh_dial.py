@@ -46,7 +46,7 @@ class SshTarget(NamedTuple):
     keepalive_s: float = 2.0
     """Silence before a keepalive is sent, in seconds."""
     name: str = ""
-    """Name of the transport, for the hint about the command ``urc trust``."""
+    """The transport's name, for the hint about the command ``urc trust``."""
 
 
 class _SshClient(asyncssh.SSHClient):
@@ -77,7 +77,7 @@ async def dial(
 
     Args:
         target: the server.
-        outer: SSH connection that tunnels the new connection; None for the network of this machine.
+        outer: SSH connection that tunnels the new connection; None for this machine's own network.
         timeout_s: total time for all addresses of the server, in seconds; the caller enforces the
             limit.
 
@@ -92,7 +92,7 @@ async def dial(
 async def look_at_key(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> OfferedHostKey:
-    """Return the host key of the server without logging in; `dial` describes the parameters."""
+    """Return the server's host key without logging in; `dial` describes the parameters."""
     client = _SshClient(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})

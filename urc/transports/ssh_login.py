@@ -1,4 +1,4 @@
-"""The login to an SSH server: user, credentials, and accepted algorithms."""
+"""The login to an SSH server: user, credentials and accepted algorithms."""
 
 import asyncio
 import os
@@ -38,7 +38,7 @@ class Login(NamedTuple):
     username: str
     password: str = ""
     key: str = ""
-    """Path of a private key file, or the text of the key."""
+    """Path of a private key file, or the key's text."""
     passphrase: str = ""
     agent: bool = False
     """Whether to use keys from the SSH agent at ``SSH_AUTH_SOCK``."""

@@ -1,7 +1,7 @@
-"""The socket below an SSH connection, with flow control.
+"""The socket that carries an SSH connection, with flow control.
 
 asyncssh writes without checking for buffer space, so a stalled robot would fill URC's memory. The
-protocol in this module connects asyncssh with the socket and detects a full kernel buffer.
+protocol in this module connects asyncssh to the socket and detects a full kernel buffer.
 """
 
 import asyncio
@@ -18,15 +18,15 @@ __all__ = ["TunnelAdapter", "SshSocket", "why_lost"]
 
 _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
-"""Maximum number of unsent bytes of replies to a server; larger than the window of a channel."""
+"""Maximum number of unsent bytes in replies to a server; larger than a channel's window."""
 _LAST_TURNS = 10
-"""Number of event loop turns between the last bytes and the end of the stream; the delay exists
+"""Number of event loop turns between the last bytes and the end of the stream. The delay is needed
 because asyncssh reads some packets in tasks. Servers often close directly after a refusal; the
 delay lets asyncssh read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return a one-line message about the end of a connection, as in other transports."""
+    """Return a one-line message about why a connection ended, as in other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
             return "the connection broke (the robot does not answer any more)"
@@ -115,7 +115,7 @@ class SshSocket(asyncio.BufferedProtocol):
         return True  # stay open until then
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Pass on the loss of the connection after all earlier data; wake waiting tasks."""
+        """Report the lost connection after passing on all earlier data; wake waiting tasks."""
         self._at_last(self._lost, exc)
 
     def pause_writing(self) -> None:
@@ -148,7 +148,7 @@ class SshSocket(asyncio.BufferedProtocol):
 
 
 class TunnelAdapter:
-    """An asyncssh tunnel that provides the connection below the SSH connection."""
+    """An asyncssh tunnel that provides the connection for the SSH connection to use."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
         """Create a tunnel over a connected socket, or over another forwarding SSH connection."""
@@ -179,7 +179,7 @@ class TunnelAdapter:
 
 
 class _Nested(asyncssh.SSHTCPSession[bytes]):
-    """A channel of another SSH connection that serves as a socket."""
+    """Another SSH connection's channel, used as a socket."""
 
     def __init__(self, wire: SshSocket) -> None:
         self._wire = wire

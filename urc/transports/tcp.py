@@ -205,7 +205,7 @@ class TcpListener(StreamTransport):
         self._replace()
 
     def _replace(self) -> None:
-        """Inform the current connection about its replacement."""
+        """Inform the current connection that it is being replaced."""
         stream = self._stream
         if stream is None or self._newer is None:
             return
@@ -252,7 +252,7 @@ _LOOPBACK = "127.0.0.1"
 
 
 class TcpTransport(StreamTransport):
-    """A transport over one TCP connection; may be opened several times."""
+    """A transport over one TCP connection, which may be opened several times."""
 
     def __init__(
         self,
@@ -271,7 +271,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``tcp 192.168.1.5:6789``."""
+        """The transport's target as display text, such as ``tcp 192.168.1.5:6789``."""
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
@@ -303,11 +303,11 @@ class TcpTransport(StreamTransport):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document.
+    """Return a transport for a document's options.
 
-    ``host`` and ``port`` specify the address of the robot. With ``mode: listen``, the robot
-    connects to ``bind`` (loopback by default) and ``port``. Only ``host`` may connect, unless the
-    options include ``from: any``.
+    ``host`` and ``port`` specify the robot's address. With ``mode: listen``, the robot connects to
+    ``bind`` (loopback by default) and ``port``. Only ``host`` may connect, unless the options
+    include ``from: any``.
 
     Raises:
         TransportError: an option is missing or invalid.

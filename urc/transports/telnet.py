@@ -1,6 +1,6 @@
 """The Telnet transport: a byte stream with option negotiation.
 
-The underlying connection is either a TCP connection of this machine or a tunnelled connection.
+The underlying connection is either a TCP connection from this machine or a tunnelled connection.
 """
 
 import asyncio
@@ -51,7 +51,7 @@ class TelnetOptions(NamedTuple):
 
 
 class TelnetTransport(StreamTransport):
-    """A transport over one Telnet connection; may be opened several times."""
+    """A transport over one Telnet connection, which may be opened several times."""
 
     def __init__(
         self, host: str, port: int, wishes: TelnetOptions, tunnel: Tunnel | None = None
@@ -64,7 +64,7 @@ class TelnetTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``telnet 192.168.1.5:23``."""
+        """The transport's target as display text, such as ``telnet 192.168.1.5:23``."""
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -145,7 +145,7 @@ def _acknowledge(line: socket.socket) -> None:
 
     Many Telnet servers send small segments and wait for each acknowledgement. Delayed
     acknowledgements would cost 40 ms per command. The system resets the socket option for immediate
-    acknowledgements with every read.
+    acknowledgements at every read.
     """
     if _QUICKACK is not None:
         with suppress(OSError):  # the connection is closing
@@ -153,7 +153,7 @@ def _acknowledge(line: socket.socket) -> None:
 
 
 def from_setup(setup: TransportSetup) -> TelnetTransport:
-    """Return a Telnet transport for the options of a document; see docs/transports/telnet.md.
+    """Return a Telnet transport for a document's options; see docs/transports/telnet.md.
 
     Raises:
         TransportError: an option is missing or invalid.

@@ -2,7 +2,7 @@
 
 Pure. Options are negotiated with the Q method (RFC 1143), which prevents loops: replies are sent
 only for changes. URC never withdraws an agreed option, so the six states of the Q method reduce to
-the three of `_Side`. Every request for an unknown option is refused, because servers negotiate in
+the three of `_Side`. URC refuses every request for an unknown option, because servers negotiate in
 several rounds and wait for the last reply.
 """
 
@@ -13,9 +13,9 @@ from typing import Final
 __all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetNegotiation"]
 
 BINARY: Final = 0
-"""Unchanged transmission of all byte values, including NUL and CR (RFC 856)."""
+"""Transmit all byte values unchanged, including NUL and CR (RFC 856)."""
 ECHO: Final = 1
-"""Echo of received characters by the side that offers the option (RFC 857)."""
+"""The side that offers the option echoes received characters (RFC 857)."""
 SGA: Final = 3
 """Suppress Go Ahead, which enables full-duplex operation (RFC 858)."""
 TTYPE: Final = 24
@@ -84,14 +84,14 @@ class TelnetNegotiation:
         columns: int = 80,
         rows: int = 24,
     ) -> None:
-        """Create the protocol state of a new connection, with no option enabled.
+        """Create the protocol state for a new connection, with no option enabled.
 
         Args:
             ours: local options that URC enables on request.
             theirs: remote options that URC permits.
             terminal: terminal type to report on request.
-            columns: width of the terminal in characters, 1 to 65535.
-            rows: height of the terminal in characters.
+            columns: the terminal's width in characters, 1 to 65535.
+            rows: the terminal's height in characters.
         """
         self._ours = _Side(_WILL, _WONT, ours)
         self._theirs = _Side(_DO, _DONT, theirs)
@@ -105,12 +105,12 @@ class TelnetNegotiation:
 
     @property
     def ours(self) -> frozenset[int]:
-        """Enabled options of the local side."""
+        """Options that are enabled on the local side."""
         return frozenset(self._ours.active)
 
     @property
     def theirs(self) -> frozenset[int]:
-        """Enabled options of the remote side."""
+        """Options that are enabled on the remote side."""
         return frozenset(self._theirs.active)
 
     def requests(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:

@@ -1,4 +1,4 @@
-"""The bounded queue of received topic messages.
+"""A bounded queue for received topic messages.
 
 A fast publisher must not fill URC's memory. It must not be blocked either, because one stalled
 reader would freeze a topic for all clients of the bridge. Each topic therefore keeps only its
@@ -86,7 +86,7 @@ class TopicReceiveQueue:
 
     @property
     def ended(self) -> str | None:
-        """Reason for the end of the connection; None while the connection is open."""
+        """Reason why the connection ended; None while the connection is open."""
         return self._ended
 
     @property
@@ -128,7 +128,7 @@ class TopicReceiveQueue:
                 return
 
     def _forget(self, topic: str) -> None:
-        """Update the counters after the removal of the oldest message of `topic`."""
+        """Update the counters after the oldest message of `topic` was removed."""
         queue = self._topics[topic]
         _, size = queue.popleft()
         self._bytes -= size

@@ -1,4 +1,4 @@
-"""The UDP transport, in which every payload is one datagram and every datagram is one frame.
+"""The UDP transport; every payload is one datagram, and every datagram is one frame.
 
 UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
 The transport reports errors that UDP can detect: a closed port of the robot, and a missing route.
@@ -36,7 +36,7 @@ _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IP
 """Linux socket option IP_RECVERR, which Python does not define. IP_RECVERR also reports refusals on
 unconnected sockets."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""Errors that mean that this machine lost a datagram, which UDP permits."""
+"""Errors that report a datagram lost on this machine; UDP permits such losses."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
@@ -58,8 +58,8 @@ class UdpTransport:
         """Store the addresses, without opening the socket.
 
         Args:
-            host: name or address of the robot; "" to accept the first sender.
-            port: port of the robot, 1 to 65535; 0 to use the source port of the robot's datagrams.
+            host: the robot's name or address; "" to accept the first sender.
+            port: the robot's port, 1 to 65535; 0 to use the source port of the robot's datagrams.
             listen: local port; 0 lets the system choose.
             bind: local address; "" for all addresses of this machine.
             accepts_any: whether to accept datagrams from any sender, instead of only from `host`.
@@ -95,7 +95,7 @@ class UdpTransport:
         return f"udp {place_of(self._bind or '*', self._listen)} (listening{sender})"
 
     async def open(self, timeout_s: float) -> None:
-        """Bind the local port, and return immediately if the address of the robot is known.
+        """Bind the local port, and return immediately if the robot's address is known.
 
         If the robot's address is unknown, wait for the first datagram; raise `ConnectFailed` after
         `timeout_s` seconds.
@@ -281,7 +281,7 @@ class _Endpoint(asyncio.DatagramProtocol):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document.
+    """Return a transport for a document's options.
 
     Raises:
         TransportError: an option is missing or invalid.

@@ -31,7 +31,7 @@ _PIECE_BYTES = 65536
 
 
 class Dialer:
-    """A dialer for one web server; may be used several times."""
+    """A dialer for one web server, which may be used several times."""
 
     def __init__(self, place: WebOrigin, *, tls: Tls | None, tunnel: Tunnel | None) -> None:
         """Store the origin `place`, the TLS settings, and the tunnel of future connections."""
@@ -44,7 +44,7 @@ class Dialer:
 
     @property
     def place(self) -> str:
-        """Target of the connection as display text."""
+        """The connection's target as display text."""
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:

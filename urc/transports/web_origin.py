@@ -1,6 +1,6 @@
-"""Options shared by `http` and `websocket`: URL, TLS, credentials, headers.
+"""Options that `http` and `websocket` share: URL, TLS, credentials and headers.
 
-The server is fixed when the transport is created, so no response of a robot can redirect requests
+The server is fixed when the transport is created, so no robot's response can redirect requests
 elsewhere.
 """
 
@@ -113,7 +113,7 @@ class OptionReader:
         return seconds
 
     def place(self, plain: str) -> WebOrigin:
-        """Return the target in the option `url`; for TLS, its scheme is `plain` + ``s``."""
+        """Return the target in the option `url`; with TLS, its scheme is `plain` + ``s``."""
         url = self.text("url")
         wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
         try:
@@ -185,7 +185,7 @@ class Credentials(NamedTuple):
 
     @property
     def header(self) -> str:
-        """Value of the header Authorization for the types ``basic`` and ``bearer``."""
+        """Value of the Authorization header for the types ``basic`` and ``bearer``."""
         if self.kind == "bearer":
             return f"Bearer {self.secret}"
         return "Basic " + b64encode(f"{self.user}:{self.secret}".encode()).decode()

@@ -1,9 +1,9 @@
-"""The WebSocket transport (RFC 6455), with the library `websockets`.
+"""The WebSocket transport (RFC 6455), based on the library `websockets`.
 
 Each WebSocket message is one payload. Only a few messages are read ahead, and further messages stay
 in the kernel's queue, so a flooding robot must wait. `send` returns after the kernel has accepted
-every byte. A lost robot is detected by missing replies to pings. Unsent data is discarded at the
-end of a connection.
+every byte. A lost robot is detected by missing replies to pings. Unsent data is discarded when a
+connection ends.
 """
 
 import asyncio
@@ -36,11 +36,11 @@ UNTAKEN_BYTES = 1_048_576
 """Maximum number of bytes of unsent ping replies."""
 _NORMAL = CloseCode.NORMAL_CLOSURE
 _CLOSE_S = 0.2
-"""Timeout of an orderly close, in seconds; afterwards, the connection is reset."""
+"""Timeout for an orderly close, in seconds; afterwards, the connection is reset."""
 
 
 class WebSocketTransport:
-    """A transport over one WebSocket; may be opened several times."""
+    """A transport over one WebSocket, which may be opened several times."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -65,7 +65,7 @@ class WebSocketTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text, such as ``websocket ws://192.168.4.1:80/control``."""
+        """The transport's target as text, such as ``websocket ws://192.168.4.1:80/control``."""
         place = self._place
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
@@ -90,7 +90,7 @@ class WebSocketTransport:
                 await self._dialer.close()
 
     async def receive(self) -> bytes:
-        """Return the next non-empty message; raise `PeerClosed` at the end of the connection."""
+        """Return the next non-empty message; raise `PeerClosed` when the connection has ended."""
         if self._socket is None:
             raise PeerClosed(CLOSED)
         try:
@@ -155,7 +155,7 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         if self._socket is None:
             return 0
         transport = self._socket.transport
@@ -245,7 +245,7 @@ class _Connect(connect):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a WebSocket transport for the options of a document, or raise `TransportError`."""
+    """Return a WebSocket transport for a document's options, or raise `TransportError`."""
     return WebSocketTransport(setup)
 
 

@@ -1,4 +1,4 @@
-"""Access control for pages: browsers with a key are admitted, all others get the sign-in page.
+"""Access control for pages: browsers with a key are admitted; all others get the sign-in page.
 
 Layer 5. The module contains an ASGI middleware inside the page policy. A visitor without a role
 reaches only routes with the right `ANYONE`, such as STOP and the sign-in page's files.
@@ -106,7 +106,7 @@ class AccessMiddleware:
         )
 
     def _warnings(self, scope: Scope) -> Iterator[str]:
-        """Yield the warnings about the server and about this connection, for every page."""
+        """Yield the warnings that every page shows about the server and about this connection."""
         if self._access.anonymous is not None:
             yield t("Sign-in is off: everyone on this network can drive these robots.")
         client = scope.get("client") or ("",)

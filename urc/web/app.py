@@ -106,21 +106,22 @@ class DashboardOptions:
     allowed_hosts: Collection[str] = ()
     """Accepted host names in addition to addresses, ``localhost`` and the server's own names."""
     linger_s: float = LINGER_S
-    """Time from a robot's last client's departure to the disconnection, in seconds."""
+    """How long a robot stays connected after its last client has left, in seconds."""
     data: Path | None = None
     """Folder of the latches and the audit log; None stores neither."""
     audit: AuditLog | None = None
     """Open audit log of the folder, closed when the application ends; None opens the log."""
     tiles: Path | None = None
-    """Folder of map tiles, ``z/x/y.png``; None for a server without tiles."""
+    """Folder of map tiles, ``z/x/y.png``; None if the server has no tiles."""
     remake: Mapping[str, Remake] | None = None
-    """Functions that create a robot from its saved document; None without developer pages."""
+    """Functions that create a robot from its saved document; None for a server without developer
+    pages."""
     robot_options: RobotOptions | None = None
-    """Options of the robot factory; None for a server without managers and settings."""
+    """Options of the robot factory; None if the server has neither managers nor settings."""
     trusted: Collection[str] = ()
     """Names of third-party widgets that run in the page instead of a frame."""
     recordings: Path | None = None
-    """Recordings folder; None for a server without recordings."""
+    """Recordings folder; None disables recordings."""
     certificates: Certificates | None = None
     """Certificates for HTTPS, with an authority that devices may trust; None for plain HTTP."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
@@ -334,7 +335,7 @@ class _Routes:
         return [each.profile for each in self.robots.values()]
 
     def widget_files(self) -> tuple[Assets, ...]:
-        """Return the widget files of the robots, followed by the widget files of the gallery."""
+        """Return the robots' widget files, followed by the gallery's widget files."""
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot) -> None:
@@ -456,7 +457,7 @@ class _Routes:
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
 
     async def controls(self, request: Request) -> Response:
-        """Return the lease of a robot and the state of its STOP."""
+        """Return a robot's lease and the state of its STOP."""
         service = self.services.get(request.path_params["name"])
         if service is None:
             return told(404, _NO_ROBOT, "unknown-robot")

@@ -89,10 +89,10 @@ class BrowserClient:
                 await self._visit()
 
     def recheck(self) -> None:
-        """Check the visitor's rights again: stop forbidden motion, and close a page without rights.
+        """Check the visitor's rights again: stop forbidden motion, and close a page that has none.
 
-        If the visitor has no right at the robot any more, the motion that it controls stops before
-        this method returns, and the socket closes.
+        If the visitor no longer has any right to the robot, the page's motion stops before this
+        method returns, and the socket closes.
         """
         if self._operator is not None:
             self._service.controls.recheck(self._operator)

@@ -67,7 +67,7 @@ class CommandRequest(
     token: str = ""
     """Token from `ApprovalRequest`, if the driver requires a confirmation."""
     stops: int | None = None
-    """Number of STOPs known to the page at the operator's click; None skips the check."""
+    """Number of STOPs that the page knew of when the operator clicked; None skips the check."""
 
 
 class ImageSelection(
@@ -96,7 +96,8 @@ class ApprovalRequest(
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """Number of STOPs known to the page. The server checks only the number in `CommandRequest`."""
+    """Number of STOPs that the page knows of. The server checks only the number in
+    `CommandRequest`."""
 
 
 class SequenceAction(
@@ -111,16 +112,16 @@ class SequenceAction(
 class ScreenName(
     msgspec.Struct, tag_field="t", tag="name", forbid_unknown_fields=True, frozen=True
 ):
-    """The name of a screen without its own sign-in, such as “Tablet in the lab”."""
+    """The name of a screen that has no sign-in of its own, such as “Tablet in the lab”."""
 
     name: Annotated[str, msgspec.Meta(max_length=SCREEN_NAME_LENGTH)] = ""
-    """"" resets the name to the number of the screen."""
+    """"" resets the name to the screen's number."""
 
 
 class Reconnect(
     msgspec.Struct, tag_field="t", tag="reconnect", forbid_unknown_fields=True, frozen=True
 ):
-    """A request to reopen the robot's lost connections now, instead of after the backoff."""
+    """A request to reopen the robot's lost connections without waiting for the backoff."""
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
@@ -184,7 +185,7 @@ ClientMessage = (
     | Release
     | Stop
 )
-"""Every message of a client over its main socket."""
+"""Every message that a client sends over its main socket."""
 
 RIGHTS: Final[Mapping[type, Role | None]] = {
     Ping: "watch",
@@ -200,5 +201,6 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     Release: "drive",
     Stop: None,
 }
-"""The lowest role that may send each message; None: every page may send it. A command may require a
+"""The lowest role that may send each message; None means that every page may send it. A command may
+require a
 higher role (see `urc.model.driver.Command`). Taking the controls by force requires ``maintain``."""

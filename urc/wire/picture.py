@@ -1,4 +1,4 @@
-"""The layout of a binary message with a signal's image or other bytes.
+"""The layout of a binary message that contains a signal's image or other bytes.
 
 Layer 3½. Pure::
 
@@ -21,7 +21,7 @@ class PictureMessage(NamedTuple):
     """The bytes of a signal."""
 
     signal_index: int
-    """Index of the signal in the `names` of `HelloMessage`."""
+    """The signal's index in the `names` of `HelloMessage`."""
     age_ms: int
     data: bytes
 

@@ -2,7 +2,7 @@
 
 Layer 3½. Pure: `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
 milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
-Images are binary messages; see `urc.web.wire.picture`.
+Images are binary messages; see `urc.wire.picture`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 VERSION = 1
-"""Version of the messages, in `HelloMessage`."""
+"""Version of the message format, sent in `HelloMessage`."""
 CLOSE_BAD_MESSAGES = 4400
 CLOSE_NOT_LET_IN = 4401
 CLOSE_NO_ROBOT = 4404
@@ -75,12 +75,12 @@ class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     limits: dict[str, float] | None = None
     stale_after_s: float = 0.0
     sources: tuple[str, ...] = ()
-    """Transports that supply readings of the signal; if none of them is connected, the value is
-    stale immediately."""
+    """Transports that supply the signal's readings; if none is connected, the value is stale
+    immediately."""
     axes: str = ""
-    """Axis convention of the signal; "" if unknown."""
+    """The signal's axis convention; "" if unknown."""
     has_alarms: bool = False
-    """Whether a limit or a state of the signal causes an alarm."""
+    """Whether one of the signal's limits or states causes an alarm."""
 
 
 class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
@@ -88,7 +88,7 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
     version: int
     session: str
-    """Identifier of the session; the numbers of log lines restart in each new session."""
+    """The session's identifier; log line numbers restart in each new session."""
     robot: str
     title: str
     now: int
@@ -101,10 +101,10 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
 
 class ValuesMessage(Outbound, tag="v", frozen=True):
-    """Changed signals: `i` indexes of names, `v` values, `s` alarms (None if all are normal).
+    """Changed signals: `i` indexes into the names, `v` values, `s` alarms (None if all are normal).
 
-    A signal with a history may have several values, oldest first; `e` has the number of its first
-    value, by index. `n` is the server's time in milliseconds.
+    A signal with a history may have several values, oldest first; `e` contains the number of its
+    first value, by index. `n` is the server's time in milliseconds.
     """
 
     n: int
@@ -173,7 +173,7 @@ class PongMessage(Outbound, tag="pong", frozen=True):
 
 
 class ErrorMessage(Outbound, tag="error", frozen=True):
-    """The reason why a message was invalid, or why the server closes the socket."""
+    """Why a message was invalid, or why the server closes the socket."""
 
     code: str
     message: str
@@ -191,7 +191,7 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
 
     you: str
     name: str
-    """Name of the page, as shown on other pages."""
+    """The page's name, as shown on other pages."""
     epoch: int
     holder: OperatorRow | None
     asker: OperatorRow | None
@@ -208,9 +208,9 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     forces: bool
     """Whether the page may take the lease from another page without its consent."""
     spare: str
-    """Secret key for the redundant socket of the page; "" for watchers."""
+    """Secret key for the page's redundant socket; "" for watchers."""
     role: Role | None = None
-    """Role of the page at the robot; None without any right."""
+    """The page's role for the robot; None without any rights."""
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):
@@ -235,10 +235,10 @@ class RefusedMessage(Outbound, tag="refused", frozen=True):
 
 
 class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
-    """A question for a second person; the asking page gets a copy."""
+    """A question to a second person; the asking page receives a copy."""
 
     n: int
-    """Number of the question."""
+    """The question's number."""
     id: int
     """Number of the command on the asking page; 0 in messages to other pages."""
     who: str
@@ -250,7 +250,7 @@ class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
 
 
 class QuestionEndMessage(Outbound, tag="asked", frozen=True):
-    """The end of question `n`."""
+    """Question `n` has ended."""
 
     n: int
 
@@ -306,11 +306,11 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     cause: str = ""
     action: str = ""
     title: str = ""
-    """Title of the signal."""
+    """The signal's title."""
 
 
 class AlarmsMessage(Outbound, tag="alarms", frozen=True):
-    """Changed alarms of the robot; `full`: all non-normal alarms."""
+    """The robot's changed alarms, or all non-normal alarms if `full` is set."""
 
     now: int
     """Server time in ms since 1970."""

@@ -1,1 +1,1 @@
-"""Composition of documents: `extends`, `include`, `params` and `each`."""
+"""Composes documents: `extends`, `include`, `params` and `each`."""

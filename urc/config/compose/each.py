@@ -1,4 +1,4 @@
-"""Expansion of `each`: one declaration for many similar items.
+"""Expands `each`: one declaration for many similar items.
 
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
@@ -252,7 +252,7 @@ def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -
 
 
 def is_removal(item: object) -> bool:
-    """Return whether an item only removes another item."""
+    """Return whether the only purpose of an item is to remove another item."""
     return isinstance(item, dict) and item.get("remove") is True
 
 

@@ -1,8 +1,8 @@
-"""Replacement of names in single braces, such as ``{i}`` of an `each`, or ``{params.id}``.
+"""Replaces names in single braces, such as ``{i}`` from an `each`, or ``{params.id}``.
 
 URC replaces names in single braces in all keys and texts while it loads a document. Templates have
-double braces and stay unchanged. A text that is only a name becomes the value itself, so the result
-of ``"{i}"`` may be a number.
+double braces and stay unchanged. If a text consists of only one name, the value itself replaces the
+text, so ``"{i}"`` may become a number.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Merge of a document with the documents under `extends` and `include`.
+"""Merges a document with the documents under `extends` and `include`.
 
     extends: base.yaml                  # the whole base, changed by this document
     extends: generic-ros1               # the same, with a document that ships with URC
@@ -48,7 +48,7 @@ def compose(document: Document, library: Library) -> Composed:
     """Merge a document with the documents that it extends and includes.
 
     The library reads the documents, and collects problems in references and contradictory values.
-    The shape pass reports all other problems of the sources and the result.
+    The shape pass reports all other problems in the sources and the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -122,7 +122,7 @@ class _Composer:
     def _sources(
         self, root: Node, chain: tuple[str, ...]
     ) -> tuple[list[Tree | None], list[Tree | None]]:
-        """Return the extended and the included documents, with None for each invalid document."""
+        """Return the extended and included documents; an invalid document becomes None."""
         kind = kind_of(root.document)
         base = root.get("extends")
         return (

@@ -1,9 +1,9 @@
-"""Merge of two data trees with source positions; the upper tree overrides the lower tree.
+"""Merges two data trees with source positions; the upper tree overrides the lower tree.
 
 Mappings are merged by key, and lists of named items are merged by name. The upper tree replaces all
 other values. Rules of a simulator are merged by name, and rules without a name are kept. The value
 ``null`` removes a key, and ``remove: true`` removes an item of a list. Every mark in the result
-refers to its document, so every problem has its original position.
+refers to its document, so every problem is reported at its original position.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Replacement of a driver's parameters, such as ``{params.id}``, in keys and texts.
+"""Replaces a driver's parameters, such as ``{params.id}``, in keys and texts.
 
 Each robot sets its driver's parameters, and URC replaces them while it loads the documents. The
 operator provides the values of settings.
@@ -30,8 +30,8 @@ def fill_params(
     """Return a driver's document with its parameters replaced.
 
     `given` contains the robot's values, and `use` is the robot's reference to the driver. To check
-    a driver without a robot, pass None for `given` and `use`. Each parameter without a default then
-    gets a sample value of its type.
+    a driver without a robot, pass None for both. Each parameter without a default then gets a
+    sample value of its type.
     """
     data = document.data
     if not isinstance(data, dict):

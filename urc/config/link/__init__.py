@@ -1,1 +1,1 @@
-"""Links from names in a model to their declarations."""
+"""Links the names in a model to their declarations."""

@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Linker(Protocol):
-    """The link pass functions that this module needs."""
+    """Functions of the link pass that this module needs."""
 
     driver: Driver
     problems: Problems
@@ -49,7 +49,7 @@ class Linker(Protocol):
 
 
 def link_command(linker: Linker, part: Node, command: Command) -> None:
-    """Check the keys of a command, except the keys of its frame."""
+    """Check the keys of a command, except its frame's keys."""
     known = {*linker.driver.signals, *command.arguments}
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)

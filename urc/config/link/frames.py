@@ -17,7 +17,7 @@ __all__ = ["check_frames"]
 
 
 def check_frames(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report constant texts under ``send:`` that do not result in exactly one frame."""
+    """Report constant texts under ``send:`` that do not form exactly one frame."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
         if command is not None:

@@ -1,4 +1,4 @@
-"""Links from the outputs of a widget to the commands of the driver."""
+"""Links a widget's outputs to the driver's commands."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -93,7 +93,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
 def _check_hold(
     part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
-    """Report a mismatch of hold-to-run output and held command; return whether they match."""
+    """Report a mismatch between hold-to-run output and held command; return whether they match."""
     if port.is_held and command.hold is None:
         problems.error(
             part,
@@ -219,7 +219,7 @@ def _check_nothing(
 
 
 def _stands_still(command: Command, given: OutputBinding) -> bool:
-    """Return whether a held command sends its release values while the control is held."""
+    """Return whether a held command would send its release values while its control is held."""
     release = command.hold.release if command.hold is not None else {}
     return bool(command.arguments) and all(
         given.fixed.get(name, one.default) == release.get(name, one.default)
@@ -244,6 +244,6 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
 
 
 def _place(part: Node, source: str) -> Node:
-    """Return the node of a value in a binding's `args`; the binding's node if missing."""
+    """Return the node of a value in `args`, or the binding's node if `args` lacks the value."""
     args = part.get("args") if isinstance(part.data, dict) else None
     return (args.get(source) if args is not None else None) or part

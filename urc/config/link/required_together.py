@@ -17,7 +17,7 @@ __all__ = ["link_together"]
 
 _NOTHING_GIVEN: Final = OutputBinding()
 _LOCAL: Final = re.compile(r"/(?![/\\])")
-"""Pattern of an absolute path on the same server."""
+"""Pattern for an absolute path on the same server."""
 
 
 def link_together(
@@ -84,7 +84,7 @@ def _check_instead(
 ) -> None:
     """Warn about a binding or option in this document that another binding of the slot replaces.
 
-    Bindings in a driver cause no warning, because an interface may override the bindings.
+    Bindings in a driver cause no warning, because an interface may override them.
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():
@@ -127,7 +127,7 @@ def _check_units(
 
 
 def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[str, str]]:
-    """Yield a description and the unit of each signal or argument of a port."""
+    """Yield the description and unit of each signal or argument that a port is bound to."""
     single = use.inputs.get(port.name)
     for name in (single,) if single is not None else use.lists.get(port.name, ()):
         signal = driver.signals.get(name)
@@ -149,7 +149,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not smaller than its upper limit, which is another option."""
+    """Report an option that is not smaller than the option that limits it."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None

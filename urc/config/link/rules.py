@@ -213,7 +213,7 @@ def _link_reaction(
 
 
 def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
-    """Report each signal that a rule sets although the emulated robot's world sets it."""
+    """Report each signal that both a rule and the emulated robot's world set."""
     for name, inner in part.named("set").items():
         if name in told:
             text = f"the world sets the signal {name!r}"
@@ -231,7 +231,7 @@ def _check_word(linker: Linker, part: Node, value: Template) -> None:
 
 
 def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule) -> None:
-    """Report `auto` replies of a periodic rule, because a periodic rule has no request."""
+    """Report `auto` replies of a periodic rule, because it has no request to reply to."""
     if rule.every_s is None:
         return
     for place in places:

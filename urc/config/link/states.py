@@ -1,4 +1,4 @@
-"""Checks whether expressions compare signals with named states only with these names."""
+"""Checks that expressions compare a signal with named states only to the names of its states."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -14,7 +14,7 @@ __all__ = ["check_words"]
 def check_words(
     problems: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
 ) -> None:
-    """Warn about each comparison of a signal with a text that is not one of its states."""
+    """Warn about each comparison of a signal with text that is not one of its states."""
     worded = {
         name: dict(signals[name].states)
         for name in template.names
@@ -39,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Yield each name and text that an expression compares."""
+    """Yield each pair of a name and a text that an expression compares."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue

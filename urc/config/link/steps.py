@@ -27,7 +27,7 @@ def steps_of(part: Node) -> Node:
 
 
 def link_sequences(linker: Linker, part: Node) -> None:
-    """Check the steps of every sequence and every transport of the driver at `part`."""
+    """Check the steps of all sequences and transports in the driver at `part`."""
     commands = part.named("commands")
     for name, inner in part.named("sequences").items():
         if name in commands:
@@ -69,7 +69,7 @@ class _Walk:
         self._linker = linker
         self._is_named = is_named
         self._is_late = is_late
-        """Whether the steps run after the login, and may use the values of the login."""
+        """Whether the steps run after the login and may use its values."""
         self._known: set[str] = set(linker.driver.signals)
 
     def steps(self, part: Node, steps: tuple[sequence.Step, ...]) -> None:
@@ -157,7 +157,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that a transport's login defines; no names for the login's own steps."""
+        """Return the names that a transport's login defines; empty for the login's own steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -192,7 +192,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first sequence with a loop among `start` and its called sequences; "" if none."""
+    """Return the first sequence with a loop among `start` and the sequences it runs; "" if none."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

@@ -15,7 +15,7 @@ from urc.model.world import READINGS, Failsafe, WorldSpec
 __all__ = ["check_readings", "link_world"]
 
 _READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
-"""Pattern of ``world.NAME`` and ``world.NAME.PART`` in a compiled template."""
+"""Pattern for ``world.NAME`` and ``world.NAME.PART`` in a compiled template."""
 
 
 def link_world(

@@ -110,7 +110,7 @@ class _Lines:
         self.only = own[0] if len(own) == 1 else ""
 
     def name(self, part: Node, key: str) -> str:
-        """Return the name of the transport under `key`, or of the default transport."""
+        """Return the name of the transport under `key`, or the default transport's name."""
         return part.text(key, self.only)
 
     def context(self, name: str) -> FormContext:

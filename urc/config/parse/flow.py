@@ -41,7 +41,7 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""Empty frame of a sequence, which sends frames only in its steps."""
+"""Empty frame of a sequence; only the sequence's steps send frames."""
 
 
 def line_with_flow(
@@ -264,7 +264,7 @@ def _arguments(part: Node) -> dict[str, Reading]:
 
 
 _NUMBERED_IN_FLIGHT: Final = 16
-"""Default maximum number of requests in flight when replies are matched by number."""
+"""Default limit of requests in flight when replies are matched by number."""
 
 
 def _queue(part: Node | None, kind: str) -> Queue:

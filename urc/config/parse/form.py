@@ -1,7 +1,7 @@
 """Finds the form of a frame, and defines the interface of the form parsers.
 
-Each form has a module in the package ``forms``. Modules of received forms have the functions of
-`ReadForm`, and modules of sent forms have the functions of `WriteForm`.
+Each form has a module in the package ``forms``. Modules for received forms implement `ReadForm`,
+and modules for sent forms implement `WriteForm`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -82,7 +82,7 @@ def read_form(part: Node) -> tuple[Node, ReadForm] | None:
 
 
 def write_form(part: Node) -> tuple[Node, WriteForm]:
-    """Return the value under ``send:`` or under a form's key in it, and the form's module."""
+    """Return the value under ``send:`` or under the form's key inside, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:

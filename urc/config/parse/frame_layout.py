@@ -106,7 +106,7 @@ def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
 
 
 def checksums_of(part: Node) -> list[Node]:
-    """Return the checksums of the framing at `part`, which may have one or several."""
+    """Return all checksums of the framing at `part`, which may declare one or several."""
     inner = part.get("checksum") if part.text("type") != "xml" else None
     if inner is None:
         return []

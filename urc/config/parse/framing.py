@@ -195,7 +195,7 @@ def _check_case(
     before: list[tuple[bytes, FramingSpec]],
     problems: Problems,
 ) -> None:
-    """Report an unreachable case, and a case whose framing has other start bytes."""
+    """Report unreachable cases, and cases whose framing has different start bytes."""
     for other, _ in before:
         if first.startswith(other):
             problems.error(

@@ -13,7 +13,7 @@ from urc.model.values import AlarmAttributes, AlarmLimits
 __all__ = ["NUMERIC_LIMITS", "parse_limits"]
 
 NUMERIC_LIMITS: Final = ("lolo", "low", "high", "hihi")
-"""Keys of the limits of numbers, in ascending order."""
+"""Keys of numeric limits, in ascending order."""
 _NUMBERS: Final = ("integer", "number")
 _WITH_STATES: Final = ("integer", "boolean", "string")
 _Bounds = tuple[float | None, float | None]
@@ -30,7 +30,7 @@ def parse_limits(
 
     Args:
         part: the signal.
-        kind: type of the signal, or of the elements of an array.
+        kind: type of the signal, or of an array's elements.
         bounds: smallest and largest valid value.
         states: pairs of a raw text and the displayed word.
         problems: collector of problems.

@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Value types of non-text settings, by type of setting."""
+"""Value types of non-text settings, by setting type."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:

@@ -65,7 +65,7 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
-    """Return the implied reply of a request whose protocol always replies; otherwise None.
+    """Return the implied reply of a request if its protocol always replies; otherwise None.
 
     Without the implied reply, a refused request would count as complete as soon as it is sent.
     """

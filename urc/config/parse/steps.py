@@ -37,7 +37,7 @@ class StepContext(NamedTuple):
     transport: str
     """Default transport of the steps; "" if each step must name its transport."""
     is_named: bool
-    """Whether the steps form a named sequence; only its steps may name a transport."""
+    """Whether the steps form a named sequence; no other steps may name a transport."""
     forms: FormContext
 
 

@@ -141,7 +141,7 @@ def _pieces(part: Node, problems: Problems) -> Fed | tuple[Fed, ...]:
 
 
 def _wire(part: Node, problems: Problems) -> Fed:
-    """Return the data under ``feed``: text, bytes under ``hex``, or a message."""
+    """Return the data of the key ``feed``: text, bytes (key ``hex``) or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
     inner = part.get("hex")

@@ -37,11 +37,11 @@ _OTHER_WORDS = {
     "ros2": "ros",
     "roslibjs": "ros",
 }
-"""Transport types, by the corresponding word in other programs."""
+"""Transport types, keyed by the word that other programs use."""
 
 
 def _other_word(word: str) -> str:
-    """Return a hint with the type for another program's word; "" for an unknown word."""
+    """Return a hint that names the type for another program's word; "" for an unknown word."""
     other = _OTHER_WORDS.get(word.lower())
     return f"use the word '{other}'" if other else ""
 
@@ -84,7 +84,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
-    """Return the framing of received frames, with the framing of sent frames if it is separate."""
+    """Return the framing of received frames, including any separate framing of sent frames."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema requires 'framing' for streams

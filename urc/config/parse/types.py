@@ -15,7 +15,7 @@ Items = tuple[Item, ...]
 def parse_types(
     part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], problems: Problems
 ) -> Mapping[str, Items]:
-    """Return the items of each type of the driver at `part`, by name; no items if invalid."""
+    """Return the items of each type in the driver at `part`; an invalid type has no items."""
     parts = part.named("types")
     types: dict[str, Items] = {}
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}

@@ -13,7 +13,7 @@ _HINT: Final = "remove 'replies: never', or remove the waits for this transport"
 
 
 def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report waits on a transport without replies, and silence as success without error replies."""
+    """Check waits on transports without replies, and replies that treat silence as success."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
         _check_silence(inner, one.reply, driver.transports.get(one.transport), problems)

@@ -27,7 +27,7 @@ _BITS_OF_A_BYTE = 10
 
 
 def check_flow(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
-    """Warn about excessive traffic, early timeouts and visible secrets in the driver at `part`.
+    """Warn if the driver at `part` has excessive traffic, early timeouts or visible secrets.
 
     `secrets` contains the names of secret settings.
     """
@@ -155,7 +155,7 @@ def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
 
 
 def _digested(part: Node, send: WriteSpec) -> set[str]:
-    """Return the settings that are sent only inside a changing hash."""
+    """Return the settings that are sent only as part of a hash with a nonce or time."""
     inner, form = write_form(part)
     found = [template for _, template in form.templates(inner, send)]
     digested = {name for one in found for name in digested_settings(one)}

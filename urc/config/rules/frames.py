@@ -22,14 +22,14 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""Sample values of a field; some patterns reject some of the values."""
+"""Sample values for a field; a pattern may reject some of them."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
 _GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
 _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
-"""Pattern of the syntax in a group that may match empty text."""
+"""Pattern for the syntax that lets a group match empty text."""
 
 
 def check_frames_apart(part: Node, driver: Driver, problems: Problems) -> None:
@@ -96,7 +96,7 @@ def _stages(part: Node, reply: Reply) -> Iterator[tuple[Node, ReadSpec]]:
 
 
 class _Text:
-    """A declaration of text frames, with sample frames and a method that matches frames."""
+    """A declaration of text frames, with sample frames and methods that match frames."""
 
     def __init__(self, pattern: Pattern | None, text: str = "") -> None:
         self._pattern = pattern
@@ -162,7 +162,7 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return text with an example frame that matches both; None if no frame matches both."""
+    """Return text with an example if `first` matches every frame of `second`; otherwise None."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:

@@ -1,9 +1,9 @@
 """Rules for held commands: watchdog, lease, repetition and transport load.
 
 If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
-therefore declare the watchdog. A lease or period that contradicts the declared watchdog is an
-error, because the motion would stutter or outlast the lease. All other problems of held commands
-are warnings.
+therefore declare the watchdog. It is an error if a lease or period contradicts the declared
+watchdog, because the motion would stutter or outlast the lease. All other problems with held
+commands are warnings.
 """
 
 import math
@@ -29,7 +29,7 @@ _ROUNDING: Final = 1.000001
 
 
 def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report problems of all held commands in the driver at `part`."""
+    """Report problems with all held commands in the driver at `part`."""
     held = [
         (inner.must("hold"), driver.commands[name], hold)
         for name, inner in part.named("commands").items()
@@ -181,7 +181,7 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Warn about held commands through an MQTT broker without a last will."""
+    """Warn about held commands that use an MQTT broker without a last will."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
@@ -196,7 +196,7 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest possible period in milliseconds, with all periods scaled equally."""
+    """Return the shortest period in ms after all periods are scaled equally to fit the line."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 

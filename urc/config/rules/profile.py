@@ -143,7 +143,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
     """Warn about a poll with a reply timeout longer than its period.
 
-    A declared timeout causes no warning if it is not longer than the default.
+    A declared timeout that is no longer than the default causes no warning.
     """
     if poll.reply is None:
         return
@@ -168,7 +168,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
 
 
 def _place(part: Node, near: Node) -> str:
-    """Return the line of `part`, with the file name if it differs from the file of `near`."""
+    """Return the line of `part`, with the file name if `near` is in another file."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
     line = f"line {mark.span.line if mark else 1}"

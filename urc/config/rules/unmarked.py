@@ -1,4 +1,4 @@
-"""Checks for unmarked motion commands, and for autonomous motion without an end.
+"""Finds unmarked motion commands, and autonomous motion without a stop command or a confirmation.
 
 A command may suggest motion by its name, by its arguments' units and names, or by its message type.
 Only whole words match: ``moves_left`` does not match ``move``.

@@ -40,7 +40,7 @@ _OTHER_WORDS: Final = {
     "minimum": ("min",),
     "maximum": ("max",),
 }
-"""Keys of URC, by the corresponding key of another tool."""
+"""URC keys, keyed by the corresponding key of another tool."""
 _SAME_TYPES: Final = {
     "float": "number",
     "double": "number",
@@ -55,14 +55,14 @@ _SAME_TYPES: Final = {
     "picture": "image",
     "bytes": "blob",
 }
-"""Type names of URC, by the corresponding type name of another tool."""
+"""URC type names, keyed by the corresponding type name of another tool."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _SPAN: Final = re.compile(
     r"(?P<number>[0-9]{1,6}(?:\.[0-9]{1,6})?)\s*"
     r"(?P<unit>hz|ms|msec|milli(?:s|second)s?|s|secs?|seconds?|m|mins?|minutes?|h|hours?)",
     re.IGNORECASE,
 )
-"""Pattern of a duration or rate in the notation of other programs."""
+"""Pattern for a duration or rate in the notation of other programs."""
 _UNITS: Final = "a duration has the unit ms, s, m (minutes) or h"
 _NUMBERS: Final = {"integer", "number"}
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
@@ -71,7 +71,7 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""Hints by misplaced key and by another valid key of the same mapping."""
+"""Hints, keyed by a misplaced key and another valid key of the same mapping."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
@@ -134,7 +134,7 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
 
 
 def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
-    """Return the schema's first example of a mapping, with `value` in place of its delimiter."""
+    """Return a hint with the schema's first example of a mapping, with `value` as its delimiter."""
     if _is_filled_in(document, path):
         return ""
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
@@ -163,7 +163,7 @@ def _quoted(value: object) -> str:
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
-    """Return a hint to convert a value to one of `types`; "" without a suitable hint."""
+    """Return a hint for converting a value to one of `types`; "" without a suitable hint."""
     if value is None:
         return "give the key a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):

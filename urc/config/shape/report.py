@@ -86,7 +86,7 @@ def report(
 def _branches(
     validator: Any, condition: Any, instance: Any, schema: Mapping[str, Any]
 ) -> Iterator[ValidationError]:
-    """Check ``then`` or ``else``; report missing keys for the outer schema."""
+    """Check ``then`` or ``else``; report missing keys as errors of the outer schema."""
     branch = "then" if validator.evolve(schema=condition).is_valid(instance) else "else"
     for error in validator.descend(instance, schema.get(branch, True), schema_path=branch):
         if not error.path and "properties" in schema and "properties" not in error.schema:
@@ -247,7 +247,7 @@ def _other_one(document: Document, path: Path, error: _Error) -> Problem:
 
 
 def _in_names(tell: _Report) -> _Report:
-    """Wrap a report function to report errors in key names separately."""
+    """Wrap a report function so that errors in key names are reported separately."""
 
     def choose(document: Document, path: Path, error: _Error) -> list[Problem]:
         return (_wrong_name if error.is_name else tell)(document, path, error)

@@ -1,1 +1,1 @@
-"""Generation and compilation of Python source from a driver."""
+"""Generate Python source from a driver, and compile it."""

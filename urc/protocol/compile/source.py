@@ -1,4 +1,4 @@
-"""Construction of functions from generated source text, with readable tracebacks.
+"""Build functions from generated source text, with readable tracebacks.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
 Text from a document enters the generated source only inside the `repr()` of a constant. `linecache`
@@ -34,6 +34,6 @@ def function_of(
     exec(compile(source, file, "exec"), made)  # noqa: S102  # see the module docstring
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     function: Callable[..., Any] = made[name]
-    # Remove the source together with the function, whose lifetime is that of its engine.
+    # Remove the source together with the function, which lives as long as its engine.
     weakref.finalize(function, linecache.cache.pop, file, None).atexit = False
     return function

@@ -33,14 +33,14 @@ class PathTemplate:
     """A writer for addresses: request paths, and the names of topics, services and actions.
 
     An argument value fills exactly one segment of the address, so the value cannot redirect the
-    request. An argument value that is the whole address may have several segments. Setting values
-    are trusted, like the document's own text.
+    request. An argument value that provides the whole address may have several segments. Setting
+    values are trusted, like the document's own text.
     """
 
     def __init__(
         self, pieces: tuple[_AddressPiece, ...], written: Callable[[str, bool], str]
     ) -> None:
-        """Initialise with `pieces`; `written(value, is_whole)` checks and converts a value."""
+        """Create a writer for `pieces`; `written(value, is_whole)` checks and converts a value."""
         self._pieces = pieces
         self._written = written
 
@@ -57,7 +57,7 @@ class PathTemplate:
 
 
 def place_writer(name: str, tree: object) -> PathTemplate | None:
-    """Return the writer of the attribute `name`; None for an attribute without restrictions.
+    """Return the writer of the attribute `name`; None if the attribute has no restrictions.
 
     Args:
         name: name of the attribute, such as ``path`` or ``topic``.
@@ -136,7 +136,7 @@ class EnvelopeWriter:
             return None
         found: dict[str, object] = {}
         for name in _ADDRESS:
-            # The robot receives a URL as its path.
+            # The robot receives only the path of a URL.
             value = envelope.attributes.get("path" if name == "url" else name)
             if name == "path" and name in self._places and isinstance(value, str):
                 value = unquote(value)
@@ -154,7 +154,7 @@ class EnvelopeWriter:
         return None if said is None else {**found, **said}
 
     def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
-        """Return whether `value` matches `tree`; add the values by name to `found`."""
+        """Return whether `value` matches `tree`, and add the values by name to `found`."""
         if isinstance(tree, Mapping):
             if not isinstance(value, Mapping) or tree.keys() != value.keys():
                 return False

@@ -13,7 +13,7 @@ __all__ = ["AnyReader", "EqualsReader", "RawReader", "SilenceReader"]
 
 
 class SilenceReader:
-    """A reader that matches no frame, for robots that stay silent on success."""
+    """A reader that never matches, for robots that stay silent on success."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         """Ignore both arguments: the form has no options."""
@@ -38,7 +38,7 @@ class EqualsReader:
 
 
 class AnyReader:
-    """A reader that matches every frame, for replies with irrelevant content."""
+    """A reader that matches every frame, for replies whose content does not matter."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         """Ignore both arguments: the form has no options."""

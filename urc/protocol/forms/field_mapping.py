@@ -89,7 +89,7 @@ class ShapedReader:
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return the result of a failed expression: an unusable operand, None, or the error."""
+    """Return an unusable operand, None if an operand is missing, or else the expression's error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

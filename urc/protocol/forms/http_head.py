@@ -57,7 +57,7 @@ class HeadReader:
         named = {name: fields[field] for field, name in self._head.items() if field in fields}
         status = named.pop(STATUS, 200)
         if not isinstance(status, int):
-            status = 200  # a default for values that are no status
+            status = 200  # the default if the value is not a status
         headers = {name: text_of(value) for name, value in named.items()}
         attributes = {"ok": status < 400, "status": status, "headers": headers}
         return Envelope("response", attributes, body)

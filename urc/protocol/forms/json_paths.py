@@ -44,7 +44,7 @@ class JsonReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found; None for an invalid document or a document without fields."""
+        """Return the fields found; None if the document is invalid or has none of the fields."""
         if self.pick is not None and isinstance(frame.payload, bytes):
             try:
                 return self.pick(frame.payload)

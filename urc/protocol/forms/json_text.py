@@ -81,7 +81,7 @@ def _completed(tree: Any, value: Any) -> Any:
 
 
 def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
-    """Return whether `value` matches `tree`; add the values of plain names to `found`."""
+    """Return whether `value` matches `tree`, and add the values of plain names to `found`."""
     if isinstance(tree, Template):
         name = tree.source.strip().removeprefix("{{").removesuffix("}}").strip()
         if name.isidentifier() and name in tree.names:

@@ -36,7 +36,7 @@ class _Shape:
         return self.element
 
     def is_plain(self) -> bool:
-        """Return whether the shape has a single type at every level."""
+        """Return whether the shape has exactly one type at each level."""
         kinds = self.is_leaf + bool(self.names) + (self.element is not None)
         inner = [*self.names.values(), *([self.element] if self.element else [])]
         return (
@@ -75,8 +75,8 @@ class ExtractionPlan(NamedTuple):
 
         Args:
             variable: name of the variable with the decoded value.
-            begin: function that returns the text before the value in a field's source line; ""
-                means that the field is skipped.
+            begin: function that returns the text before the value in a field's source line, or ""
+                to skip the field.
         """
         yield from self._picking(self.want, variable, "    ", begin)
 

@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression with linear run time. Every repeat is possessive and matches
-only characters that cannot follow it.
+A pattern becomes a regular expression that runs in linear time. Every repeat is possessive and
+matches only characters that cannot follow it.
 """
 
 import re
@@ -52,7 +52,7 @@ class PatternReader:
         """First literal word of the pattern; "" means that the pattern begins with a field."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
         """Regular expression of the pattern. Patterns are compiled on first use, because a document
-        test uses only a few patterns of a driver."""
+        test uses only a few of a driver's patterns."""
         self._casts = [
             (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
@@ -123,7 +123,7 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _by_words(words: list[str | PatternField], found: list[str]) -> dict[str, object] | None:
-    """Return the fields of a text that is split into words; None if the text does not match."""
+    """Return the fields of a text that was split into words; None if the text does not match."""
     if len(found) != len(words):
         return None
     fields: dict[str, object] = {}

@@ -25,7 +25,7 @@ class SplitReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the parts by name; None for a wrong number of parts."""
+        """Return the parts by name; None if the number of parts is wrong."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -41,7 +41,7 @@ class SplitReader:
         }
 
     def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
-        """Return the parts by name, with all remaining parts as a list under the last name."""
+        """Return the parts by name; the last name has a list of all remaining parts."""
         first, strip = len(self._names) - 1, self._strip
         if len(parts) < first:
             return None

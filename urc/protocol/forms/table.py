@@ -1,4 +1,4 @@
-"""Tables of the forms for reading and writing, and construction of their readers and writers.
+"""The tables of readers and writers by form, and functions that build readers and writers.
 
 Pure. Each value of `READERS` and `WRITERS` is a factory with the parameters ``(spec, context)``,
 which returns a reader or a writer. Each engine calls the factory once for each declaration.

@@ -16,7 +16,7 @@ _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
     r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
-"""Pattern of an expression with only a name and formatting filters, whose value can be read
+"""Pattern for an expression that has only a name and formatting filters, so its value can be read
 back."""
 
 

@@ -84,7 +84,7 @@ def _parsed(text: str) -> ElementTree.Element | None:
 
 
 def _local(tag: object) -> str:
-    """Return an ElementTree name ``{namespace}name`` without the namespace."""
+    """Return an ElementTree name, such as ``{namespace}name``, without the namespace."""
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 

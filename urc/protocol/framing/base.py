@@ -4,10 +4,10 @@ Pure. Each framing works in both directions, so an emulated robot can use the sa
 (`reversed`).
 
 Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call.
-Remaining bytes stay in the buffer, so another decoder can continue if a reply has a different
+Remaining bytes stay in the buffer, so another decoder can take over if a reply has a different
 framing. Memory is bounded: the buffer never exceeds the maximum frame size. Time is linear: bytes
 are scanned once, and rescanned only within a `RescanBudget`. After invalid bytes, the decoder
-reports one violation and continues at the next possible frame start.
+reports one violation and continues at the next possible start of a frame.
 """
 
 from collections.abc import Callable
@@ -108,7 +108,7 @@ class StreamDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """None, because silence completes no frame."""
+        """None, because silence never completes a frame."""
         return None
 
     def push(self, data: bytes, now: float = 0.0) -> None:
@@ -128,7 +128,7 @@ class StreamDecoder:
         return frames
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return an empty list, because silence completes no frame."""
+        """Return an empty list, because silence never completes a frame."""
         return []
 
     def restart(self) -> None:
@@ -143,7 +143,7 @@ class StreamDecoder:
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return the number of bytes before the next `mark`, which may be cut off at the end."""
+        """Return the number of bytes before the next `mark`, which may still be incomplete."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:

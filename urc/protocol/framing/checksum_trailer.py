@@ -56,7 +56,7 @@ class ChecksumTrailer:
         return content
 
     def _parted(self, text: bytes) -> tuple[bytes, bytes] | None:
-        """Return the content and the checksum, or None for a missing optional checksum."""
+        """Return the content and the checksum; None if an optional checksum is missing."""
         spec, size = self._spec, self._size
         if not spec.mark:
             if len(text) < size:

@@ -51,7 +51,7 @@ class Checksum:
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
         """Return the bytes of the correct checksum, computed over `window`.
 
-        For an unknown salt, the result may be None; the frame is then accepted unchecked.
+        If the salt is unknown, the result may be None; the frame is then accepted unchecked.
         """
         data = window
         if self.spec.is_from_hex:

@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes, and return the same kind of result as `_read`."""
+        """Check the end bytes; the result has the same form as that of `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:

@@ -26,7 +26,7 @@ _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:
-    """Return a function that decodes a frame to its payload, with `slow` as the general decoder."""
+    """Return a function that decodes a frame to its payload, using `slow` in uncommon cases."""
     spec = layout.checksum
     if spec is not None and not _is_common(spec):
         return slow

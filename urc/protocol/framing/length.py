@@ -1,9 +1,9 @@
 """The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
 
 Theory of operation. If the framing has start bytes, the decoder advances to the next start bytes;
-otherwise, every byte may begin a frame. After a bad length, wrong end bytes or a wrong checksum,
-only the first byte is dropped. A valid frame may begin at the second byte of an invalid frame.
-The checksum may therefore be computed several times over the same bytes, so `RescanBudget` limits
+otherwise, every byte may begin a frame. If the length, the end bytes or the checksum is wrong, only
+the first byte is dropped. A valid frame may begin at the second byte of an invalid frame. The
+checksum may therefore be computed several times over the same bytes, so `RescanBudget` limits
 rescanning. After the budget is spent, an invalid frame is dropped as a whole.
 """
 
@@ -65,7 +65,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._plain = (
             0 if self._start or self._end or not self._least <= size <= max_bytes else size
         )
-        """Size of every frame in bytes, if decoding requires no previous check; otherwise 0."""
+        """Size of every frame in bytes if frames can be cut without checking them; otherwise 0."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream, data = self._stream, self._stream.data

@@ -30,7 +30,7 @@ _SMALL: Final = 256
 _GROWTH: Final = 8
 """A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005
-"""Duration of silence after which a larger buffer is searched regardless of its growth, in
+"""How long the robot must be silent before a larger buffer is searched regardless of its growth, in
 seconds."""
 
 
@@ -102,7 +102,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._codec = codec
         self._tried = 0
-        """Number of bytes searched so far without a match."""
+        """Number of bytes that have been searched without a match."""
         self._newest = 0.0
 
     @property

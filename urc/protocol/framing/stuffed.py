@@ -101,7 +101,7 @@ def _to_cobs(data: bytes) -> bytes:
     pieces: list[bytes] = []
     blocks = data.split(b"\0")
     for place, block in enumerate(blocks):
-        # A full block has no zero of its own, so the rest follows in another block.
+        # A full block does not end with a zero, so the remaining bytes follow in another block.
         at = 0
         while len(block) - at >= _BLOCK:
             pieces.append(b"\xff" + block[at : at + _BLOCK])

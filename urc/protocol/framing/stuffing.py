@@ -82,7 +82,8 @@ class Unstuffer:
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest decoded bytes, for recognising the sequence before an inserted byte."""
+        """Newest decoded bytes, which are used to recognise the sequence before an inserted
+        byte."""
 
     def feed(self, byte: int) -> bool:
         """Process one byte; return False for an invalid byte."""

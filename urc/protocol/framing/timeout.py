@@ -1,9 +1,10 @@
-"""Timeouts, and removal of terminal escape sequences, for any framing.
+"""Timeouts for any framing, and removal of terminal escape sequences.
 
-Theory of operation. An incomplete frame blocks all later frames: a corrupted length field may
-require bytes that never arrive. With a timeout, silence after the newest byte ends the wait. After
-the timeout, bytes are dropped one by one, until the remaining bytes contain valid frames. Terminal
-escape sequences are removed before framing, because a sequence could split a marker or a text.
+Theory of operation. An incomplete frame blocks all later frames. For example, a corrupted length
+field may require bytes that never arrive. With a timeout, silence after the newest byte ends the
+wait. After the timeout, bytes are dropped one by one, until the remaining bytes contain valid
+frames. Terminal escape sequences are removed before framing, because they could split a marker or a
+text.
 """
 
 import re
@@ -58,7 +59,7 @@ class _PatientDecoder:
         self._newest: float | None = None
         """Time of the newest byte; None before the first byte."""
         self._told: list[bytes | FrameFault] = []
-        """Frames and violations found after the timeout, to be returned by `next`."""
+        """Frames and violations found after the timeout, which `next` returns."""
         self._held = b""
         """Received bytes of an incomplete escape sequence."""
 
@@ -127,7 +128,7 @@ class _PatientDecoder:
                 left -= 1
                 if not left or isinstance(self._framing.framing, DelimiterFraming):
                     before = len(stream.data)  # no further beginning of a frame exists
-                # No further bytes will arrive, so the buffered bytes are no frame.
+                # No further bytes will arrive, so the buffered bytes are not a frame.
                 stream.at = min(max(before + 1, stream.at), len(stream.data))
                 if not is_lost:
                     text = f"a frame was incomplete for {timeout:g} s; dropped"

@@ -109,7 +109,7 @@ class _XmlDecoder(StreamDecoder):
         return self._skip(start - stream.at) if start > stream.at else None
 
     def _to_end(self) -> int:
-        """Return the end offset of the element or of a preceding section, or `_WAIT` or `_BAD`."""
+        """Return the end offset of the element or of a section before it, or `_WAIT` or `_BAD`."""
         while True:
             if self._until:
                 step = self._through_special()

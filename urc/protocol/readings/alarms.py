@@ -1,10 +1,10 @@
 """Alarm states of signals over time.
 
-Callers pass the time, because the module reads no clock. A value equal to the limit causes an
-alarm, and so does an alarm state. The alarm ends when the value is within the limit by at least
-``hysteresis``. The key ``for`` delays the alarm until the value has been beyond the limit for that
-time, and ``off_delay`` delays the alarm's end. A delayed change happens at `AlarmMonitor.deadline`,
-even without another sample.
+Callers pass the time, because the module does not read a clock. A value that reaches the limit
+causes an alarm, and so does an alarm state. The alarm ends when the value is within the limit by at
+least ``hysteresis``. The key ``for`` sets how long the value must be beyond the limit before the
+alarm begins. The key ``off_delay`` delays the alarm's end. A delayed change happens at
+`AlarmMonitor.deadline`, even without another sample.
 """
 
 from urc.model.values import Alarm, AlarmLimits, Reading, state_texts
@@ -115,7 +115,7 @@ class AlarmMonitor:
 
 
 def _span(value: Reading) -> tuple[float, float] | None:
-    """Return the minimum and maximum number in a value; None for a value without numbers."""
+    """Return the minimum and maximum number in a value; None if the value has no numbers."""
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):

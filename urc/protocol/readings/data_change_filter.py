@@ -24,7 +24,7 @@ class DataChangeFilter:
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` reports the pending sample; None without a pending sample."""
+        """Time at which `tick` reports the pending sample; None if no sample is pending."""
         return None if self._pending is None else self._since + self._settle_s
 
     def filter(self, sample: Sample, now: float) -> Sample | None:

@@ -97,7 +97,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values that do not come from a frame, in the same way as fields."""
+        """Convert values from outside a frame in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -110,12 +110,12 @@ class Readings:
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal, so that `follow` is needed."""
+        """Return whether a formula or a timed alarm uses the signal, which then needs `follow`."""
         return name in self._kept
 
     @property
     def is_timed(self) -> bool:
-        """Whether the passage of time can change samples, without new data."""
+        """Whether samples can change over time without new data."""
         return bool(self._timed or self._change_filter)
 
     @property
@@ -128,7 +128,7 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return samples that time alone has changed by `now`, with their arrival times.
+        """Return the samples that have changed by `now` without new data, with their arrival times.
 
         The result contains the newest samples of signals with a new alarm, and debounced samples.
         """

@@ -1,6 +1,6 @@
 """Limits of a command: maximum duration, and transports in use.
 
-Pure. Every wait of an engine has a timeout. The maximum duration of a command is the sum of all its
+Pure. Every wait in an engine has a timeout. The maximum duration of a command is the sum of all its
 timeouts.
 """
 
@@ -49,7 +49,7 @@ def longest_s(driver: Driver, name: str) -> float:
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the minimum delay in seconds from any frame or command to a new deadline, or 0.
+    """Return the minimum time between a frame or command and a new deadline in seconds, or 0.
 
     Deadlines result from replies, polls and stale connections. Deadlines of sequences and framing
     timeouts are not considered. The result is 0 if the minimum is unknown.
@@ -79,7 +79,7 @@ def calm_s(driver: Driver) -> float:
 
 def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float:
     if command.name in outer:
-        return 0.0  # loaded sequences never run themselves; hand-built ones might
+        return 0.0  # loaded sequences never run themselves; hand-built sequences might
     within_s = command.verify.within_s if command.verify is not None else 0.0
     if not command.steps:
         return _exchange_s(command, driver.transports[command.transport]) + within_s
@@ -137,7 +137,7 @@ def _line_of(step: Step, transports: Mapping[str, TransportSpec]) -> TransportSp
 
 
 def _step_s(step: Step, spec: TransportSpec | None) -> float:
-    """Return the maximum duration of one step in seconds, without branches and commands."""
+    """Return the maximum duration of one step in seconds, excluding branches and commands."""
     if isinstance(step, WaitStep):
         return step.seconds
     if isinstance(step, UntilStep):
@@ -171,7 +171,7 @@ def lines_of(name: str, driver: Driver) -> frozenset[str]:
 
 
 def needs_readings(driver: Driver) -> bool:
-    """Return whether any condition or step of a driver depends on earlier samples."""
+    """Return whether any of a driver's conditions or steps depends on earlier samples."""
     specs = driver.transports.values()
     return (
         any(

@@ -46,7 +46,7 @@ def build_fast_encode(
     encoding: str,
     slow: Encode,
 ) -> Encode | None:
-    """Return a function that encodes a namespace to bytes; None for an unsupported template."""
+    """Return a function that encodes a namespace to bytes; None if the template is unsupported."""
     if type(framing) is not DelimiterFraming or framing.codec is not None:
         return None
     names = sorted(template.names)
@@ -74,7 +74,7 @@ def _text_of(
     tx: bytes,
     encoding: str,
 ) -> str | None:
-    """Return the format string of a frame as source text; None for an unsupported template."""
+    """Return the format string of a frame as source text; None if the template is unsupported."""
     whole = frozenset(variables[name] for name, kind in kinds.items() if kind == "integer")
     try:
         pieces = _pieces(ast.parse(template.python, mode="eval").body, variables, whole)

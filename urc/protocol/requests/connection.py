@@ -29,7 +29,7 @@ __all__ = ["Connection"]
 
 
 class Connection:
-    """Base class of conversations, which handles the opening and closing of transports."""
+    """Base class of conversations, which opens and closes transports."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         self.spec = spec
@@ -109,7 +109,7 @@ class Connection:
         return events + self._pump(now)
 
     def fail(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection for the given reason; all pending requests fail."""
+        """Close the connection for the given reason, and fail all pending requests."""
         if self.state == "closed":
             return []
         reason = self.receiver.secrets.hide(reason)
@@ -136,7 +136,7 @@ class Connection:
         return [*events, Close(self.spec.name), *self._pump(now)]
 
     def _lose(self, reason: str) -> list[LineEvent]:
-        """Discard the connection; all pending requests fail."""
+        """Discard the connection, and fail all pending requests."""
         lost = self._lost()
         for exchange in tuple(self._request_queue):
             if exchange.is_privileged:

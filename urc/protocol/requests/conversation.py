@@ -7,10 +7,10 @@ per-request conversation requests a connection (`Open`) for each request, and cl
 afterwards (`Close`). The module is pure: callers pass the time.
 
 Requests in flight are kept in sending order. A received frame is offered to all requests in flight,
-oldest first. A request with a correlation accepts only its own reply. Of the requests without a
+oldest first. A request with a correlation accepts only its own reply. Among requests without a
 correlation, only the oldest accepts the frame, because replies arrive in order. Real-time requests
 have a separate reply order. After its timeout, a request is *late*, and stays in flight for another
-reply timeout. A late reply is dropped, because the next request must not accept it. Until the late
+reply timeout. A late reply is dropped so that the next request does not accept it. Until the late
 reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
 consecutive missing replies, the connection is closed and reopened.
 """
@@ -72,7 +72,7 @@ class Conversation(Connection):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next deadline for `tick`; None without a deadline."""
+        """Time of the next deadline for `tick`; None if there is no deadline."""
         pending_replies = self._pending_replies
         due = (
             None
@@ -292,8 +292,9 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Processing short frames one by one takes almost twice as long as in batches (decision 27). A
-        batch ends after the expected reply or a refused value, or before another kind of frame.
+        Processing short frames one by one takes almost twice as long as processing them in batches
+        (decision 27). A batch ends after the expected reply or a refused value, or before another
+        kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -331,7 +332,7 @@ class Conversation(Connection):
         return events
 
     def _recut(self) -> None:
-        """Select the framing of a pending reply or a step, or the framing of the connection."""
+        """Select the framing of a pending reply or step, or else that of the connection."""
         framing = (
             self._pending_replies.framing() if self._pending_replies else None
         ) or self.receiver.framing

@@ -38,7 +38,7 @@ class ExchangeOutcome(NamedTuple):
     """The result of a request."""
 
     code: str = ""
-    """Failure code as in `urc.protocol.events.Failed`; "" for success."""
+    """Failure code as in `urc.protocol.events.Failed`; "" means success."""
     message: str = ""
     values: Mapping[str, Reading] = NOTHING
 
@@ -83,7 +83,7 @@ class CompiledRequest(NamedTuple):
     """Whether the request moves the robot. Motion requests fail immediately if the connection is
     not ready."""
     learnt: frozenset[str] = frozenset()
-    """Names in the request's templates for values that the login has received."""
+    """Names of the login values that the request's templates use."""
     is_fresh: bool = False
     """Whether the request contains the time or a nonce."""
     is_local: bool = False
@@ -94,7 +94,7 @@ class CompiledRequest(NamedTuple):
     """Reader of the reply if the request has a single reply that contains only samples; otherwise
     None."""
     is_miss_harmless: bool = False
-    """Whether only the poll counts missing replies; a missing reply then does not indicate a lost
+    """Whether only the poll counts missing replies. If so, a missing reply does not indicate a lost
     connection."""
     is_numbered: bool = False
     """Whether the request is an envelope with a number that the reply repeats."""
@@ -134,7 +134,7 @@ class Exchange:
     numbers: Mapping[str, int] = NOTHING
     """Numbers in the last rendered frame, keyed by counter."""
     is_privileged = False
-    """Whether the request belongs to the login or the close, and may be sent before the connection
+    """Whether the request is part of the login or the close and may be sent before the connection
     is ready."""
     is_secret = False
     """Whether the payload is secret, and must not appear in any message."""
@@ -198,7 +198,7 @@ class Exchange:
 
     @property
     def latest_key(self) -> str:
-        """Label of requests that replace each other in the queue; "" means no replacement."""
+        """Label of requests that replace each other in the queue; "" if they do not."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
@@ -208,14 +208,14 @@ class Exchange:
 
 
 class ExchangeEnded(NamedTuple):
-    """Internal event of the engine: a request has ended."""
+    """The engine's internal event for the end of a request."""
 
     exchange: Exchange
     outcome: ExchangeOutcome
 
 
 class ConnectionClosing(NamedTuple):
-    """Internal event of the engine: the conversation is ready for the steps of ``on_close``."""
+    """The engine's internal event when the conversation is ready for the ``on_close`` steps."""
 
     transport: str
 

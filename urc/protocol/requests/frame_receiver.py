@@ -40,7 +40,7 @@ so the whole message is hidden."""
 
 
 class SentSecrets:
-    """Secrets sent on a connection, for redaction if the robot echoes them."""
+    """Secrets sent on a connection, which are redacted if the robot echoes them."""
 
     __slots__ = ("_texts",)
 
@@ -132,7 +132,7 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return a message part about an unexpected frame during a wait; "" if no frame arrived.
+        """Return a clause about an unexpected frame during a wait; "" if no frame arrived.
 
         Args:
             since: start time of the wait, in seconds.
@@ -243,7 +243,7 @@ class FrameReceiver:
         return [Violation(self._spec.name, "no-match", offer.dropped)] if offer.dropped else []
 
     def _unknown(self, frame: Frame) -> Violation:
-        """Return the violation for a frame that matches no declaration."""
+        """Return the violation for a frame that does not match any declaration."""
         fault = getattr(frame, "fault", "")
         if fault:
             return Violation(self._spec.name, "bad-value", self.secrets.hide(fault))

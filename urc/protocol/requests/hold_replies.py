@@ -8,7 +8,8 @@ In half-duplex mode, motion frames wait for a pending reply, and queued requests
 motion frames. The wait for a reply to a motion frame is short, because a lost reply must not
 prevent motion. A stop never waits for replies.
 
-A held command expects replies from its first frame until the reply timeout of the newest frame.
+A held command expects replies from when its first frame is sent until the reply timeout of its
+newest frame.
 """
 
 from collections.abc import Mapping
@@ -40,8 +41,8 @@ class _Listening:
 
     def __init__(self, answer: CompiledReply, match: Template | None) -> None:
         self.expectation = Expectation(answer)
-        # Many frames are pending, so a number cannot be assigned to a specific frame. Any number
-        # matches.
+        # Many frames are pending, so a number cannot be assigned to a specific frame. Every number
+        # therefore matches.
         self._match = None if match is None or "seq" in match.names else match
         self.names = _NOTHING
         self.until_s = float("-inf")

@@ -1,7 +1,7 @@
-"""Additional effects of messages: collecting values from several frames, and acknowledging frames.
+"""Additional effects of messages: values collected from several frames, and acknowledgements.
 
-Pure. Collecting and acknowledging are part of the conversion from fields to samples, so both occur
-exactly once per message. Incomplete collected values are discarded when the connection is lost.
+Pure. Collecting and acknowledging are part of converting fields to samples, so each occurs exactly
+once per message. Incomplete collected values are discarded when the connection is lost.
 Acknowledgements wait in `Acknowledgements` until the conversation has reported the frame.
 """
 

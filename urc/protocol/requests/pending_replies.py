@@ -161,7 +161,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the earliest timeout of all pending replies; None without a pending reply."""
+        """Time of the earliest timeout of all pending replies; None if no reply is pending."""
         if len(self) == 1:
             return self[0].due
         return min((pending.due for pending in self), default=None)
@@ -201,7 +201,7 @@ class PendingReplies(list[PendingReply]):
         return None
 
     def collects_lines(self) -> bool:
-        """Return whether any received frame could be part of a pending multi-frame reply."""
+        """Return whether any received frame might be part of a pending multi-frame reply."""
         return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
@@ -247,7 +247,7 @@ class PendingReplies(list[PendingReply]):
 
 
 def _plain(raw: object) -> Reading:
-    """Return the plain reply value of a raw field."""
+    """Return a raw field as a plain reply value."""
     if isinstance(raw, (list, tuple)):
         return tuple(map(_plain, raw))
     if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):

@@ -20,9 +20,8 @@ REALTIME: Final = 0
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass immediately; the average rate stays constant. With a minimum
-    gap between calls, every slightly early call would be delayed, which would reduce the average
-    rate.
+    After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
+    between calls would instead delay every slightly early call and so reduce the average rate.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -66,7 +65,7 @@ class FrameCounters:
 
     @property
     def count(self) -> Count:
-        """The frame's effect on the connection's counters."""
+        """How the frame changes the connection's counters."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 
@@ -160,7 +159,7 @@ class Counters:
 
 
 class Prioritized(Protocol):
-    """An item of a priority queue."""
+    """An item in a priority queue."""
 
     @property
     def rank(self) -> int:
@@ -168,7 +167,7 @@ class Prioritized(Protocol):
 
     @property
     def latest_key(self) -> str:
-        """Key of requests that replace each other; "" means no replacement."""
+        """Key of requests that replace each other; "" means that none are replaced."""
 
 
 Item = TypeVar("Item", bound=Prioritized)

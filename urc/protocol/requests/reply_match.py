@@ -109,7 +109,7 @@ class MatchResult(NamedTuple):
     aside: Aside | None = None
     """Kind of the provisional reply; None for other frames."""
     dropped: str = ""
-    """Report of dropped lines, as a human-readable message; "" means no dropped lines."""
+    """Human-readable message about dropped lines; "" means that no lines were dropped."""
 
 
 _MORE: Final = MatchResult()
@@ -152,7 +152,7 @@ class Expectation:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return the frame to search for a refusal; for a counted reply, all its frames so far."""
+        """Return the frame that may be a refusal; for a counted reply, return all frames so far."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):
@@ -207,14 +207,14 @@ class ExpectationOwner(Protocol):
 
 
 class Matched(NamedTuple):
-    """Internal event of the engine: an expected frame has arrived."""
+    """The engine's internal event for the arrival of an expected frame."""
 
     expectation: "Expectation"
     offer: "MatchResult"
 
 
 def _is_about(fields: Fields, is_mine: IsMine | None) -> bool:
-    """Return whether a frame with `fields` belongs to the request; True without fields."""
+    """Return whether a frame with `fields` belongs to the request; True if there are no fields."""
     return is_mine is None or not fields or is_mine(fields)
 
 

@@ -1,4 +1,4 @@
-"""Compilation of a driver's declared requests, once per engine. Pure."""
+"""Compile a driver's declared requests, once for each engine. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -98,7 +98,7 @@ class RequestCompiler:
         line.receiver.replies, line.receiver.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the namespace of an acknowledgement: fields, signals and login fields."""
+        """Return the namespace for an acknowledgement: fields, signals and login fields."""
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> CompiledRequest:

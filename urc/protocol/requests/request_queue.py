@@ -38,7 +38,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         """End time of the minimum gap after the last request, in seconds."""
 
     def submit(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
-        """Queue a request; return a displaced request with its outcome, or None."""
+        """Queue a request; return the displaced request and its outcome, or None."""
         gone = self.push(exchange)
         if gone is None:
             return None
@@ -98,7 +98,7 @@ class RequestQueue(PriorityQueue[Exchange]):
             return None
         first: float | None = None
         barred_from = float("inf")
-        """From this time, a request that does not fit into the robot's buffer blocks later
+        """From this time on, a request that does not fit into the robot's buffer blocks later
         requests."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(

@@ -1,1 +1,1 @@
-"""ROS messages in their binary forms: definitions, generated readers and writers. Pure."""
+"""ROS messages in binary form: definitions, and generated readers and writers. Pure."""

@@ -1,10 +1,10 @@
 """Types from the ROS common interfaces that drivers publish most often.
 
-A robot sends the definitions of the types that it publishes, but not of types that it only
+A robot sends definitions of the types that it publishes, but not of the types that it only
 receives. Messages of other types are sent as JSON (`urc.protocol.ros.topic_codec`).
 
-Sources: common_interfaces, rcl_interfaces, unique_identifier_msgs and common_msgs, as of ROS 2
-Jazzy and ROS 1 Noetic.
+Sources: common_interfaces, rcl_interfaces, unique_identifier_msgs and common_msgs, from ROS 2 Jazzy
+and ROS 1 Noetic.
 """
 
 from collections.abc import Mapping

@@ -82,9 +82,9 @@ SIZES: Final[Mapping[str, int]] = {
 }  # fmt: skip
 """Size in bytes, keyed by format code."""
 BYTE_CODES: Final = "B"
-"""Format code of numbers whose arrays are bytes, as in images."""
+"""Format code of numbers whose arrays are treated as bytes, as in images."""
 TIME_TYPES: Final = frozenset(("builtin_interfaces/Time", "time"))
-"""Types of a point in time, for which a message may contain the text ``now``."""
+"""Types for a point in time; messages may contain the text ``now`` in place of such a value."""
 
 
 class Primitive(NamedTuple):
@@ -128,7 +128,7 @@ _STANDARD: Final = {
     "time": (MessageField("secs", "uint32"), MessageField("nsecs", "uint32")),
     "duration": (MessageField("secs", "int32"), MessageField("nsecs", "int32")),
 }
-"""Types that a text can use without a definition: the time types of ROS 2 and ROS 1."""
+"""Types that a text can use without defining them: the time types of ROS 2 and ROS 1."""
 _PADDING: Final = (("structure_needs_at_least_one_member", Primitive("B")),)
 """The only field of an empty type in ROS 2, according to rosidl."""
 

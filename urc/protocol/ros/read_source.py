@@ -2,7 +2,7 @@
 
 Theory of operation. The source is generated once for each combination of layout, byte order and
 wanted parts. Consecutive fields of fixed size become one *run*, which a single `struct.Struct`
-unpacks or skips. CDR aligns each number to its size, relative to the end of the four-byte header.
+unpacks or skips. CDR aligns each number to its size, counted from the end of the four-byte header.
 The generator therefore tracks the offset modulo a power of two. After a string, the offset is
 unknown, and the next number is aligned at run time. Non-finite numbers become None, as in JSON from
 rosbridge. The data is untrusted. Every length is compared with the remaining bytes before use, and
@@ -339,7 +339,7 @@ class _Generator:
         self._emit(f"{name} = all_finite({taken})" if code in "fd" else f"{name} = {taken}")
 
     def _stride(self, element: Record, wanted: Wanted) -> int | None:
-        """Return the constant distance between consecutive array elements; None if it varies."""
+        """Return the distance between consecutive array elements; None if it varies."""
         sizes = list(_sizes(element))
         if not sizes or any(one is None or (wanted and one[1] > 1) for one in sizes):
             return None
@@ -447,7 +447,7 @@ def _sizes(layout: Layout) -> Iterator[tuple[int, int] | None]:
 
 
 def _least(layout: Layout, is_ros1: bool) -> int:
-    """Return the smallest possible size of a layout in bytes, without padding."""
+    """Return the minimum size of a layout in bytes, without padding."""
     match layout:
         case Primitive():
             return SIZES[layout.code]

@@ -1,14 +1,15 @@
 """Conversion of ROS messages between their binary forms and plain data, for one connection.
 
-Pure. With the Foxglove protocol, the transport carries messages as bytes. Before a topic's
-messages, the transport delivers their type's definition, in an envelope with the verb `DEFINITION`.
-The codec then reads the parts of each message that the driver uses. The transport never decodes
-messages. For moving robots, the transport runs in the guard, which must not be delayed.
+Pure. With the Foxglove protocol, the transport carries messages as bytes. The transport delivers
+the definition of a topic's type before the topic's messages, in an envelope with the verb
+`DEFINITION`. The codec then reads the parts of each message that the driver uses. The transport
+never decodes messages. For moving robots, the transport runs in the guard, which must not be
+delayed.
 
-For sent messages, the codec adds the message's bytes to its envelope. The definition of a published
-type is in `urc.protocol.ros.common_types`, or is taken from a topic of the same type. Without a
-definition, the envelope has no bytes, and the transport sends JSON. An envelope always keeps its
-plain body, so that it also works with rosbridge.
+When a message is sent, the codec adds the message's bytes to its envelope. The definition of a
+published type comes from `urc.protocol.ros.common_types`, or from a topic of the same type. If
+there is no definition, the envelope has no bytes, and the transport sends JSON. The envelope always
+keeps its plain body, so it also works with rosbridge.
 
 Services have their own definitions, which the transport delivers with the first call. The transport
 returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
@@ -30,8 +31,8 @@ from urc.protocol.ros.write_source import Unwritable, Writer
 __all__ = ["DEFINITION", "UNENCODED", "Received", "TopicCodec"]
 
 DEFINITION: Final = "definition"
-"""Verb of a definition, with attributes `topic`, `type`, `encoding` and `notation`, and a text
-body."""
+"""Verb of a definition; the envelope has a text body and the attributes `topic`, `type`, `encoding`
+and `notation`."""
 UNENCODED: Final = "unencoded"
 """Verb of a returned call. Its attributes are those of the call, plus `request` and `response`,
 each a list of type, encoding, notation and text."""
@@ -40,7 +41,7 @@ MAX_COMPILED: Final = 256
 unlimited number of new types."""
 _SHOWN: Final = 60
 _ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
-"""Byte order and largest alignment, keyed by encapsulation identifier: CDR and plain CDR2."""
+"""Byte order and largest alignment for CDR and plain CDR2, keyed by encapsulation identifier."""
 
 
 class Received(NamedTuple):
@@ -55,7 +56,7 @@ class Received(NamedTuple):
 
 
 class _Schema(NamedTuple):
-    """A type as described by a robot."""
+    """A message type, as defined by a robot."""
 
     type: str
     encoding: str
@@ -226,7 +227,7 @@ class TopicCodec:
     # -- sent envelopes
 
     def sent(self, payload: Payload) -> Payload:
-        """Return the envelope, with its message's bytes if the definition is known.
+        """Return the envelope; if the definition is known, the message's bytes are added.
 
         Raises:
             Unwritable: the message does not fit its type.

@@ -1,7 +1,7 @@
 """The parts of a message that a driver reads.
 
-Pure. A message reader skips all other parts. `ALL` means a whole value. A dictionary means some
-fields of a message or, with the key `EACH`, some parts of each element.
+Pure. A message reader skips all other parts. `ALL` means a whole value. A dictionary means some of
+a message's fields or, with the key `EACH`, some parts of each element.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -68,7 +68,7 @@ def paths_of(read: ReadSpec) -> Iterator[Path]:
 
 
 def _of_expression(node: Any) -> set[Path]:
-    """Return the paths that a JMESPath expression's node reads, relative to the node's value."""
+    """Return the paths that a node of a JMESPath expression reads, relative to the node's value."""
     if not isinstance(node, Mapping):
         return {()}
     kind, children = node.get("type"), node.get("children", [])

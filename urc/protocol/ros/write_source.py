@@ -3,7 +3,7 @@
 Theory of operation. The source is generated once per layout. Consecutive numbers become one
 `struct.Struct` format. Alignment works as in `urc.protocol.ros.read_source`. A message is a mapping
 of fields, as in a document; missing fields have their default values or zero. The generated
-function is fast but fails without a reason. `Writer` then searches the message for the reason.
+function is fast, but its errors give no reason. `Writer` then searches the message for the reason.
 """
 
 import base64
@@ -29,7 +29,7 @@ from urc.protocol.ros.definition import (
 __all__ = ["NOW", "Unwritable", "Writer", "Written"]
 
 NOW: Final = "now"
-"""Text in place of a point in time; the sender replaces it with the time of sending."""
+"""Text that stands for a point in time; the sender replaces it with the time of sending."""
 _HEADER: Final = b"\0\1\0\0"
 """Encapsulation identifier of CDR with little-endian numbers."""
 _SHOWN: Final = 40
@@ -306,7 +306,7 @@ def _zero(layout: Layout) -> object:
 
 
 def _reason(layout: Layout, value: object, path: str) -> str:
-    """Return the first reason why a value does not fit a layout; "" if it fits."""
+    """Return the first reason why a value does not fit a layout; "" if the value fits."""
     shown = f"{path.lstrip('.') or 'the message'}: {printable(repr(value))[:_SHOWN]}"
     match layout:
         case Primitive(code=code):

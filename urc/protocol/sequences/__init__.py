@@ -1,1 +1,1 @@
-"""Sequences of steps, and their execution as commands."""
+"""Sequences of steps, which run as commands."""

@@ -1,4 +1,4 @@
-"""Compilation of sequence steps: each `Step` becomes a function for a `SequenceRunner`.
+"""Compile the steps of sequences: each `Step` becomes a function for a `SequenceRunner`.
 
 Pure. See `urc.protocol.sequences.sequence_runner` for the theory of operation.
 """

@@ -51,7 +51,7 @@ def why_not_allowed(
         known: state of the robot, for conditions.
         values: checked arguments, by name.
         now: current time, in seconds.
-        stops: number of stops at the time of the request; None for a new request.
+        stops: number of stops when the command was requested; None for a new request.
     """
     is_of_before = stops is not None and stops != known.stops
     if (known.latched or is_of_before) and command.moves_with(values):
@@ -70,8 +70,7 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
     Args:
         command: the declared command.
-        values: arguments including defaults, by name; each element of an array may require a
-            question.
+        values: arguments including defaults, by name; each element of an array may need a question.
     """
     asked = [] if command.confirm is None else [command.confirm]
     for name, argument in command.arguments.items():
@@ -128,8 +127,8 @@ def exchange_of(
         sink: function that receives the outcome.
         now: current time, in seconds.
         known: state of the robot, for conditions.
-        verifications: runs waiting for verification; a command that requires verification is added
-            to them.
+        verifications: runs waiting for verification; if the command requires verification, its run
+            is added.
 
     Raises:
         BadArgument: the frame cannot be encoded with these arguments.
@@ -152,7 +151,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return an argument value in the notation of a document key."""
+    """Return an argument value as it would be written in a document key."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)

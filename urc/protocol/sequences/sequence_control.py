@@ -9,12 +9,12 @@ from typing import Final, Literal
 __all__ = ["PAUSE_S", "Pull", "SequenceControl"]
 
 PAUSE_S: Final = 600.0
-"""Maximum duration of a pause, in seconds. The limit exists because a paused sequence blocks other
+"""Maximum duration of a pause, in seconds. There is a limit because a paused sequence blocks other
 sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
-"""A control request from the operator. ``step`` runs one outermost step and then pauses. With
-``step`` before the start, the sequence pauses before the first step."""
+"""A control request from the operator. ``step`` runs one outermost step and then pauses. If
+``step`` is requested before the start, the sequence pauses before its first step."""
 
 
 class SequenceControl:
@@ -23,7 +23,7 @@ class SequenceControl:
     __slots__ = ("_halt", "count", "is_aborted", "is_paused", "is_running", "of", "place", "reason")
 
     def __init__(self, of: int) -> None:
-        """Initialise the state of an idle sequence with `of` outermost steps."""
+        """Create the state of an idle sequence with `of` outermost steps."""
         self.of = of
         self.place = 0
         """Number of outermost steps that have started."""
@@ -31,7 +31,7 @@ class SequenceControl:
         self.is_paused = False
         self.is_aborted = False
         self.reason = ""
-        """Reason why the last run failed; "" without a failure."""
+        """Reason why the last run failed; "" if it did not fail."""
         self.count = 0
         """Number of changes to the public attributes."""
         self._halt: Literal["", "now", "next", "outer"] = ""
@@ -72,7 +72,7 @@ class SequenceControl:
         self.count += 1
 
     def halts(self, *, is_outermost: bool) -> bool:
-        """Return whether the next step must wait; if so, mark the sequence as paused."""
+        """Return whether the next step must wait, and if so, mark the sequence as paused."""
         is_over = is_outermost and self.place == self.of
         is_wanted = self._halt == "now" or (self._halt == "outer" and is_outermost)
         if is_over or not is_wanted:
@@ -82,7 +82,7 @@ class SequenceControl:
         return True
 
     def goes_on(self) -> bool:
-        """Return whether a pause must end; if so, mark the sequence as running."""
+        """Return whether a pause must end, and if so, mark the sequence as running."""
         if not self.is_paused or self._halt not in ("", "next"):
             return False
         self.is_paused = False

@@ -2,8 +2,8 @@
 
 Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls the functions
 in order, until a step must wait. Steps may wait for a reply, a frame, a prompt, a condition or a
-delay. The engine processes the returned events and calls `advance` again. Every loop is bounded and
-every wait has a timeout, so every sequence ends.
+delay. The engine processes the returned events and calls `advance` again. Every loop has a limit
+and every wait has a timeout, so every sequence ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +23,7 @@ __all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink
 Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
 """Function that receives an outcome and the time, and returns the resulting events."""
 Unless = Callable[[], str]
-"""Function that returns why a request is obsolete; "" means that the request is still valid."""
+"""Function that returns why a request is obsolete, or "" if the request is still valid."""
 
 
 class SequenceHost(Protocol):
@@ -122,7 +122,7 @@ class SequenceRunner:
 
     @property
     def deadline(self) -> float | None:
-        """Time at which to call `expire` next; None without a timeout."""
+        """Time at which to call `expire` next; None if there is no timeout."""
         if self.due is None or self.ends_at is None:
             return self.ends_at if self.due is None else self.due
         return min(self.due, self.ends_at)
@@ -155,7 +155,7 @@ class SequenceRunner:
         return events
 
     def wait_for_logins(self, now: float) -> None:
-        """Wait for the logins of all open connections, for at most a command's queue limit."""
+        """Wait for the logins of all open connections, up to the time limit for queued commands."""
         lines = (self.host.lines[name] for name in self.program.transports)
         self._logins = [
             line
@@ -210,13 +210,13 @@ class SequenceRunner:
             self._outcome = ExchangeOutcome(code, reason)
 
     def why_over(self) -> str:
-        """Return the reason why the run's further frames are obsolete; "" if the run continues."""
+        """Return the reason why the run must send no more frames; "" if the run continues."""
         return self._outcome.message if self._outcome is not None else ""
 
     # -- called by the engine
 
     def check_conditions(self, now: float) -> None:
-        """Check the awaited condition after new samples or at the start of the wait."""
+        """Check the awaited condition, after new samples or at the start of the wait."""
         if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
             self._awaited = None
             self._resume()

@@ -1,4 +1,4 @@
-"""Struct numbers with special encodings: variable lengths, decimal digits and odd widths.
+"""Struct numbers with special encodings: variable length, decimal digits or unusual widths.
 
 Pure. ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has
 two decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits
@@ -30,7 +30,7 @@ Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
-"""Key in `out` for the error of the first invalid item; no item has this name."""
+"""Key in `out` for the first invalid item's error; no item has this name."""
 
 
 class OtherFrame(Exception):

@@ -1,4 +1,4 @@
-"""Builder for binary frames, with gaps for numbers that are computed later. Pure."""
+"""A builder for binary frames, which leaves gaps for numbers that are computed later. Pure."""
 
 from typing import Any, NamedTuple
 
@@ -25,7 +25,7 @@ class Backpatch(NamedTuple):
     at: int
     item: Item
     container: Number
-    """Type of the number that contains the missing number, at bit `shift`."""
+    """Type of the number that contains the missing number at bit `shift`."""
     shift: int = 0
 
 

@@ -4,9 +4,8 @@ Pure. The closures are a readable version of the code that `urc.protocol.struct.
 generates. Generated functions are faster for runs of fixed items. Tests compare the results of the
 closures and the generated functions. Theory of operation: every item becomes a step ``(data, at,
 end, out) -> after``. A step reads bytes from `at` to at most `end`, and stores the value in `out`.
-A step raises `OtherFrame` if the frame does not match. After the first invalid value, an error is
-recorded under the key `FAULT`, and reading continues. The error is reported only if the whole frame
-matches.
+A step raises `OtherFrame` if the frame does not match. The first invalid value's error is stored
+with the key `FAULT`, and reading continues. The error is reported only if the whole frame matches.
 """
 
 from collections.abc import Callable, Mapping
@@ -49,7 +48,7 @@ Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
 """Function that returns a size or count (-1: up to the end) and the start of the data."""
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
-"""A part of ``bits``: item, shift, mask, sign bit (0 for unsigned) and decoding function."""
+"""A part of ``bits``: item, shift, mask, sign bit (0 if unsigned) and decoding function."""
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
@@ -131,7 +130,7 @@ def _number_step(item: Item, encoding: str) -> Step:
 
 
 def const_of(item: Item) -> Any:
-    """Return the constant as read back from a frame, because 0.1 in 32 bits is not exactly 0.1."""
+    """Return the constant as it is read back from a frame; 0.1 in 32 bits is not exactly 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
     return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)
@@ -213,7 +212,7 @@ def _padding_step(item: Item, encoding: str) -> Step:
 
 
 def build_amount(extent: Extent | None, name: str) -> Amount:
-    """Return a function that computes a size or count from earlier items."""
+    """Return a function that computes a size or count from the values of earlier items."""
     if extent is None or extent.kind == "rest":
         return lambda data, at, end, out: (-1, at)
     if extent.kind == "fixed":

@@ -22,7 +22,7 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 
 
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
-    """Return a function that reads a frame's fields, or returns None if the frame does not match.
+    """Return a function that returns a frame's fields, or None if the frame does not match.
 
     The returned function raises `BadItem` if a matching frame contains an invalid value.
     """
@@ -52,7 +52,7 @@ def _is_open_end(item: Item) -> bool:
 def add_fixed(
     source: SourceBuilder, items: tuple[Item, ...], encoding: str, data: str
 ) -> tuple[list[str], dict[str, str]] | None:
-    """Add source for unpacking a frame of items with fixed positions, or return None.
+    """Add source that unpacks a frame of items with fixed positions; return None if impossible.
 
     Args:
         source: builder of a function that returns None for a non-matching frame.
@@ -61,8 +61,7 @@ def add_fixed(
         data: name of the variable that contains the frame.
 
     Returns:
-        The source lines for decoding, and an expression for each field that is valid after those
-        lines.
+        The source lines for decoding, and an expression for each field, valid after those lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))
@@ -93,7 +92,7 @@ def _variables(place: int, number: int, leaf: FixedField) -> list[str]:
 
 
 def _add_unpack(source: SourceBuilder, run: FixedRun, place: int, where: str) -> None:
-    """Add source for unpacking a run and checking its constants."""
+    """Add source that unpacks a run and checks its constants."""
     names = [
         name for number, leaf in enumerate(run.leaves) for name in _variables(place, number, leaf)
     ]

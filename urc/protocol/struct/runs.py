@@ -23,7 +23,7 @@ class FixedField(NamedTuple):
 
     item: Item
     name: str
-    """Name of the field, including the names of outer structs; "" means no field."""
+    """Name of the field, including the names of outer structs; "" if the item has no field."""
     outer: str
     """Joined name of the outer structs."""
     code: str

@@ -56,7 +56,7 @@ def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
 def raw_of(item: Item) -> Callable[[Any], Any]:
     """Return a function that converts the value to the raw form, or raises `NotWritable`.
 
-    Numbers are rounded to the nearest whole number, and halves to the nearest even number.
+    Numbers are rounded to the nearest whole number; halves are rounded to the nearest even number.
     """
     numbers = {word: number for number, word in item.enum}
     number, valid, scale, offset = item.number, item.valid, item.scale, item.offset
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function that converts a value to a raw number and that number's value."""
+    """Return a function that converts a value to a raw number, and to the value of that number."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
@@ -168,7 +168,7 @@ def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
 
 
 def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
-    """Return a function that converts a value to the bytes of a text or bytes item, unpadded."""
+    """Return a function that converts a value to the unpadded bytes of a text or bytes item."""
     codec, name = item.encoding or encoding, item.id or item.kind
 
     def encode(value: object) -> bytes:
@@ -208,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes represented by a text of hex digits."""
+    """Return the bytes for a text of hex digits."""
     try:
         return bytes.fromhex(text)
     except ValueError:

@@ -2,8 +2,8 @@
 
 Pure. These closures are the inverse of the closures in `urc.protocol.struct.read`. Theory of
 operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values
-leave a gap in the frame until the missing number can be computed. The `Backpatch` for the size of a
-later item is stored in the scope. Values that depend on the size of the whole frame are stored in
+leave a gap in the frame until the missing number can be computed. For the size of a later item, the
+`Backpatch` is stored in the scope. Values that depend on the size of the whole frame are stored in
 `FrameBuilder.late`.
 """
 
@@ -141,7 +141,7 @@ def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
 def _deferral(
     item: Item, rules: StructWriteScope
 ) -> Callable[[FrameBuilder, Scope, Backpatch], None] | None:
-    """Return the handler for the gap of a number that is computed later, or None."""
+    """Return the handler for the gap if the number is computed later, or None."""
     value = item.value
     if value is None and item.id in rules.derived:
         return lambda builder, scope, gap: scope.__setitem__(GAP + item.id, gap)
@@ -357,12 +357,12 @@ def _struct_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _outer(scope: Scope) -> Scope:
-    """Return the outer scope's values that a struct may use, keyed by name."""
+    """Return those values of the outer scope that a struct may use, keyed by name."""
     return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope) -> WriteStep:
-    """Return the step that writes a struct with its size field and without its trimmed bytes."""
+    """Return the step that writes a struct and its size field, but not the trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""

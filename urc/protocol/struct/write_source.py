@@ -33,8 +33,8 @@ Write = Callable[[Mapping[str, object]], bytes]
 def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
     """Return a function that encodes arguments to a frame, or raises `NotWritable`.
 
-    The generated code works only for valid values. After an error, the closures repeat the
-    encoding. The closures round and convert values, and report invalid values.
+    The generated code works only for valid values. After an error, the closures encode the frame
+    again. The closures round and convert values, and report invalid values.
     """
     steps = build_write_steps(items, encoding, is_lenient=False)
 

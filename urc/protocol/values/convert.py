@@ -34,7 +34,7 @@ _ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
 
 
 class BadValue(ValueError):
-    """An invalid raw value; the message contains the found and the expected value."""
+    """An invalid raw value; the message contains the actual and the expected value."""
 
 
 class Unusable:
@@ -50,7 +50,7 @@ class Unusable:
 
 
 def build_conversion(conversion: Conversion) -> Step | None:
-    """Return a function that converts raw values; None without a conversion.
+    """Return a function that converts raw values; None if there is no conversion.
 
     The returned function raises `BadValue` for an invalid raw value.
     """
@@ -69,9 +69,9 @@ def build_conversion(conversion: Conversion) -> Step | None:
 
 
 def build_inverse(conversion: Conversion) -> Step | None:
-    """Return a function that converts values back to raw values; None without a conversion.
+    """Return a function that converts values to raw values; None if there is no conversion.
 
-    The returned function raises `BadValue` for a value without a corresponding raw value.
+    The returned function raises `BadValue` if a value has no corresponding raw value.
     """
     steps: list[Step] = []
     if conversion.states:

@@ -2,7 +2,7 @@
 
 Pure. Each engine builds the converters once per signal. A value with the wrong type or range is
 counted as a violation and never becomes a sample. On a screen, a wrong number would be worse than
-an old one.
+an old number.
 """
 
 import math
@@ -45,7 +45,7 @@ def build_converter(signal: Signal) -> Convert:
 def build_raw(signal: Signal) -> Callable[[object], object]:
     """Return a function that converts a value of `signal` to a raw field, for the emulated robot.
 
-    The returned function raises `BadValue` for a value without a raw counterpart.
+    The returned function raises `BadValue` if a value has no corresponding raw field.
     """
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)

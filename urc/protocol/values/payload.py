@@ -44,7 +44,8 @@ class Frame:
     fault: str
     """Reason why a reader rejected a value of the frame; unset if no reader rejected a value."""
     was_text_wanted: bool
-    """Whether a reader needed the text of an undecodable frame; unset if no reader did."""
+    """Whether a reader needed the text of an undecodable frame; unset if no reader needed the
+    text."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
@@ -106,4 +107,4 @@ class PayloadWriter(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return values of the top-level names for which `write` returns this frame, or None."""
+        """Return values of top-level names with which `write` returns this frame, or None."""

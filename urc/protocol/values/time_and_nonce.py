@@ -1,7 +1,7 @@
 """Times and nonces for sent frames.
 
-Pure. Times and nonces have injected sources: a clock and a random generator for a robot, fixed
-sources for tests. With fixed sources, URC always encodes a document's frames identically.
+Pure. The sources of times and nonces are passed in: a clock and a random generator for a robot, and
+fixed sources for tests. With fixed sources, URC always encodes a document's frames identically.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ class TimeAndNonce(NamedTuple):
     """Function that returns a given number of random bytes, different for each call."""
 
     def names(self) -> dict[str, object]:
-        """Return the namespace of one frame, with the same time and nonce for all uses."""
+        """Return the namespace of one frame, in which all uses see the same time and nonce."""
         made: dict[int, bytes] = {}
 
         def nonce(size: int) -> bytes:

@@ -1,7 +1,7 @@
 """Composite values: arrays, objects, and binary data such as images.
 
-Pure. Raw composite values are JSON-like data, bytes, or text. In text, blanks, commas or semicolons
-separate array elements, and bytes are in base64. The size of a frame limits the size of its
+Pure. Raw composite values are JSON-like data, bytes, or text. In text, array elements are separated
+by blanks, commas or semicolons, and bytes are in base64. The size of a frame limits the size of its
 composite values.
 """
 
@@ -29,7 +29,7 @@ _AROUND = " \t\r\n[]()"
 def array_converter(
     signal: Signal, element: Callable[[object], Value]
 ) -> Callable[[object], Reading]:
-    """Return a function that converts raw elements to a tuple of values, each by `element`."""
+    """Return a function that converts raw elements to a tuple of values, each with `element`."""
     wanted = signal.size
 
     def convert(raw: object) -> Reading:

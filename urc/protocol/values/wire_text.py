@@ -1,4 +1,4 @@
-"""Received text, for comparison in a correlation. Pure."""
+"""Received text that is compared in a correlation. Pure."""
 
 __all__ = ["WireText"]
 

@@ -1,6 +1,6 @@
 """Decoding of recorded messages into events.
 
-Layer 4, pure. A file may be damaged or come from a different program, so messages that do not match
+Layer 4, pure. A file may be damaged or come from another program, so messages that do not match
 `shapes` are ignored.
 """
 

@@ -33,7 +33,7 @@ __all__ = ["FASTEST", "Player", "REFUSAL"]
 FASTEST: Final = 100.0
 REFUSAL: Final = "this is a recording: commands are not sent to a robot"
 _REST_S: Final = 0.25
-"""Pause between the end and the next start of a repeated recording, in seconds."""
+"""Pause before a repeated recording starts again, in seconds."""
 _AHEAD: Final = 256
 """Number of messages to read in one step."""
 
@@ -54,12 +54,12 @@ class Player:
         is_looped: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        """Prepare the playback, paused at the start position.
+        """Prepare the playback, which is paused at its start position.
 
         Args:
             recording: the recording to play.
             profile: profile that pages use to display the recording.
-            settings: valid settings of the profile, although the playback opens no connection.
+            settings: valid settings of the profile, although playback does not open a connection.
             speed: playback speed; 1.0 is real time.
             start_s: start position, in seconds.
             is_looped: whether to restart the playback at the end.
@@ -72,7 +72,7 @@ class Player:
         self._clock: Clock = clock or LoopClock()
         self._speed = min(speed, FASTEST)
         self._base_s = self._within(start_s)
-        """Position at the monotonic time `_since_s`, in seconds."""
+        """Position in the recording at the monotonic time `_since_s`, in seconds."""
         self._since_s: float | None = None
         """Monotonic time of the last start, in seconds; None while paused."""
         self._wants_to_run = True
@@ -187,7 +187,7 @@ class Player:
     async def _follow(
         self, hub: Hub, stream: Generator[RecordedMessage, None, None], number: int
     ) -> None:
-        """Send each message of the stream when due, until the end or a change of position."""
+        """Send each message of the stream when it is due, until the end or a change of position."""
         waiting: deque[RecordedMessage] = deque()
         while True:
             if not waiting:
@@ -203,7 +203,7 @@ class Player:
                 await self._until(waiting[0].time_ns, number)
 
     def _due_ns(self) -> float:
-        """Return the recorded time of the last due message, or infinity at the recording's end."""
+        """Return the recorded time up to which messages are due; infinity at the end."""
         position_s = self.position_s
         if position_s >= self.length_s:
             return math.inf
@@ -235,7 +235,7 @@ class Player:
             await self._changed.wait()
 
     def _forget(self, hub: Hub, known: Set[str]) -> None:
-        """Clear all values that the recording contains only after the current position."""
+        """Clear all values that first appear in the recording after the current position."""
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:
@@ -291,7 +291,7 @@ class PlaybackSession:
         """Do nothing, because a recording has no connections."""
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Do nothing, because a recording runs no sequence."""
+        """Do nothing, because a recording does not run sequences."""
 
     def latch(self, reason: str) -> None:
-        """Do nothing, because a recording moves no robot."""
+        """Do nothing, because a recording does not move a robot."""

@@ -1,6 +1,6 @@
-"""A reader of recordings, including incomplete files of killed processes.
+"""A reader of recordings, including incomplete files left by killed processes.
 
-Layer 4. The reader provides the recorded document, the time range, and the messages in order from
+Layer 4. The reader provides the recorded document, its time range, and its messages in order from
 any start time. Files of any length are processed in sections.
 """
 
@@ -22,8 +22,8 @@ from urc.runtime.recording.shapes import LOG, PROFILE
 __all__ = ["RecordedMessage", "Recording", "open_recording"]
 
 _RECORD_BYTES: Final = 64 * 1024 * 1024
-"""Maximum size of a record, also after decompression, in bytes; a longer record indicates a damaged
-file."""
+"""Maximum size of a record in bytes, before and after decompression; a longer record indicates a
+damaged file."""
 
 
 class RecordedMessage(NamedTuple):
@@ -45,9 +45,10 @@ class Recording(NamedTuple):
     """Time of the first message, in nanoseconds since 1970."""
     end_ns: int
     topics: Mapping[Any, str] = NOTHING
-    """Topic of each channel, by channel number, from the summary at the end of the file."""
+    """Topic of each channel, by channel number, as listed in the summary at the end of the file."""
     unread_bytes: int = 0
-    """Number of unreadable bytes at the end; -1 for a readable file that lacks its end records."""
+    """Number of unreadable bytes at the end; -1 if the file is readable but lacks its end
+    records."""
 
     @property
     def length_s(self) -> float:
@@ -55,14 +56,14 @@ class Recording(NamedTuple):
         return (self.end_ns - self.start_ns) / 1e9
 
     def messages(self, from_ns: int) -> Generator[RecordedMessage, None, None]:
-        """Yield the messages in order from a start time; stop at a damaged end of the file.
+        """Yield the messages in order from a start time; stop if the end of the file is damaged.
 
         An unreadable section in the middle of the file is reported as a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 
     def before(self, until_ns: int) -> list[RecordedMessage]:
-        """Return the state before a time: the last message of each signal and each transport."""
+        """Return the state before a time, as the last message of each signal and transport."""
         last: dict[str, RecordedMessage] = {}
         for message in _messages(self, 0, until_ns):
             if is_state(message.topic):

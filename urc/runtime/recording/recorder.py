@@ -1,11 +1,11 @@
-"""The recorder of one session, which writes an MCAP file.
+"""The recorder for one session, which writes an MCAP file.
 
 Layer 4. Theory of operation. `Recorder.put` queues events and returns immediately. `put` never
 waits for a disk, because motion uses the same event loop. A separate thread does all slow work:
 reading the document, creating the file, and writing. The thread flushes the file once a second, so
-a killed process loses at most that second and the end of the file. If the queue is full, new events
-are lost, and the file contains a count of the lost events. If the disk is full, the recording ends,
-and `fault` contains the reason.
+a killed process loses at most one second of events and the end of the file. If the queue is full,
+new events are lost, and the file contains a count of the lost events. If the disk is full, the
+recording ends, and `fault` contains the reason.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ from urc.runtime.widget_registry import widget_folder_of
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
 RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
-"""Callback with a recording's step, its file name, and the result as text."""
+"""Callback with the step of a recording, its file name, and the result as text."""
 _SUFFIX: Final = ".mcap"
 MOST_WAITING: Final = 50_000
 """Maximum number of queued events."""
@@ -44,8 +44,8 @@ _PIECE_BYTES: Final = 200
 _TRIES: Final = 1000
 """Maximum number of names to try for a new file."""
 _GATHER_S: Final = 0.05
-"""Time for which events are gathered on the event loop, in seconds; waking the thread for each
-event would be slower."""
+"""How long events are gathered on the event loop, in seconds; waking the thread for each event
+would be slower."""
 _CHUNK_BYTES: Final = 256 * 1024
 """Size of an MCAP chunk, in bytes; the library's default of 1 MiB would block the interpreter
 longer."""
@@ -95,7 +95,8 @@ class Recorder:
         self._is_folder = is_folder
         self._profile = profile
         self._document = document
-        # One offset for the whole file: a change of the system clock must not shift its times.
+        # The whole file has one offset, because a change of the system clock must not shift its
+        # times.
         offset_ns = time.time_ns() - time.monotonic_ns()
         self._shapes = RecordingEncoder(
             profile.driver, lambda time_s: offset_ns + round(time_s * _SECOND_NS)
@@ -127,7 +128,7 @@ class Recorder:
             self._wakes.notify()
 
     def close(self) -> None:
-        """Write the queued events and the end of the file, within ten seconds."""
+        """Write the queued events and the end of the file; take at most ten seconds."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify()
@@ -212,7 +213,7 @@ class Recorder:
                     raise UrcError(f"{self.file} was removed, or moved away")
 
     def _next(self) -> list[Tapped] | None:
-        """Return queued events; [] after a second without events; None at the end."""
+        """Return the queued events; [] after a second without events; None at the end."""
         with self._wakes:
             self._wakes.wait_for(lambda: self._waiting or self._is_closing, _WHOLE_S)
             batch = list(self._waiting)
@@ -293,9 +294,9 @@ async def recorded(
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
-        on_step: callback for the creation of the file, and for its end.
-        document: the whole profile as one document; "" for no document; None to read the profile's
-        file.
+        on_step: callback for when the file is created, and for when it ends.
+        document: the whole profile as one document; "" means no document, and None means to read
+            the profile's file.
     """
     recorder = Recorder(place, profile, is_folder=is_folder, document=document)
     steps = _Steps(recorder, on_step)
@@ -318,13 +319,13 @@ class _Steps:
         self._is_told = False
 
     def look(self) -> None:
-        """Report the creation of the file once."""
+        """Report once that the file was created."""
         if self._on_step is not None and self._recorder.is_begun and not self._is_told:
             self._is_told = True
             self._on_step("started", self._recorder.file.name, "")
 
     def ended(self) -> None:
-        """Report the end of the file, or the reason for a missing file."""
+        """Report the end of the file, or the reason why there is no file."""
         self.look()
         recorder = self._recorder
         if self._on_step is not None and (recorder.is_begun or recorder.fault):

@@ -206,7 +206,7 @@ class RecordingEncoder:
         return COMMANDS + command, time_ns, _json(arguments)
 
     def _ended(self, entry: AuditEntry, time_ns: int) -> list[tuple[str, int, bytes]]:
-        """Return the message that ends a motion; without it, the motion would seem to continue."""
+        """Return the message that ends a motion, which would otherwise seem to continue."""
         command = self._commands.get(entry.command)
         if entry.what != "stopped" or command is None or command.hold is None:
             return []
@@ -217,9 +217,9 @@ class RecordingEncoder:
         return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
-        """Return `time_s` or the last used time, whichever is later; recorded times never decrease.
+        """Return the later of `time_s` and the last used time, so that times never decrease.
 
-        A reading's time is the arrival of its first byte; the time of traffic is its arrival.
+        A reading's time is when its first byte arrived; the time of traffic is when it arrived.
         """
         time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
         self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)
@@ -262,7 +262,7 @@ def _json(told: Mapping[str, object]) -> bytes:
 
 
 def _mended(value: Any) -> Any:
-    """Return `value` with replacements for all parts that JSON cannot represent."""
+    """Return `value`, with all parts that JSON cannot represent replaced."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode()
     if isinstance(value, float):

@@ -73,8 +73,8 @@ class ServerContext(NamedTuple):
     """Function that returns the current world image for the given topic names; None without an
     image."""
     last_peer: LastPeer | None = None
-    """Host that last sent data, shared by all servers of the robot; None means that the host is not
-    recorded."""
+    """Host that last sent data, shared by all of the robot's servers; None means that the host is
+    not recorded."""
     carried: Mapping[tuple[str, int], Endpoint] = MappingProxyType({})
     """Targets that clients can reach through this server. The keys are hosts and ports in the
     driver, and the values are endpoints of the emulated robot."""
@@ -147,7 +147,7 @@ def cannot_listen(context: ServerContext, port: int, fault: OSError, kind: str =
 
 
 def reason(fault: OSError) -> str:
-    """Return the system's error text without the address that asyncio repeats."""
+    """Return the system's error text, without the address that asyncio repeats."""
     if isinstance(fault, socket.gaierror) or not fault.errno:
         return str(fault.strerror or fault).lower()
     return os.strerror(fault.errno).lower()

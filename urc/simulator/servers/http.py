@@ -1,8 +1,8 @@
-"""An emulated robot behind a web server: requests, and streams of pictures, events and lines.
+"""An emulated robot behind a web server, with requests and streams of pictures, events and lines.
 
 Requests are passed to the robot's rules as envelopes. Each of the driver's subscriptions is a
 stream at the topic's path. Streams contain the robot's messages or, for a camera, images of its
-world. Without a world, each image is filled with one slowly changing colour.
+world. If there is no world, each image is filled with one colour, which changes slowly.
 """
 
 import asyncio
@@ -89,7 +89,7 @@ class HttpRequest(NamedTuple):
     target: str
     """The request target as received."""
     path: str
-    """Decoded path relative to the driver's URL, without the query."""
+    """Decoded path, relative to the driver's URL and without the query."""
     headers: Mapping[str, str]
     body: bytes
 
@@ -225,7 +225,7 @@ class _HttpConversation:
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
     def _kind(self, asked: HttpRequest) -> str:
-        """Return the stream type of the subscription to this path; "" without a subscription."""
+        """Return the stream type of the subscription to this path, or "" if none exists."""
         if asked.method != "GET":
             return ""
         ways = self._context.topics.items()
@@ -235,7 +235,7 @@ class _HttpConversation:
         return str(kinds[0]) if kinds else ""
 
     def _picture(self, asked: HttpRequest) -> bytes:
-        """Return the camera image of the robot's world; without a world, a single-colour image."""
+        """Return the camera image of the robot's world, or a plain image if there is no world."""
         context, target = self._context, asked.target.removeprefix(self._base)
         seen = context.picture((asked.path, target))
         return picture(context.now()) if seen is None else seen

@@ -22,7 +22,7 @@ class HttpAuth:
         self._nonce = secrets.token_hex(16)
 
     def challenge(self, method: str, target: str, given: str) -> str | None:
-        """Return the challenge for a request with invalid credentials; None for valid credentials.
+        """Return the challenge for a request with invalid credentials; None if they are valid.
 
         Args:
             method: method of the request.

@@ -23,8 +23,8 @@ OPEN_S = 5.0
 AGAIN_S = 1.0
 """Delay before reconnecting to the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options that apply only to the driver's connection to the broker. If they shared a client
-identifier, the emulated robot and the driver would disconnect each other."""
+"""Options that apply only to the driver's connection to the broker. The emulated robot and the
+driver would disconnect each other if they shared a client identifier."""
 
 log = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ _ENDS = {True: 4, False: 6}
 """Status codes of action results: succeeded or aborted."""
 
 EARLY = 0.1
-"""Fraction of the throttle interval by which a message may be early. A robot often sends at exactly
+"""Fraction of the throttle interval by which a message may be early. Robots often send at exactly
 the throttle interval. Without this tolerance, delays on this machine would cause every other
 message to be dropped."""
 
@@ -46,7 +46,7 @@ class Bridge:
     """The state shared by all clients of one bridge."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Initialise the bridge with the types of the robot's topics by name; "" if unknown."""
+        """Create the bridge with the type of each of the robot's topics, by name; "" if unknown."""
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
@@ -235,7 +235,7 @@ class BridgeClient:
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Send a message to all subscribers and to the robot; drop messages of unknown type."""
+        """Send a message to all subscribers and to the robot; drop it if its type is unknown."""
         topic, message = _text(operation, "topic"), operation.get("msg")
         if topic not in self._bridge.types or not isinstance(message, dict):
             return None

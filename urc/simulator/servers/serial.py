@@ -1,8 +1,8 @@
 """An emulated robot behind a pseudo-terminal, which programs can open like a serial port.
 
 The system chooses the name of the pseudo-terminal. If the profile's port is a nonexistent path
-outside ``/dev``, the server creates a symbolic link at that path. With the symbolic link, the
-profile works without changes. For ``socket://HOST:PORT``, the server listens on a TCP port.
+outside ``/dev``, the server creates a symbolic link at that path. The profile then works without
+changes. For ``socket://HOST:PORT``, the server listens on a TCP port.
 """
 
 import asyncio
@@ -112,7 +112,7 @@ class _PtyServer:
             await gone.wait()
 
     def _read(self) -> bytes | None:
-        """Return the received bytes; None while no program has opened the port."""
+        """Return the received bytes; None while no program has the port open."""
         try:
             return os.read(self._wire, READ_BYTES)
         except BlockingIOError:

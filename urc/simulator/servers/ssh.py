@@ -1,7 +1,7 @@
 """An emulated robot behind an SSH server.
 
 The server connects the client's shell, or the driver's command, to the emulated robot. Forwarded
-connections can reach only the other transports of the same robot.
+connections can reach only other transports of the same robot.
 """
 
 import asyncio
@@ -107,7 +107,7 @@ class _Lock:
         self._key: asyncssh.SSHKey | None = None
         self._takes_any_key = options.get("agent") is True
         if context.is_anywhere:
-            # The emulated robot does not need the key of the real one.
+            # The emulated robot does not need the real robot's key.
             self.password = secrets.token_urlsafe(16)
             self.options = {"password": self.password, "key": None, "agent": False}
         elif key := str(options.get("key") or ""):
@@ -230,7 +230,7 @@ def _own_key() -> asyncssh.SSHKey:
         return asyncssh.read_private_key(file)
     except (OSError, asyncssh.KeyImportError):
         key = asyncssh.generate_private_key("ssh-ed25519")
-    with suppress(OSError):  # without a file the next start makes another one
+    with suppress(OSError):  # without a file, the next start creates another key
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         _write(file, key.export_private_key("openssh"))
     return key

@@ -1,4 +1,4 @@
-"""An emulated robot as a TCP server, or as a TCP client of the driver (``mode: listen``)."""
+"""An emulated robot that is a TCP server, or a TCP client of the driver (``mode: listen``)."""
 
 import asyncio
 import socket

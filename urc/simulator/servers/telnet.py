@@ -1,4 +1,4 @@
-"""An emulated robot behind a Telnet server, with negotiation and echo."""
+"""An emulated robot behind a Telnet server that supports negotiation and echo."""
 
 import asyncio
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """An emulated robot behind a UDP port.
 
 Clients are identified by the source address of their datagrams. If the driver listens on a port
-(``listen``), the robot sends to this port from the start. Unsolicited datagrams are sent to the
+(``listen``), the robot sends to that port from the start. Unsolicited datagrams are sent to the
 local machine until another host sends a datagram to the robot.
 """
 
@@ -23,7 +23,8 @@ from urc.simulator.servers.clients import ClientConnection, Clients, converse
 __all__ = ["UdpServer"]
 
 FORGOTTEN_S = 300.0
-"""Timeout in seconds for silent clients, except for the port on which the driver listens."""
+"""Timeout for silent clients in seconds; it does not apply to the port on which the driver
+listens."""
 _WAITING = 256
 """Maximum number of queued datagrams per client; further datagrams are dropped."""
 

@@ -27,7 +27,7 @@ class MessageServer(ListeningServer):
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await self._serve(host, port)
-        # `Clients` closes the connections, without a closing handshake each.
+        # `Clients` closes the connections without a closing handshake for each.
         refuse = partial(server.close, close_connections=False)
         return Listener(next(iter(server.sockets)).getsockname(), refuse, server.wait_closed)
 
@@ -38,7 +38,7 @@ class MessageServer(ListeningServer):
 
     @abstractmethod
     async def _serve(self, host: str, port: int) -> Server:
-        """Start listening, with the limits of the server class."""
+        """Start listening with the limits of the server class."""
 
     @abstractmethod
     def _talk(

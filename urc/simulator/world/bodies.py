@@ -1,7 +1,7 @@
 """Motion models: one simulation step for each kind of body.
 
 Pure. Units are metres, seconds and radians. The axes are x forward, y left and z up (REP 103).
-Wheeled bodies follow exact arcs, so that constant inputs produce the same path at any step length.
+Wheeled bodies follow exact arcs, so constant inputs produce the same path for any step length.
 """
 
 import math
@@ -17,7 +17,7 @@ GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
 """Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""Lean of a sprung body per acceleration, in radians per m/s²."""
+"""How far a sprung body leans for a given acceleration, in radians per m/s²."""
 
 Inputs = Mapping[str, float]
 
@@ -78,7 +78,7 @@ def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
 
 
 def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the joint angles from head to tail: a travelling wave added to a bend."""
+    """Return the joint angles from head to tail: the sum of a travelling wave and a bend."""
     return tuple(
         motion.drive * body.amplitude * math.sin(2 * math.pi * (motion.phase - place / body.joints))
         + motion.bend * body.amplitude / 3
@@ -87,7 +87,7 @@ def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the leg angles from -pi to pi. Adjacent legs have opposite phases, as in a trot."""
+    """Return the leg angles from -pi to pi. Adjacent legs move in opposite phase, as in a trot."""
     turns = (motion.phase + (place % 3 != 0) / 2 for place in range(body.legs))
     return tuple(2 * math.pi * ((one + 0.5) % 1.0 - 0.5) for one in turns)
 

@@ -1,4 +1,4 @@
-"""Reproducible noise: a random number for a seed, a time step and a name.
+"""Reproducible noise: a random number for each seed, time step and name.
 
 Pure. The generator has no state, so the order of sensor readings does not matter.
 """

@@ -18,7 +18,7 @@ _HEIGHT_M = 0.15
 
 
 def sweep(faces: EdgeArrays, moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.laser``. Rays without an echo have the range None."""
+    """Return ``world.laser``. A ray without an echo has the range None."""
     spec, motion = moment.spec.laser, moment.motion
     step = (spec.last - spec.first) / spec.rays
     angles = motion.yaw + spec.first + step * np.arange(spec.rays, dtype=np.float64)

@@ -24,7 +24,7 @@ _BINS: Final = 1440
 """Number of directions around the camera."""
 _LAYERS: Final = 4
 """Maximum number of edges drawn per direction. Several edges may be visible in one direction,
-because a low box hides only the foot of a wall."""
+because a low box hides only the bottom of a wall."""
 _SKY: Final = ((150, 184, 222), (226, 233, 240))
 """Colours of the sky, at the top and at the horizon."""
 _GROUNDS: Final = {
@@ -33,7 +33,7 @@ _GROUNDS: Final = {
     "water": ((70, 122, 150), (62, 112, 142)),
 }
 _FAR_M: Final = 25.0
-"""Distance in metres at which a colour is an equal blend of its own colour and the horizon."""
+"""Distance in metres at which a colour is blended equally with the colour of the horizon."""
 _QUALITY: Final = 80
 
 
@@ -102,7 +102,7 @@ def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False
 
 @lru_cache(maxsize=8)
 def _straight(columns: int, rows: int, view: float) -> Array:
-    """Return the direction of each pixel for a level camera, as forward, left and up components."""
+    """Return each pixel's direction for a level camera, as forward, left and up components."""
     focus = columns / 2 / math.tan(view / 2)
     left = (columns / 2 - 0.5 - np.arange(columns, dtype=np.float32)) / focus
     up = (rows / 2 - 0.5 - np.arange(rows, dtype=np.float32)) / focus

@@ -29,11 +29,11 @@ _GROUNDS: Final = {
 }
 _HOLE: Final = (40, 38, 36)
 _FAR_M: Final = 25.0
-"""Distance in metres at which a colour is an equal blend of its own colour and the horizon."""
+"""Distance in metres at which a colour is blended equally with the colour of the horizon."""
 _TILES_M: Final = 30.0
 """Distance in metres beyond which the ground tiles are smaller than a pixel."""
 STRIDE: Final = 2
-"""Number of neighbouring columns that show the same ray; a ray for each column would take too
+"""Number of neighbouring columns that share one ray; a separate ray for each column would take too
 long."""
 _SHADES: Final = 4096
 """Number of slopes in a table of colours."""
@@ -74,7 +74,7 @@ class _Column(NamedTuple):
     """The parts of one image column that do not depend on the pose."""
 
     turn: float
-    """Direction of the column, in radians to the left of the forward direction."""
+    """Direction of the column, in radians left of the forward direction."""
     scale: float
     """Slope of the ray per pixel from the horizon."""
     even: Channels
@@ -84,7 +84,7 @@ class _Column(NamedTuple):
 
 
 def sweep(plan: WorldMap, moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.laser``. Rays without an echo have the range None."""
+    """Return ``world.laser``. A ray without an echo has the range None."""
     spec, motion = moment.spec.laser, moment.motion
     step = (spec.last - spec.first) / spec.rays
     first = motion.yaw + spec.first
@@ -186,7 +186,7 @@ def _hits(edges: Sequence[_Relative], cosine: float, sine: float) -> Iterator[_H
 
 
 def _is_ahead(edge: Edge, pose: LevelPose) -> bool:
-    """Return whether a part of an edge may be in front of the camera."""
+    """Return whether any part of an edge may be in front of the camera."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     ends = ((edge.x1, edge.y1), (edge.x2, edge.y2))
     return any((x - pose.x) * cosine + (y - pose.y) * sine > 0 for x, y in ends)
@@ -236,7 +236,7 @@ def _blend(one: Colour, other: Colour, share: float) -> Colour:
 
 
 def _row(column: _Column, height: int, slope: float) -> int:
-    """Return the first row of the image whose ray is not above `slope`."""
+    """Return the image's first row whose ray is not above `slope`."""
     return min(height, max(0, math.ceil(height / 2 - 0.5 - slope / column.scale)))
 
 

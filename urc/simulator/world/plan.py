@@ -14,7 +14,7 @@ __all__ = ["ROOM", "Edge", "WorldMap", "Contact"]
 
 
 class Edge(NamedTuple):
-    """A vertical face of an obstacle, from the ground up."""
+    """A vertical face of an obstacle, which begins at the ground."""
 
     x1: float
     y1: float
@@ -53,7 +53,8 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The default room, 10 by 7 m. The room contains boxes, four coloured posts and stairs down. A wall
+"""The default room, 10 by 7 m. The room contains boxes, four coloured posts and descending stairs.
+A wall
 with a door divides it into two halves."""
 
 
@@ -70,7 +71,7 @@ class WorldMap:
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Minimum x and y, and maximum x and y of all obstacles, in metres.
+        """Minimum x and y and maximum x and y of all obstacles, in metres.
 
         Without obstacles, the bounds are a square with sides of 10 m.
         """

@@ -55,7 +55,7 @@ def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Number
 
 
 def first_hits(faces: EdgeArrays, x: float, y: float, z: float, angles: Numbers) -> Numbers:
-    """Return the range of each ray at height `z` in metres, or ``inf`` without an intersection."""
+    """Return each ray's range at height `z` in metres, or ``inf`` if there is no intersection."""
     if not len(faces.height):
         return np.full(len(angles), np.inf)
     distance, _ = cast(faces, x, y, angles)

@@ -22,14 +22,14 @@ _SQUARE_OF_ECCENTRICITY: Final = 0.00669437999014
 _EMPTY: Final = 5.0
 """Battery level at which the simulation replaces the battery, in per cent."""
 _CHANGED_AFTER_S: Final = 30.0
-"""Standstill time before the battery is replaced, in seconds. A demo must not end with an empty
-battery."""
+"""How long the robot must stand still before the battery is replaced, in seconds. The battery is
+replaced so that a demo does not end with an empty battery."""
 _REACH_M: Final = 0.06
 """Distance from the robot's edge to the cliff sensors, in metres."""
 
 
 class SensorInput(NamedTuple):
-    """The inputs of all sensors."""
+    """The inputs from which all sensors compute their readings."""
 
     spec: WorldSpec
     plan: WorldMap
@@ -221,7 +221,7 @@ def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """The battery; its level is at least 0. If empty, it is replaced after a standstill."""
+    """The battery, which never falls below 0 %. An empty battery is replaced after a standstill."""
 
     def __init__(self, spec: WorldSpec) -> None:
         """Initialise the battery with the declared level."""
@@ -231,7 +231,7 @@ class Battery:
         self.current = spec.battery.idle
         """Current drawn from the battery, in A."""
         self._stands_s = 0.0
-        """Time spent at standstill with an empty battery, in seconds."""
+        """How long the robot has stood still with an empty battery, in seconds."""
 
     @property
     def level(self) -> float:
@@ -252,7 +252,7 @@ class Battery:
         self.charge = min(self.charge, self._spec.capacity * level / 100)
 
     def readings(self) -> Mapping[str, object]:
-        """Return ``world.battery``, with a positive current when discharging."""
+        """Return ``world.battery``; the current is positive while the battery discharges."""
         spec, share = self._spec, self.level / 100
         sag = 0.02 * (spec.full - spec.empty) * self.current / max(spec.idle + spec.drive, 1e-6)
         voltage = spec.empty + (spec.full - spec.empty) * share - sag

@@ -85,7 +85,7 @@ def top_picture(
 
 
 def _draw_grid(draw: ImageDraw.ImageDraw, place: _Map, motion: Motion) -> None:
-    """Draw grid lines every metre, so that motion is visible in open space."""
+    """Draw a grid line every metre, so that motion is visible in open space."""
     reach = math.ceil(max(place.size) / place.scale)
     for step in range(-reach, reach + 1):
         x, y = math.floor(motion.x) + step, math.floor(motion.y) + step
@@ -120,7 +120,7 @@ def _dot(draw: ImageDraw.ImageDraw, at: Point, radius: float, colour: str) -> No
 
 
 def _spine(body: BodySpec, motion: Motion) -> list[Point]:
-    """Return the points of a jointed body, from head to tail."""
+    """Return the points along a jointed body, from head to tail."""
     length = 3 * body.radius / max(1, body.joints) * 2
     x, y = motion.x, motion.y
     angle = motion.yaw + math.pi

@@ -1,6 +1,6 @@
-"""The world of an emulated robot: a body with inputs, and sensors.
+"""The world of an emulated robot: a body with inputs and sensors.
 
-The module uses no clock and no sockets. Time is an argument, and the world advances in steps of
+The module does not use clocks or sockets. Time is an argument, and the world advances in steps of
 `STEP_S`. Identical commands at identical times produce the same world, however often the world is
 observed.
 """
@@ -33,7 +33,7 @@ __all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 STEP_S: Final = 0.02
 """Length of a simulation step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Maximum simulated time between two observations, in seconds. The remainder of a longer gap is not
+"""Maximum simulated time between two observations, in seconds. The rest of a longer gap is not
 simulated."""
 _ASKED_EVERY_S: Final = 0.1
 """Interval at which time-dependent inputs are evaluated during a long gap, in seconds."""
@@ -91,7 +91,7 @@ class World:
         self.missing = _RENDERED - drawn
         """Names of `READINGS` that require a missing package."""
         self.dropped = set(self.missing)
-        """Names of failed `READINGS`. Failed readings have no value."""
+        """Names of failed `READINGS`, which have no value."""
         self._inputs = inputs
         self._holds = holds
         self._is_busy = False

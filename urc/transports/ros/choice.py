@@ -1,10 +1,10 @@
-"""The kinds of ROS bridges, and the automatic choice of one kind.
+"""The kinds of ROS bridges, and the automatic choice between them.
 
 A WebSocket client offers subprotocols, and the server selects one. A server of the Foxglove
 protocol requires one of its own subprotocols. A rosbridge server selects no subprotocol. With
-``via: auto``, the transport therefore offers the subprotocols of Foxglove, and follows the
-selection of the server. If no port is given, the transport tries the usual ports of both kinds,
-beginning with the port that worked last.
+``via: auto``, the transport therefore offers the subprotocols of Foxglove, and follows the server's
+selection. If no port is given, the transport tries the usual ports of both kinds, beginning with
+the port that worked last.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ PORTS: Final[Mapping[str, tuple[int, ...]]] = {
     "foxglove": (FOXGLOVE_PORT,),
     "auto": (FOXGLOVE_PORT, rosbridge.DEFAULT_PORT),
 }
-"""Usual ports by kind of bridge, in the order of attempts."""
+"""Usual ports for each kind of bridge, in the order in which they are tried."""
 _WEBSOCKET: Final = ("auth", "headers")
 """Options that are passed to the WebSocket transport."""
 
@@ -68,7 +68,7 @@ class Candidate:
 
 
 class AnyBridgeTransport:
-    """A transport to the first bridge that answers; may be opened several times."""
+    """A transport to the first bridge that answers, which may be opened several times."""
 
     def __init__(self, candidates: list[Candidate], where: str) -> None:
         """Initialise without connecting; `where` is the target as display text."""
@@ -78,7 +78,7 @@ class AnyBridgeTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``ros 192.168.1.5``."""
+        """The transport's target as display text, such as ``ros 192.168.1.5``."""
         return self._bridge.address if self._bridge is not None else f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -126,7 +126,7 @@ class AnyBridgeTransport:
         await self._open_bridge().probe()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         return 0 if self._bridge is None else self._bridge.unsent()
 
     def _open_bridge(self) -> _Bridge:
@@ -136,7 +136,7 @@ class AnyBridgeTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a ROS transport for the options of a document.
+    """Return a ROS transport for a document's options.
 
     See docs/transports/rosbridge.md and docs/transports/foxglove.md.
 

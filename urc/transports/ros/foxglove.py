@@ -1,9 +1,9 @@
 """A transport for ROS robots behind a server of the Foxglove protocol, such as foxglove_bridge.
 
-Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings.
-`FoxgloveSession` implements the protocol. Its objects are discarded with the connection, so no data
-can be sent late. A task reads continuously, even if messages are consumed slowly, because the
-bridge drops the oldest data of a slow client. Channels can appear and disappear. Changes are
+Theory of operation. Each connection is one WebSocket, opened by URC's WebSocket transport, with
+pings. `FoxgloveSession` implements the protocol. Its objects are discarded with the connection, so
+no data can be sent late. A task reads continuously, even if messages are consumed slowly, because
+the bridge drops the oldest data of a slow client. Channels can appear and disappear. Changes are
 collected for `_SETTLE_S`, because a broken robot may announce thousands of channels per second.
 
 A bridge creates a ROS publisher when the client announces a topic, and ROS connects publishers and
@@ -37,7 +37,7 @@ _TURN_S: Final = 0.005
 
 
 class FoxgloveTransport:
-    """A transport to one server of the Foxglove protocol; may be opened several times."""
+    """A transport to one server of the Foxglove protocol, which may be opened several times."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class FoxgloveTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``ros 192.168.1.5:8765``."""
+        """The transport's target as display text, such as ``ros 192.168.1.5:8765``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -171,7 +171,7 @@ class FoxgloveTransport:
         await self._wire.probe()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         return self._wire.unsent()
 
     # -- the reader

@@ -46,7 +46,7 @@ class MessageData(NamedTuple):
 
 
 class TimeTold(NamedTuple):
-    """The robot's time, for example simulation time."""
+    """The robot's time, which may be simulation time."""
 
     time_ns: int
 
@@ -60,7 +60,7 @@ class ServiceReply(NamedTuple):
 
 
 class AdvertisedChannel(NamedTuple):
-    """A topic of the robot, with the definition of its type."""
+    """One of the robot's topics, with its type's definition."""
 
     id: int
     topic: str
@@ -87,7 +87,7 @@ class FrameReader:
         self._operations = OperationReader()
 
     def read(self, frame: bytes) -> dict[str, Any] | MessageData | TimeTold | ServiceReply | None:
-        """Return the content of a frame; None for an unknown kind.
+        """Return a frame's content; None for an unknown kind.
 
         Raises:
             BadOperation: the frame is invalid.
@@ -128,7 +128,7 @@ def channel_of(said: Mapping[str, Any]) -> AdvertisedChannel:
 def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceType:
     """Return an announced service; raise `BadOperation` for an invalid service.
 
-    Older servers send only ``requestSchema`` and ``responseSchema``, in the encoding of the server.
+    Older servers send only ``requestSchema`` and ``responseSchema``, in the server's encoding.
     """
     number, name, kind = _number(said), said.get("name"), _text(said, "type")
     if number is None or not isinstance(name, str):
@@ -151,12 +151,12 @@ def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceTy
 
 
 def publish_frame(channel: int, data: bytes) -> bytes:
-    """Return the frame of a message on one of the client's channels."""
+    """Return the frame for a message on one of the client's channels."""
     return struct.pack("<BI", 1, channel) + data
 
 
 def call_frame(service: int, call: int, encoding: str, data: bytes) -> bytes:
-    """Return the frame of a service call."""
+    """Return the frame for a service call."""
     name = encoding.encode()
     return struct.pack("<BIII", 2, service, call, len(name)) + name + data
 

@@ -52,20 +52,20 @@ MAX_PENDING: Final = 256
 KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
-"""Maximum number of different status messages of the robot that are reported."""
+"""Maximum number of different status messages from the robot that are reported."""
 MAX_RETRIES: Final = 5
-"""Maximum number of retries of a refused subscription."""
+"""Maximum number of retries after a subscription was refused."""
 _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
 _ENCODINGS: Final = ("cdr", "ros1", "json")
 PARAMETER: Final = "parameter:"
-"""Prefix of a topic that stands for a parameter, such as ``parameter:/driver.rate``."""
+"""Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 
 log = logging.getLogger(__name__)
 
 
 class TopicWish(NamedTuple):
-    """A topic of the driver."""
+    """A topic that the driver uses."""
 
     topic: str
     type: str = ""
@@ -86,7 +86,7 @@ class _Subscription:
 
 
 class FoxgloveSession:
-    """The protocol of one connection."""
+    """The protocol state of one connection."""
 
     def __init__(
         self,
@@ -98,11 +98,11 @@ class FoxgloveSession:
         clock: Callable[[], float],
         published: dict[tuple[str, str], str],
     ) -> None:
-        """Initialise the state of a new connection.
+        """Initialise the state for a new connection.
 
         Args:
             queue: queue for messages and replies.
-            wishes: topics of the driver, without duplicates.
+            wishes: the driver's topics, without duplicates.
             graph: checks of topics.
             call_at: function that calls a function at a given time of `clock`.
             clock: monotonic clock, in seconds.
@@ -138,7 +138,7 @@ class FoxgloveSession:
         self.has_graph = False
 
     def written(self) -> list[tuple[bytes, bool]]:
-        """Remove and return the frames to send, each with a flag for text."""
+        """Remove and return the frames to send, each with a flag that marks text."""
         frames, self._frames = self._frames, []
         return frames
 
@@ -218,7 +218,7 @@ class FoxgloveSession:
                 self._channels.pop(number, None)
 
     def reconcile(self) -> None:
-        """Subscribe to the driver's topics after a change of the channels."""
+        """Subscribe to the driver's topics after the channels have changed."""
         found: dict[str, AdvertisedChannel] = {}
         for channel in self._channels.values():
             if channel.topic in self._wishes and channel.encoding in _ENCODINGS:
@@ -253,7 +253,7 @@ class FoxgloveSession:
         self.queue.answer(envelope, len(channel.schema))
 
     def check_topics(self) -> None:
-        """Report topics of the driver without publishers, or with another type."""
+        """Report driver topics that have no publishers or another type."""
         self._graph.learn({one.topic: one.type for one in self._channels.values()})
         names = {topic for topic in self._wishes if not topic.startswith(PARAMETER)}
         self._graph.subscribed({topic: self._wishes[topic].type for topic in names})
@@ -360,7 +360,7 @@ class FoxgloveSession:
             self._forget_refused({int(number) for number in _NUMBERS.findall(text[:_SHOWN])})
 
     def _forget_refused(self, channels: set[int]) -> None:
-        """Forget the subscriptions of refused channels, so that `reconcile` subscribes again.
+        """Forget the subscriptions to refused channels, so that `reconcile` subscribes again.
 
         The Foxglove SDK's server announces a channel before it accepts subscriptions, so it refuses
         a client that subscribes immediately. The refusal is a text that contains the channel
@@ -512,7 +512,7 @@ def _named(one: Mapping[str, Any]) -> bool:
 
 
 def _of_text(value: object) -> object:
-    """Return the value of a parameter, which rosapi passes as JSON text."""
+    """Return a parameter's value, which rosapi passes as JSON text."""
     if not isinstance(value, str):
         return value
     try:

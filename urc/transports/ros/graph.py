@@ -1,4 +1,4 @@
-"""Checks of topics against the graph of a ROS system.
+"""Checks of topics against a ROS system's graph.
 
 A ROS connection reports no error for a topic that does not exist, has a different type, or has no
 subscribers. A connection with access to the graph, such as rosapi, passes the topics to a
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Maximum number of remembered reports; after this number, further mistakes are not reported."""
+"""Maximum number of remembered reports; beyond this number, further mistakes are not reported."""
 
 
 class TopicGraph:
@@ -48,7 +48,7 @@ class TopicGraph:
                 self._compare(topic, kind, "carries")
 
     def publishes(self, topic: str, kind: str) -> bool:
-        """Check the type of a published topic; return whether to query the topic's subscribers."""
+        """Check a published topic's type; return whether to query the topic's subscribers."""
         if topic in self._looked:
             return False
         self._looked.add(topic)

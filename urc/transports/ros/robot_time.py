@@ -1,7 +1,7 @@
-"""The clock of a robot, estimated from the times in its messages. No I/O.
+"""A robot's clock, estimated from the times in its messages. No I/O.
 
-The clock of a robot may differ from the clock of this machine, and a simulation's clock may be
-paused. Messages are delayed, so the largest difference in the last seconds is the best estimate.
+A robot's clock may differ from this machine's clock, and a simulation's clock may be paused.
+Messages arrive with a delay, so the largest difference in the last seconds is the best estimate.
 """
 
 import struct
@@ -15,14 +15,14 @@ _KEPT_NS: Final = 2_000_000_000
 
 
 class RobotTime:
-    """An estimate of the robot's time; without messages, the time of this machine."""
+    """An estimate of the robot's time; without messages, this machine's time."""
 
     def __init__(self) -> None:
         self._difference_ns = 0
         self._taken_ns: int | None = None
 
     def told(self, robot_ns: int, here_ns: int) -> None:
-        """Record a robot time that arrived at the time `here_ns` of this machine."""
+        """Record a robot time that arrived when this machine's time was `here_ns`."""
         difference = robot_ns - here_ns
         is_old = self._taken_ns is None or here_ns - self._taken_ns > _KEPT_NS
         if is_old or difference >= self._difference_ns:
@@ -33,7 +33,7 @@ class RobotTime:
         return divmod(max(here_ns + self._difference_ns, 0), 1_000_000_000)
 
     def stamped(self, data: bytes, offsets: Iterable[int], here_ns: int) -> bytes:
-        """Return a message with the robot's time at each offset."""
+        """Return a message in which the robot's time is written at each offset."""
         out, (seconds, nanos) = bytearray(data), self.now(here_ns)
         for offset in offsets:
             struct.pack_into("<II", out, offset, seconds & 0x7FFFFFFF, nanos)

@@ -1,10 +1,10 @@
 """A transport for ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
 
-Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
-protocol over the WebSocket is implemented by roslibpy (`urc.transports.ros.rosbridge_client`). The
-objects of roslibpy are discarded with the connection, so no data can be sent late. A task reads
-continuously, even if messages are consumed slowly, because one stalled reader would freeze the
-topic for every client of the bridge.
+Theory of operation. Each connection is one WebSocket, opened by URC's WebSocket transport, with
+pings. The protocol over the WebSocket is implemented by roslibpy
+(`urc.transports.ros.rosbridge_client`). The objects of roslibpy are discarded with the connection,
+so no data can be sent late. A task reads continuously, even if messages are consumed slowly,
+because one stalled reader would freeze the topic for every client of the bridge.
 
 A bridge delivers the first message of a topic only after its publisher has connected to the
 subscribers. If the client disconnects earlier, the message is dropped. Clients therefore call
@@ -13,9 +13,9 @@ rosapi also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
 all result in missing messages. The transport therefore requests the list of topics from rosapi at
-the start, and a topic's subscribers at the topic's first message. `urc.transports.ros.graph`
-reports mistakes. With ``version: auto``, subscriptions wait for the list of topics, which
-determines the form of type names.
+the start, and a topic's subscribers when the topic's first message is published.
+`urc.transports.ros.graph` reports mistakes. With ``version: auto``, subscriptions wait for the list
+of topics, which determines the form of type names.
 """
 
 import asyncio
@@ -47,7 +47,7 @@ AUTO: Final = "auto"
 _ANSWER_S = 3.0
 """Maximum wait for a reply from rosapi, in seconds; afterwards, rosapi counts as missing."""
 _PART = 0.5
-"""Maximum fraction of the connection timeout that is spent on that wait."""
+"""Maximum fraction of the connection timeout that may be spent waiting for rosapi's reply."""
 _CONNECTS_S = 1.0
 """Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 
 class RosbridgeTransport:
-    """A transport to one rosbridge server; may be opened several times."""
+    """A transport to one rosbridge server, which may be opened several times."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class RosbridgeTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as display text, such as ``ros 192.168.1.5:9090``."""
+        """The transport's target as display text, such as ``ros 192.168.1.5:9090``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -155,7 +155,7 @@ class RosbridgeTransport:
         await self._wire.probe()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been acknowledged."""
+        """Return the number of unacknowledged bytes."""
         return self._wire.unsent()
 
     async def abort(self) -> None:
@@ -173,7 +173,7 @@ class RosbridgeTransport:
 
 
 def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
-    """Return a subscription with the options of a document.
+    """Return a subscription with a document's options.
 
     Raises:
         TransportError: an option is invalid.
@@ -200,7 +200,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
 
 def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic, because a second would cancel the first one's throttle."""
+    """Return one subscription per topic; a second one would cancel the first one's throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -280,7 +280,7 @@ class _Session:
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
 
     async def _is_heard(self, topic: str) -> bool:
-        """Wait until the publisher of a topic is connected; return False without subscribers."""
+        """Wait until a topic's publisher is connected; return False if there are no subscribers."""
         clock = asyncio.get_running_loop().time
         subscribers = await self._subscribers(topic)
         ends_s = clock() + _CONNECTS_S

@@ -1,12 +1,12 @@
 """The roslibpy protocol of a rosbridge connection, without roslibpy's network connection.
 
-roslibpy implements the rosbridge operations, their ids, and pending requests. The network
-connections of roslibpy are not used. After a reconnection, roslibpy would send old messages again;
-roslibpy also fails on binary frames, and never probes the other side. Measurements of roslibpy's
-network connections are in docs/decisions. In this module, roslibpy's protocol writes frames into a
-list, and the transport sends these frames over URC's socket. The transport passes received data to
-the protocol. Each object serves only one connection, so no state is carried over to the next
-connection.
+roslibpy implements the rosbridge operations, their ids, and the handling of pending requests. The
+network connections of roslibpy are not used. After a reconnection, roslibpy would send old messages
+again. It also fails on binary frames, and never probes the other side. Measurements of roslibpy's
+network connections are recorded in docs/decisions. In this module, roslibpy's protocol writes
+frames into a list, and the transport sends these frames over URC's socket. The transport passes
+received data to the protocol. Each object serves only one connection, so no state is carried over
+to the next connection.
 
 The client does no I/O, and uses no task or thread.
 """
@@ -66,7 +66,7 @@ class RosClient:
         return self._protocol.unanswered
 
     def spell(self, ros: int | None) -> None:
-        """Use the type names of ROS version `ros` from now on; None: names as written."""
+        """From now on, use the type names of ROS version `ros`; None keeps names as written."""
         self._ros_version = ros
 
     # -- sending; each method returns the frames to write
@@ -92,13 +92,13 @@ class RosClient:
         arguments: Mapping[str, object] = NOTHING,
         errback: Callable[[object], None] | None = None,
     ) -> list[bytes]:
-        """Call a service for internal use; a failure only calls `errback`."""
+        """Call a service for internal use; on failure, only `errback` is called."""
         call = Service(self._ros, service, "").call
         call(dict(arguments), callback=callback, errback=errback or _ignore)
         return self._protocol.written()
 
     def perform(self, envelope: Envelope) -> list[bytes]:
-        """Execute the operation of an envelope; return the frames to send.
+        """Execute an envelope's operation; return the frames to send.
 
         Raises:
             TransportError: rosbridge does not support the operation.
@@ -219,7 +219,7 @@ _ENDS = frozenset(_OUTCOMES.values())
 
 
 class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no types
-    """A version of roslibpy's protocol class that writes into a list."""
+    """A version of roslibpy's protocol class that writes to a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -283,7 +283,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """A version of roslibpy's connection factory that always appears connected."""
+    """A version of roslibpy's connection factory that always appears to be connected."""
 
     is_connected = True
 

@@ -72,7 +72,7 @@ class OperationReader:
         id."""
 
     def read(self, frame: bytes) -> dict[str, Any] | None:
-        """Return the operation of a frame, or None for an incomplete operation.
+        """Return the operation in a frame, or None for an incomplete operation.
 
         Raises:
             BadOperation: the frame is invalid.
@@ -147,7 +147,7 @@ def _read_cbor(data: bytes) -> object:
 
 
 def _tagged(first: Any, second: Any) -> object:
-    """Return the numbers of a tagged array; cbor2 passes the tag first since its version 6."""
+    """Return a tagged array's numbers; cbor2 has passed the tag first since version 6."""
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
@@ -156,7 +156,7 @@ def _tagged(first: Any, second: Any) -> object:
 
 
 class _Plain:
-    """A converter of CBOR values to JSON-like values, with a limit on the size of the result.
+    """A converter from CBOR values to JSON-like values, with a limit on the result's size.
 
     References in CBOR data may be nested, so a few bytes could expand without limit.
     """
@@ -164,7 +164,7 @@ class _Plain:
     def __init__(self, size: int) -> None:
         """Prepare the conversion of a frame of `size` bytes; each value takes at least one byte."""
         self._room = MAX_BYTES
-        """Remaining size of the result, in bytes; every value counts as at least one byte."""
+        """Remaining size of the result, in bytes; each value counts as at least one byte."""
         self._values = max(size, _MANY_VALUES)
         self._left = self._values
         """Remaining number of values that may be converted; the number is limited because even
@@ -198,7 +198,7 @@ def _key(name: object) -> str:
 
 
 def _png_text(operation: Mapping[str, Any]) -> bytes:
-    """Return the JSON text in the pixels of a PNG image, without the padding by newlines."""
+    """Return the JSON text in a PNG image's pixels, without the newlines that pad it."""
     try:
         image = base64.b64decode(operation.get("data", ""), validate=True)
     except (binascii.Error, TypeError, ValueError) as problem:

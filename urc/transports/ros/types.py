@@ -4,7 +4,7 @@ __all__ = ["spelled"]
 
 
 def spelled(name: str, kind: str, ros: int | None) -> str:
-    """Return the type `name` in the form of a ROS version.
+    """Return the type `name` in the form that a ROS version uses.
 
     Args:
         name: ``pkg/Type`` or ``pkg/msg/Type``; an empty name stays empty.

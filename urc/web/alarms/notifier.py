@@ -2,8 +2,8 @@
 
 Layer 5. `AlarmNotifier.queue` never blocks. A separate thread collects alarms for one second, then
 calls the hook once per robot. During a flood, the hook is called at most once a minute for the
-robot. The queue is bounded, each attempt has a timeout, and failures are counted and logged. The
-hook never receives robot secrets, because the hub removes them from all values.
+affected robot. The queue is bounded, each attempt has a timeout, and failures are counted and
+logged. The hook never receives robot secrets, because the hub removes them from all values.
 """
 
 import asyncio
@@ -30,13 +30,13 @@ from urc.web.show.cells import spoken
 __all__ = ["AlarmNotifier", "NotifyCount", "NotifyFailed"]
 
 GATHER_S: Final = 1.0
-"""Time spent collecting the alarms of one notification, in seconds."""
+"""How long alarms are collected for one notification, in seconds."""
 FLOOD_GAP_S: Final = 60.0
 """Minimum time between two notifications about a robot with a flood, in seconds."""
 MOST_WAITING: Final = 1000
 """Maximum number of queued alarms."""
 MOST_SHOWN: Final = 50
-"""Maximum number of alarms listed in one notification; further alarms are only counted."""
+"""Maximum number of alarms listed in one notification; any more are only counted."""
 _WAITS_S: Final = (2.0, 5.0, 10.0, 20.0)
 """Delays before each retry, in seconds."""
 _CLOSE_S: Final = 2.0
@@ -66,7 +66,7 @@ class _QueuedAlarm(NamedTuple):
 
 
 class AlarmNotifier:
-    """A queue of alarms of all robots, with a thread that calls the hook."""
+    """A queue of all robots' alarms, with a thread that calls the hook."""
 
     def __init__(self, options: NotifyOptions, now: Callable[[], float] = time.monotonic) -> None:
         """Prepare the queue; the thread starts with the first alarm."""
@@ -74,7 +74,7 @@ class AlarmNotifier:
         self._now = now
         self._waiting: list[_QueuedAlarm] = []
         self._next_at: dict[str, float] = {}
-        """Earliest time of the next notification about each robot with a flood."""
+        """Earliest time of the next notification about each robot that has a flood."""
         self._counts: Counter[str] = Counter()
         self._wakes = threading.Condition()
         self._is_closing = False

@@ -17,7 +17,7 @@ __all__ = ["KEYS", "NotifyOptions", "read_notify_options"]
 KEYS: Final = (
     "command", "url", "url_file", "secret_file", "priority", "returned", "timeout_s", "tries",
 )  # fmt: skip
-"""All permitted keys of the file."""
+"""All keys permitted in the file."""
 _MOST_WORDS: Final = 50
 _LONGEST_S: Final = 60.0
 _MOST_TRIES: Final = 5
@@ -32,13 +32,13 @@ class NotifyOptions:
     url: str = field(default="", repr=False)
     """URL to which notifications are posted as JSON."""
     secret: str = field(default="", repr=False)
-    """Secret sent as ``Authorization: Bearer``; "" to send no such header."""
+    """Secret sent as ``Authorization: Bearer``; "" to omit the header."""
     priority: AlarmPriority = "medium"
-    """Lowest priority of alarms in notifications."""
+    """Lowest alarm priority that causes a notification."""
     has_returned: bool = False
-    """Whether to send notifications about returns to normal, too."""
+    """Whether to send notifications about returns to normal as well."""
     timeout_s: float = 10.0
-    """Longest time of one attempt, in seconds."""
+    """Longest duration of one attempt, in seconds."""
     tries: int = 3
 
     @property
@@ -51,7 +51,7 @@ class NotifyOptions:
 
 
 def read_notify_options(file: str) -> NotifyOptions:
-    """Return the options from a file.
+    """Return the options in a file.
 
     Raises:
         ProblemsError: the file cannot be read, or has an error.

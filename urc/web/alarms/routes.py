@@ -45,7 +45,7 @@ from urc.web.show.cells import spoken
 __all__ = ["AlarmCalls", "alarm_key"]
 
 STORED_S: Final = 2.0
-"""Longest wait until an action is stored, in seconds."""
+"""Longest wait for an action to be stored, in seconds."""
 _SETTLE_S: Final = 0.5
 _SEARCHES: Final = 2
 """Maximum number of concurrent searches; the limit leaves threads free for other work."""
@@ -71,9 +71,9 @@ class AlarmCalls:
 
         Args:
             services: function that returns the robots, keyed by their names in paths.
-            store: the alarm store; None for a server without a data folder.
+            store: the alarm store; None if the server has no data folder.
             recorder: receives an audit entry for each action.
-            notifier: sender of alarm notifications; None for a server without a hook.
+            notifier: sender of alarm notifications; None if the server has no hook.
         """
         self._services = services
         self._store = store

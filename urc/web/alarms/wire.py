@@ -60,7 +60,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     group: int
     """Number of the alarm's burst."""
     raised: int
-    """Number of the alarm's last raise; an acknowledgement must repeat it."""
+    """Number that the alarm received when last raised; an acknowledgement must repeat it."""
     times: int
     """Number of activations since the alarm was last normal."""
     began_at: float
@@ -76,13 +76,13 @@ class AlarmCount(AlarmMessage, frozen=True):
 
     robot: str
     active: int
-    """Number of active alarms, without shelved and suppressed alarms."""
+    """Number of active alarms, excluding shelved and suppressed alarms."""
     unacknowledged: int
     """Number of unacknowledged alarms."""
     worst: str
-    """Highest priority of these alarms; "" without alarms."""
+    """Highest priority of the annunciated alarms; "" if there are no such alarms."""
     known: bool
-    """Whether all these alarms have known values."""
+    """Whether all annunciated alarms have known values."""
     monitored: bool
     """Whether the robot stays connected for its alarms."""
 
@@ -102,7 +102,7 @@ class AlarmOverview(AlarmMessage, frozen=True):
 
     robots: tuple[AlarmCount, ...]
     notifications: NotificationCount | None
-    """Counts of notifications; null for a server without notifications."""
+    """Counts of notifications; null if the server sends no notifications."""
 
 
 class RobotAlarmList(AlarmMessage, frozen=True):
@@ -144,7 +144,7 @@ class AlarmHistory(AlarmMessage, frozen=True):
     has_more: bool
     """Whether older events may also match."""
     fault: str
-    """Reason why events currently cannot be stored; "" if they can."""
+    """Reason why events currently cannot be stored; "" if they can be stored."""
     lost: int
     """Number of events that could not be stored since the server started."""
 

@@ -92,12 +92,12 @@ class Call(NamedTuple):
     answer: type | None
     """Type of the JSON answer; None if the answer is a file or a stream."""
     body: type | None = None
-    """Type of the request body: bytes, or the type of a JSON body; None without a body."""
+    """Type of the request body: bytes, or the type of a JSON body; None if there is no body."""
     method: Literal["GET", "POST"] = "GET"
     status: int = 200
     query: tuple[Query, ...] = ()
     errors: tuple[int, ...] = ()
-    """Additional failure statuses, besides those for the right, path and body."""
+    """Failure statuses in addition to those for the right, path and body."""
     media: tuple[str, ...] = (JSON,)
     """Media types of the answer."""
     is_body_needed: bool = True

@@ -41,7 +41,7 @@ def summary(
     Args:
         name: the robot's name in paths.
         service: the robot.
-        role: role of the visitor at the robot.
+        role: the visitor's role for the robot.
         times: times of the robot's last use and last data.
     """
     profile = service.robot.profile
@@ -80,7 +80,7 @@ def robot_info(
     Args:
         name: the robot's name in paths.
         service: the robot.
-        role: role of the visitor at the robot.
+        role: the visitor's role for the robot.
         may_give: function that returns whether the visitor's token permits a command.
         times: times of the robot's last use and last data.
     """

@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class EventStream:
-    """A response that ends when the reader leaves, its right ends, or the robot's session ends."""
+    """A response that ends when the reader disconnects, its right ends or the session ends."""
 
     def __init__(
         self,
@@ -59,8 +59,8 @@ class EventStream:
             signals: names of the signals to send.
             clock: clock of the readings.
             may_read: function that returns whether the visitor may still read.
-            followed: function that returns a context. While the context is open, the callback is
-                called after each change of rights.
+            followed: function that takes a callback and returns a context. While the context is
+                open, the callback is called after each change of rights.
             visit: context that keeps the robot's session open.
         """
         self._live = live
@@ -71,7 +71,7 @@ class EventStream:
         self._visit = visit
         self._news = asyncio.Event()
         self._reason = ""
-        """Reason for the end of the stream; "" while the stream is open."""
+        """Reason why the stream ended; "" while the stream is open."""
         self._revoked = asyncio.Event()
         self._seen = 0
         """Hub revision of the last sent event."""
@@ -140,7 +140,7 @@ class EventStream:
             self._live.fanout.leave(wake)
 
     def _newest(self) -> bytes:
-        """Return events with all changes since the last call; b"" without a change."""
+        """Return events with all changes since the last call; b"" if nothing has changed."""
         hub, events = self._live.session.hub, b""
         if self._links != hub.links_count:
             self._links = hub.links_count

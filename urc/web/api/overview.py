@@ -22,10 +22,11 @@ _NUMBERS: Final = ("integer", "number")
 
 
 def battery_signal(profile: Profile) -> str:
-    """Return the signal with the robot's state of charge; "" without such a signal.
+    """Return the signal with the robot's state of charge; "" if there is no such signal.
 
-    The function returns the signal that a battery widget shows as its level. Without such a widget,
-    it returns a number in percent or volts with a usual name, such as ``battery``.
+    The function returns the signal that a battery widget shows as its level. If no battery widget
+    shows a level, it returns a numeric signal in percent or volts with a usual name, such as
+    ``battery``.
     """
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
@@ -61,7 +62,7 @@ def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
     """Return the number and the highest priority of a robot's annunciated alarms.
 
     Alarms that returned to normal count until they are acknowledged. Shelved and suppressed alarms
-    are not counted. The result needs no session.
+    are not counted. The function needs no session.
 
     Args:
         name: the robot's name in paths.
@@ -75,14 +76,14 @@ def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
 def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
     """Return robots in order of importance to an operator.
 
-    Robots with alarms are first, by priority, then connected robots, then robots by last use.
-    Robots of equal rank keep their order.
+    Robots with alarms come first, by priority, followed by connected robots, then by other robots
+    in order of last use. Robots of equal rank keep their order.
     """
     return tuple(sorted(robots, key=_rank))
 
 
 def _rank(robot: RobotSummary) -> tuple[int, int, float]:
-    """Return the rank of a robot; connected robots keep their positions during use."""
+    """Return a robot's rank; connected robots keep their positions while they are in use."""
     severity = {"high": 0, "medium": 1, "low": 2}.get(robot.alarms.worst, 3)
     is_away = not robot.connected
     return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0

@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 __all__ = ["LONGEST_S", "MOST_LISTED", "RecordingCalls"]
 
 LONGEST_S: Final = 24 * 3600.0
-"""Longest recording by a program, in seconds."""
+"""Longest recording that a program can start, in seconds."""
 MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
 _FROM_START: Final = "bytes=0-"
-"""Start of a range header from the first byte; later ranges do not count as new downloads."""
+"""Beginning of a Range header for the first byte; later ranges do not count as new downloads."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII
 )
@@ -78,7 +78,7 @@ class RecordingCalls:
 
         Args:
             services: function that returns the robots, keyed by their names in paths.
-            folder: recordings folder; None for a server without recordings.
+            folder: recordings folder; None disables recordings.
             audit: receives an entry for each start, end and download.
         """
         self._services = services
@@ -155,7 +155,7 @@ class RecordingCalls:
 
     @answers_errors
     async def state(self, request: Request) -> Response:
-        """Return the state of the robot's recording by a program."""
+        """Return the state of the recording that a program started for the robot."""
         name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         return answer(running.state if running is not None else _IDLE)

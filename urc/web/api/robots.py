@@ -1,6 +1,6 @@
 """The HTTP API for robots: descriptions, signals, commands, and motion under a lease.
 
-Layer 5. The routes decode requests and encode answers. The module `sessions` drives,
+Layer 5. The routes decode requests and encode answers. The module `sessions` drives robots,
 `command_runner` runs commands, and `event_stream` sends signals.
 """
 
@@ -59,7 +59,7 @@ _STATUS: Final = {
     "not-allowed": 409,
     "stopped": 409,
 }
-"""HTTP status by failure code of a command; the robot caused all failures with other codes."""
+"""HTTP status for each failure code of a command; the robot causes failures with other codes."""
 _BY_ROBOT: Final = 424
 _NO_STORE: Final = {"cache-control": "no-store"}
 _T = TypeVar("_T")
@@ -285,7 +285,7 @@ class RobotCalls:
 
 
 async def _first(service: RobotService, live: LiveSession, is_there: Callable[[], bool]) -> None:
-    """Wait for the first value, at most until `FIRST_VALUE_S` after the robot was connected."""
+    """Wait for the first value, until at most `FIRST_VALUE_S` seconds after connecting."""
     hub = live.session.hub
     left_s = live.began_s + FIRST_VALUE_S - service.clock.now()
     if is_there() or left_s <= 0:

@@ -1,6 +1,6 @@
 """Operator sessions of programs that drive over HTTP.
 
-Layer 5. A page has a socket, so the server notices immediately when the page leaves. A program
+Layer 5. A page has a socket, so the server notices immediately when the page disconnects. A program
 sends only single requests. Its operator session therefore ends after `IDLE_S` seconds without a
 request, or when its right ends. Motion stops earlier, because the lease of a held command lasts at
 most one second.
@@ -29,17 +29,17 @@ from urc.wire.client_messages import Drive, Release, Tick
 __all__ = ["IDLE_S", "MOST_SESSIONS", "ProgramSession", "ProgramSessions"]
 
 IDLE_S: Final = 10.0
-"""Time after the last request at which a session ends, in seconds."""
+"""How long a session stays open after its last request, in seconds."""
 MOST_SESSIONS: Final = 8
 """Maximum number of one visitor's open sessions, counted over all robots."""
 _Followed = Callable[[Callable[[], None]], AbstractContextManager[None]]
 
 
 class ProgramSession:
-    """The session of one program at one robot."""
+    """One program's session with one robot."""
 
     def __init__(self, service: RobotService, live: LiveSession, peer: SocketPeer) -> None:
-        """Add the program to the operators of the robot.
+        """Add the program to the robot's operators.
 
         Raises:
             UrcError: too many operators watch the robot.

@@ -65,7 +65,7 @@ class BatteryLevel(ApiMessage, frozen=True):
     value: float
     unit: str
     alarm: Alarm = ""
-    """Exceeded alarm limit of the signal."""
+    """Alarm limit that the signal exceeds."""
 
 
 class ActiveAlarms(ApiMessage, frozen=True):
@@ -73,7 +73,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
 
     count: int = 0
     worst: str = ""
-    """Highest priority of all alarms; "" without an alarm."""
+    """Highest priority of all alarms; "" if there are no alarms."""
 
 
 class RobotSummary(ApiMessage, frozen=True):
@@ -85,7 +85,7 @@ class RobotSummary(ApiMessage, frozen=True):
     summary: str
     tags: tuple[str, ...]
     state: Literal["idle", "connecting", "live", "silent", "lost"]
-    """Worst state of all connections; ``idle`` without a session."""
+    """Worst state of all connections; ``idle`` if no session is open."""
     holder: str
     """Name of the operator who drives; "" if no operator drives."""
     latched: str
@@ -93,18 +93,18 @@ class RobotSummary(ApiMessage, frozen=True):
     emulated: bool
     """Whether the robot is emulated or a playback."""
     role: Role
-    """Visitor's role at this robot."""
+    """Visitor's role for this robot."""
     connected: bool = False
     """Whether a session is open, because a page or program needs the robot."""
     detail: str = ""
     """Reason for an abnormal state, as one line of text."""
     battery: BatteryLevel | None = None
-    """Battery level; null if the robot has no battery signal, or its value is unknown or stale."""
+    """Battery level; null if there is no battery signal, or if its value is unknown or stale."""
     alarms: ActiveAlarms = ActiveAlarms()
     used_at: float | None = None
     """Time of the last use by a page or program, in seconds since 1970 (UTC)."""
     seen_at: float | None = None
-    """Last time with a live connection to the robot, in seconds since 1970 (UTC)."""
+    """Last time at which a connection to the robot was live, in seconds since 1970 (UTC)."""
 
 
 class RobotList(ApiMessage, frozen=True):
@@ -149,9 +149,9 @@ class HoldInfo(ApiMessage, frozen=True):
     """Motion under a lease: the robot moves only while motion requests arrive."""
 
     period_s: float
-    """Period between setpoints from the server to the robot."""
+    """Interval between the setpoints that the server sends to the robot."""
     lease_s: float
-    """Time after the last motion request at which the robot stops."""
+    """How long after the last motion request the robot stops."""
     release: dict[str, Any]
     """Arguments that stop the robot."""
 
@@ -223,7 +223,7 @@ class SignalValue(ApiMessage, frozen=True):
     stale: bool
     """Whether the value is missing, or older than the signal's `stale_after`."""
     alarm: Alarm = ""
-    """Exceeded limit, or severity of an alarm state; "" without an alarm."""
+    """Exceeded limit, or severity of an alarm state; "" if there is no alarm."""
 
 
 class SignalValues(ApiMessage, frozen=True):
@@ -244,9 +244,10 @@ class CommandAsked(ApiMessage, frozen=True):
     confirmed: bool = False
     """Whether a person has confirmed the command's question."""
     stops: _Count | None = None
-    """Program's last known number of STOP presses; the command is refused after a newer STOP."""
+    """Number of STOP presses last known to the program; the command is refused after a newer
+    STOP."""
     session: _Word = ""
-    """Session secret from the lease answer; "" without a lease."""
+    """Session secret from the lease answer; "" if the program has no lease."""
 
 
 class CommandAnswer(ApiMessage, frozen=True):
@@ -277,10 +278,10 @@ class MotionNotice(ApiMessage, frozen=True):
 
 
 class LeaseAnswer(ApiMessage, frozen=True):
-    """State of the controls, as one session sees it."""
+    """State of the controls, from one session's point of view."""
 
     session: str
-    """Secret of the session, for further requests; "" after its end."""
+    """Session secret for further requests; "" after the session has ended."""
     name: str
     """Name of the program as shown to operators."""
     drives: bool
@@ -290,15 +291,15 @@ class LeaseAnswer(ApiMessage, frozen=True):
     holder: str
     """Name of the operator in control; "" if no operator is in control."""
     asker: str
-    """Name of the operator who requests control; "" without a request."""
+    """Name of the operator who requests control; "" if there is no request."""
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     stops: int
     """Number of STOP presses since the server started."""
     beat: int | None
-    """Newest heartbeat number, for the next motion request; null if this session does not drive."""
+    """Newest heartbeat number, for the next motion request; null if the session does not drive."""
     idle_s: float
-    """Time after the last request at which the session ends."""
+    """How long the session stays open after the last request."""
     notices: tuple[MotionNotice, ...] = ()
 
 
@@ -350,7 +351,7 @@ class RecordingList(ApiMessage, frozen=True):
 
 
 class RecordingState(ApiMessage, frozen=True):
-    """State of a recording by a program."""
+    """State of a recording that a program started."""
 
     active: bool
     file: str
@@ -358,4 +359,4 @@ class RecordingState(ApiMessage, frozen=True):
     messages: int
     """Number of messages written so far."""
     fault: str
-    """Reason why the recording failed; "" without a fault."""
+    """Reason why the recording failed; "" if it has not failed."""

@@ -1,7 +1,7 @@
 """Routes of the audit log: the page, the search, the export, and the timeline of a robot.
 
 Layer 5. Visitors with the role ``maintain`` for all robots see all entries. Other visitors see the
-entries of robots that they may maintain. Threads read the log.
+entries of robots that they may maintain. The log is read in threads.
 """
 
 import asyncio
@@ -71,7 +71,7 @@ class AuditRoutes:
         """Prepare.
 
         Args:
-            log: the audit log; None for a server without a data folder.
+            log: the audit log; None if the server has no data folder.
             recorder: receives an entry for each export.
             robots: function that returns the names of the served robots.
             ways: navigation links of this server.

@@ -1,7 +1,7 @@
 """Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
 
 Layer 5. These routes exist only with ``--dev``. They require the start key, because the pages show
-all traffic of a robot. `urc.web.app` creates at most one `Dev`.
+all of a robot's traffic. `urc.web.app` creates at most one `Dev`.
 """
 
 import asyncio

@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 SHOWN_BYTES = 4096
-"""Maximum number of displayed bytes of one frame; further bytes are only counted."""
+"""Maximum number of displayed bytes of one frame; any more are only counted."""
 THUMBNAIL_BYTES = 48 * 1024
 """Maximum size of a displayed image, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")

@@ -1,8 +1,8 @@
 """The developer start page: one robot with fixed values, and a button to reload its documents.
 
 Layer 5. These routes exist only with ``--dev``, and require the start key. The developer page loads
-a document as soon as it is saved. The start page also reloads documents in which the server has
-noticed no change.
+a document as soon as it is saved. The start page's button reloads all documents, even if the server
+has not noticed a change.
 """
 
 import asyncio

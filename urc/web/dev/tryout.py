@@ -55,7 +55,7 @@ class ParsedPiece(NamedTuple):
     """Offset of the frame's first byte in the input."""
     end: int
     data: bytes
-    """Payload of the frame, without delimiter, length field and checksum."""
+    """Payload of the frame, excluding the delimiter, length field and checksum."""
     fault: str
     """Reason why the bytes are not a frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()
@@ -71,7 +71,7 @@ class ParseResult(NamedTuple):
     left: int
     """Number of bytes in an incomplete frame at the end."""
     more: int
-    """Number of unparsed frames above the limit `MOST_PIECES`."""
+    """Number of frames beyond the limit `MOST_PIECES`, which are not parsed."""
 
 
 class _Candidate(NamedTuple):

@@ -36,7 +36,7 @@ class CheckedProfile(NamedTuple):
     """The loaded profile; None if the file has errors."""
     problems: tuple[Problem, ...]
     files: tuple[str, ...]
-    """Paths of all documents of the profile."""
+    """Paths of all the profile's documents."""
 
 
 def examine(file: str) -> CheckedProfile:
@@ -125,7 +125,7 @@ class ProfileWatch:
                 self._report("waiting", text)
 
     def _try_switch(self) -> bool:
-        """Switch to a pending version if the robot is at rest; return False without an attempt."""
+        """Try to switch to a pending version if the robot is at rest; return whether it tried."""
         if self._next is None or not self.service.is_at_rest:
             return False
         profile, self._next = self._next, None

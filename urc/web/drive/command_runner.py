@@ -1,4 +1,4 @@
-"""The execution of a command from a page or program: rights, interlock, confirmation, reply, audit.
+"""Execution of a command from a page or program: rights, interlock, confirmation, reply and audit.
 
 Layer 5. Pages and the HTTP API share this code, so both perform the same checks. Each command has
 exactly one outcome and one audit log entry.
@@ -50,7 +50,7 @@ class CommandOutcome(NamedTuple):
     values: Mapping[str, Reading] = NOTHING
     """Values from the reply."""
     code: str = ""
-    """Code of the failure; "" after success."""
+    """Failure code; "" after success."""
     message: str = ""
     is_ours: bool = False
     """Whether the server refused the command before sending anything."""

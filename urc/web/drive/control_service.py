@@ -35,9 +35,9 @@ BEAT_S = 0.05
 """Interval between heartbeat numbers to the page in control, in seconds. The page's ticks echo the
 numbers."""
 THINNED_S = 0.01
-"""Minimum mean interval between two applied ticks of one control, in seconds."""
+"""Minimum mean interval between a control's applied ticks, in seconds."""
 PATIENCE_S = 0.25
-"""Time after the end of a control's motion during which late ticks are not reported, in seconds."""
+"""How long refused late ticks go unreported after a control's motion ends, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
@@ -56,8 +56,9 @@ class ControlService:
     ) -> None:
         """Restore the latch from `file`.
 
-        The controls are the held commands of `driver`. The store `file` preserves the latch over a
-        restart; None stores no latch. The `recorder` receives audit events; None records no events.
+        The controls are the held commands of `driver`. The store `file` preserves the latch across
+        restarts; None stores no latch. The `recorder` receives audit events; None records no
+        events.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -186,7 +187,7 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def name_screen(self, operator: OperatorSession, name: str) -> None:
-        """Set the name of a screen of this computer, or of a visitor without a sign-in.
+        """Set the name of a screen of this computer or of a visitor who has not signed in.
 
         People, devices and programs keep the names of their sign-ins. If another page already has
         the name, the screen number is appended, so that no page can impersonate another.
@@ -248,7 +249,7 @@ class ControlService:
     # -- messages from pages
 
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
-        """Accept a message that may be a tick, as raw bytes; return the message's kind.
+        """Accept a message that may be a tick, as raw bytes, and return the message's kind.
 
         Rights are checked when a tick is applied, in `_tick`.
 
@@ -317,7 +318,7 @@ class ControlService:
         self.once.stopped()
 
     async def settle(self) -> None:
-        """Wait until the latch is stored, or could not be stored."""
+        """Wait until the latch has been stored or storing it has failed."""
         if self._file is not None:
             await self._file.settle()
 
@@ -335,7 +336,7 @@ class ControlService:
         self._set_expiry()
 
     def _scope_refusal(self, operator: OperatorSession, verb: wire.Verb) -> str:
-        """Return why a token for single commands does not permit a request; "" if it does."""
+        """Return why a token for single commands does not permit a request; "" if permitted."""
         may_give = operator.rights.may_give
         if verb not in ("take", "ask", "force", "reset") or may_give(""):
             return ""

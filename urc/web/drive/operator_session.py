@@ -1,4 +1,4 @@
-"""The state of one page at a robot: pending ticks, pending notices and lease.
+"""The state of one of a robot's pages: pending ticks, pending notices and lease.
 
 Layer 5.
 """
@@ -25,7 +25,7 @@ _DRIVES: Final = FixedRights()
 
 
 class RedundantLine(Protocol):
-    """The interface of a redundant socket for a session; see `urc.web.drive.redundant_socket`."""
+    """A redundant socket, as seen by a session; see `urc.web.drive.redundant_socket`."""
 
     def heartbeat(self, number: int) -> None:
         """Send a heartbeat number to the page."""
@@ -35,7 +35,7 @@ class RedundantLine(Protocol):
 
 
 class OperatorSession:
-    """The state of one page at a robot."""
+    """The state of one of a robot's pages."""
 
     def __init__(
         self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES
@@ -58,9 +58,9 @@ class OperatorSession:
         self.paces: dict[str, RateLimiter] = {}
         self.alarms: dict[str, Timer] = {}
         self.moved_s: dict[str, float] = {}
-        """Time of the last applied tick of each control, in seconds."""
+        """Time at which the last tick of each control was applied, in seconds."""
         self.moved_at_s = float("-inf")
-        """Time of the last applied tick of any control, in seconds."""
+        """Time at which the last tick of any control was applied, in seconds."""
         self.key = secrets.token_urlsafe(16)
         """Secret key that a redundant socket needs to join the page."""
         self.spare: RedundantLine | None = None
@@ -87,7 +87,7 @@ class OperatorSession:
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether a message is no duplicate, judging by its number."""
+        """Return whether a message's number shows that it is not a duplicate."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:

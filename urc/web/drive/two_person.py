@@ -93,10 +93,10 @@ class TwoPersonRule:
 
         Args:
             asker: the page that runs the command.
-            run: page's number for this run of the command.
+            run: the page's number for this run of the command.
             known: the command.
             arguments: its arguments.
-            token: single-use token from `prepare`; "" without a confirmation.
+            token: single-use token from `prepare`; "" if the operator confirmed nothing.
 
         Raises:
             CommandFailed: a confirmation is missing.
@@ -118,7 +118,7 @@ class TwoPersonRule:
         return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
 
     async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
-        """Ask all other pages with the role to drive for approval; return the second person's name.
+        """Request approval from all other pages that may drive; return the second person's name.
 
         `run` is the asking page's number for this run of the command.
 

@@ -61,10 +61,10 @@ class _Update(NamedTuple):
 
 
 class Pacer:
-    """A rate limiter that passes a burst's first event immediately, then a steady rate.
+    """A rate limiter that passes a burst's first event immediately, and later events steadily.
 
-    The limiter tolerates jitter of one period, so it never delays a source with exactly the
-    permitted rate. In any second, it passes at most one event above the permitted number.
+    The limiter tolerates jitter of one period, so it never delays a source that sends at exactly
+    the permitted rate. In any second, it passes at most one event above the permitted number.
     """
 
     def __init__(self, rate_hz: float) -> None:

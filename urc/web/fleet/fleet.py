@@ -20,7 +20,7 @@ from urc.web.words import t
 __all__ = ["BrokenRobot", "Fleet", "service_of"]
 
 _END_S = 15.0
-"""Maximum wait for the end of a robot's session, in seconds."""
+"""Maximum wait for a robot's session to end, in seconds."""
 
 
 class BrokenRobot(NamedTuple):
@@ -37,7 +37,7 @@ class Fleet:
     def __init__(
         self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]
     ) -> None:
-        """Prepare the robots known at the start of the server.
+        """Prepare the robots that are known when the server starts.
 
         Args:
             robots: the robots, keyed by their names in URLs.
@@ -106,10 +106,10 @@ class Fleet:
             await asyncio.wait((task,), timeout=_END_S)
 
     def driven_by(self, name: str) -> str:
-        """Return the name of the operator in control of a robot; "" if the robot is at rest.
+        """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
         A pending stop counts as driving while a session can deliver it. Without a session it does
-        not count, because otherwise a wrong address of the robot could not be corrected.
+        not count, because otherwise a wrong robot address could not be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -129,7 +129,7 @@ class Fleet:
 
 
 def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[str, RobotService]:
-    """Return name and service of the robot in a request's path; raise `ApiError` 404 if unknown.
+    """Return the name and service of the robot in a request's path, or raise `ApiError` 404.
 
     Args:
         services: the robots' services, keyed by the robots' names in URLs.

@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """Options of the robot factory, set at the start of the dashboard."""
+    """Options of the robot factory, set when the dashboard starts."""
 
     data: Path
     """Folder of the settings and packages."""
@@ -45,7 +45,7 @@ class RobotOptions:
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
     """Function that opens a session to test the transports, without controlling the robot."""
     given: Callable[[Profile], Mapping[str, Value]]
-    """Function that returns the settings given at the start of the server, which override stored
+    """Function that returns the settings given when the server started, which override stored
     settings. The function raises `UrcError` if given settings no longer fit the profile."""
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
@@ -59,7 +59,7 @@ class ResolvedSettings(NamedTuple):
     values: dict[str, Value]
     """Values of all usable settings, by setting name."""
     given: dict[str, Value]
-    """Values given at the start of the server, by setting name."""
+    """Values given when the server started, by setting name."""
     destination: str
     """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
@@ -81,10 +81,10 @@ class RobotFactory:
         self.robot_options = robot_options
         self.store = Store(robot_options.data / "packages")
         self._there = self._roots()
-        """Packages installed at the start of the server."""
+        """Packages that were installed when the server started."""
         self._begun: dict[str, str] = {}
-        """First destination of each robot, by package or robot name. Settings given at the start
-        are valid only for that destination."""
+        """First destination of each robot, by package or robot name. Settings given when the server
+        started are valid only for that destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
         """Cache of manifests, by digest and state of the archive. Pages often need all
         manifests."""
@@ -133,8 +133,8 @@ class RobotFactory:
     def resolved_settings(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
         """Return the resolved settings of a robot, or raise `UrcError`.
 
-        A value given at the start overrides a stored value, and a stored value overrides the
-        default. A stored value that has become invalid, for example after an update, counts as
+        A value given when the server started overrides a stored value, and a stored value overrides
+        the default. A stored value that has become invalid, for example after an update, counts as
         missing. A secret is used only for the destination that it was entered for.
         """
         defaults: dict[str, Value] = {
@@ -172,14 +172,14 @@ class RobotFactory:
         return ResolvedSettings(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-        """Return the robot's destination at the start of the server; "" if installed later."""
+        """Return the robot's destination when the server started; "" if it was installed later."""
         if package and package not in self._there:
             return ""
         place = destination_of(profile, package, values)
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return a robot's installed package, such as ``drivers/puppet``; "" without a package."""
+        """Return a robot's installed package, such as ``drivers/puppet``; "" if not installed."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts
@@ -218,7 +218,7 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return the versions of the installed packages with a robot, by name, oldest first.
+        """Return the versions of each installed package with a robot, by name, oldest first.
 
         If a robot package and a driver package have the same name, the result contains only the
         package in use.
@@ -241,7 +241,7 @@ class RobotFactory:
         return profile
 
     def reload(self, profile: Profile) -> Profile:
-        """Read the profile of a robot given at the start again, or raise `UrcError`."""
+        """Reread the profile of a robot given when the server started, or raise `UrcError`."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:

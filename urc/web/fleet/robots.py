@@ -1,4 +1,4 @@
-"""A robot of the dashboard, and the opening and closing of its session.
+"""The dashboard's robots, and the code that opens and closes their sessions.
 
 Layer 5. The session opens when the first client connects, and closes shortly after the last client
 disconnects. Reloading the page therefore keeps the robot connected. Leaving the page disconnects
@@ -90,14 +90,14 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum number of one robot's clients from one unknown address, and of one signed-in visitor."""
+"""Maximum number of a robot's clients from one unknown address, and from one signed-in visitor."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
-"""Maximum wait for the delivery of a STOP over HTTP, in seconds."""
+"""Maximum wait for a robot to receive a STOP requested over HTTP, in seconds."""
 _LOOK_S = 0.01
 PICTURE_BYTES = 256 * 1024
-"""Maximum size of the image that is kept after a session, in bytes."""
+"""Maximum size of the image that is stored after a session ends, in bytes."""
 
 log = logging.getLogger(__name__)
 
@@ -214,12 +214,11 @@ class RobotService:
 
         Args:
             robot: the robot.
-            linger_s: time between the departure of the last client and the end of the session, in
-                seconds.
+            linger_s: how long the session stays open after the last client has left, in seconds.
             clock: the clock.
-            latch: store that preserves a latched STOP over a restart; None stores no latch.
+            latch: store that preserves a latched STOP across restarts; None stores no latch.
             recorder: receives the audit events; None records no events.
-            start_lock: shared lock of all robots of a server; makes sessions start one by one.
+            start_lock: lock shared by all of a server's robots, so that sessions start one by one.
             alarms: the robot's alarms; None creates alarms that are not stored.
         """
         self.robot = robot
@@ -298,7 +297,7 @@ class RobotService:
     def glimpse(self) -> Glimpse:
         """Return a view of the robot, without opening a connection.
 
-        Without a session, the view of a real robot is the last image of its last session.
+        Without a session, a real robot's view is the last image of its previous session.
         """
         if self.robot.glimpse is not None:
             return self.robot.glimpse()
@@ -454,7 +453,7 @@ class RobotService:
 
     @property
     def _is_unwanted(self) -> bool:
-        """Whether an open session must end despite its clients."""
+        """Whether an open session must end even though it has clients."""
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
@@ -495,7 +494,7 @@ class RobotService:
 
 
 def _view(hub: Hub) -> Glimpse:
-    """Return a robot's first image, or else its values; None if no data has arrived."""
+    """Return a robot's first image, or its values if it has no image; None without data."""
     samples = {name: hub.latest(name) for name in hub.signals}
     values = {name: one.value for name, one in samples.items() if one is not None}
     pictures = (value for value in values.values() if isinstance(value, bytes))

@@ -125,7 +125,7 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
     folder are omitted.
 
     Raises:
-        UrcError: widgets of the same name come from different folders, or a widget has too many
+        UrcError: widgets with the same name are in different folders, or a widget has too many
             files.
     """
     found = Assets()

@@ -22,8 +22,8 @@ class FileRoutes:
     """The routes.
 
     Args:
-        vendor: folder of the build's third-party modules; None without a build.
-        tiles: folder of map tiles, ``z/x/y.png``; None for a server without tiles.
+        vendor: folder of the build's third-party modules; None if there is no build.
+        tiles: folder of map tiles, ``z/x/y.png``; None if the server has no tiles.
         widgets: function that returns the tables of widget files. The first table with a file takes
             precedence.
     """

@@ -79,7 +79,7 @@ def page_key(url: str) -> str:
 
 
 def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield the widget use of every filled slot, in the profile and its interfaces."""
+    """Yield the widget use of every filled slot in the profile and its interfaces."""
     yield from profile.slots.values()
     for interface in profile.interfaces.values():
         yield from interface.widgets.values()

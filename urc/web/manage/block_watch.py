@@ -1,7 +1,6 @@
 """A watch over the block lists, which stops and disables robots with blocked packages.
 
-Layer 5. The lists change through imports on the command line and through this watch's hourly
-requests.
+Layer 5. Imports on the command line and this watch's hourly requests change the lists.
 """
 
 import asyncio
@@ -20,7 +19,7 @@ __all__ = ["BlockWatch"]
 _LOOK_S: Final = 1.0
 """Interval between checks of the block list file, in seconds."""
 _FIRST_ASK_S: Final = 60.0
-"""Time from the server's start to the first request to the repositories, in seconds."""
+"""Time between the server's start and the first request to the repositories, in seconds."""
 _ASK_S: Final = 3600.0
 """Interval between requests to the repositories, in seconds."""
 
@@ -43,10 +42,10 @@ class BlockWatch:
         Args:
             store: the installed packages.
             fleet: the served robots.
-            remade: function that recreates a robot from its documents. It is called in a thread,
-                and raises `UrcError`, for example for a blocked package.
+            remade: function that recreates a robot from its documents. The function is called in a
+                thread, and raises `UrcError`, for example for a blocked package.
             own_interfaces: function that returns the names of the interfaces in a robot's own
-                document. It is called in a thread, and may raise `UrcError`.
+                document. The function is called in a thread, and may raise `UrcError`.
             ask: function that starts a request to all repositories.
         """
         self._store = store
@@ -81,7 +80,7 @@ class BlockWatch:
             seen = stamp
 
     async def enforce(self) -> None:
-        """Stop and disable robots with a blocked package; enable disabled robots without one.
+        """Stop and disable robots with a blocked package; enable disabled robots that have none.
 
         Raises:
             UrcError: the lists cannot be read. No robot has changed.
@@ -99,7 +98,7 @@ class BlockWatch:
                 log.warning("%s: its package is no longer blocked", name)
 
     def _lines(self, name: str, robot: Robot) -> list[str]:
-        """Return one line for each blocked package of a robot; called in a thread."""
+        """Return one line for each of a robot's blocked packages; called in a thread."""
         if robot.playback is not None:
             return []
         lines = blocked_lines_of(Path(robot.profile.file))

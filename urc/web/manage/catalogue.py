@@ -77,12 +77,12 @@ class PackageCatalog:
         return search(entries, words.split())
 
     def versions(self, key: PackageId) -> list[IndexEntry]:
-        """Return all versions of a package without withdrawn ones, newest first."""
+        """Return all versions of a package that are not withdrawn, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
     def withdrawn(self, lock: Lock) -> list[str]:
-        """Return a line of text for each withdrawn part of an installed package."""
+        """Return a line for each withdrawn package in an installed package's lock file."""
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 

@@ -33,7 +33,7 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Maximum number of reported changes in the frames to the robot."""
+"""Maximum number of reported changes to the frames sent to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
 """Maximum number of abandoned threads that still wait for a server."""
@@ -53,7 +53,7 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without a setting by the user."""
+    """Resources of this machine that the package uses without the user having set them."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
@@ -67,7 +67,7 @@ class _Planned(NamedTuple):
 class Job:
     """One installation job, from the request to the result.
 
-    The job's thread changes only texts and numbers of the job.
+    The job's thread changes only the job's texts and numbers.
     """
 
     number: int

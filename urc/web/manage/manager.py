@@ -63,13 +63,13 @@ class Manager:
             lambda: self.catalogue.refresh(force=True),
         )
         self._packages: dict[str, Lock] = {}
-        """Served version of each robot from an installed package, by robot name."""
+        """For each robot from an installed package, the version that is served, by robot name."""
         self._offered: dict[str, str] = {}
         """Digest of each installed interface, by name."""
         self._seen: object = None
-        """State of the package store at the last update of the menu."""
+        """State of the package store when the menu was last updated."""
         self._is_behind = False
-        """Whether a change is pending because a robot is driven."""
+        """Whether a change is pending because a robot is being driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -122,7 +122,7 @@ class Manager:
             self._packages.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
-        """Return whether a robot is driven; if so, record that its change is pending."""
+        """Return whether a robot is being driven; if so, record that its change is pending."""
         is_driven = name in self.fleet.robots and bool(self.fleet.driven_by(name))
         self._is_behind = self._is_behind or is_driven
         return is_driven
@@ -169,13 +169,13 @@ class Manager:
         return {name: str(lock) for name, lock in self._packages.items()}
 
     def lock_of(self, name: str) -> Lock | None:
-        """Return a robot's installed package; None for a robot given at the start."""
+        """Return a robot's installed package; None for a robot given when the server started."""
         return self._packages.get(name)
 
     # Changes
 
     async def refresh(self) -> None:
-        """Update the menu if a package was installed or removed by any program."""
+        """Update the menu if any program has installed or removed a package."""
         if await asyncio.to_thread(self.factory.stamp) != self._seen:
             await self.changed()
 
@@ -242,7 +242,7 @@ class Manager:
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
         """Remove a package and its unneeded dependencies; return the names of the removed packages.
 
-        If `forgets` is true, the robot's settings are deleted, too.
+        If `forgets` is true, the robot's settings are deleted as well.
 
         Raises:
             PackageError: the package is not installed.

@@ -17,7 +17,7 @@ __all__ = ["move_playback", "playback_state"]
 
 
 def playback_state(playback: Playback | None) -> Response:
-    """Return the state of the playback as a response; status 404 without a playback."""
+    """Return the playback's state as a response; status 404 if there is no playback."""
     if playback is None:
         return told(404, "this robot is not a recording")
     return answer(

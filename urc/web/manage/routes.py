@@ -1,8 +1,8 @@
 """Routes of the manager pages, and of the pages' requests under ``/api/v1``.
 
-Layer 5. Changes are POST requests with a JSON body from the server's own pages;
-`urc.web.serve.policy` checks their origin. Each change requires the start key or the token of
---manage.
+Layer 5. Changes are POST requests with a JSON body, sent by the server's own pages;
+`urc.web.serve.policy` checks their origin. Each change requires the role `maintain` and a recent
+sign-in, or the start key.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""The groups of a robot's settings, and the setting behind a failed connection.
+"""The groups of a robot's settings, and the setting that probably caused a failed connection.
 
 Layer 5. Pure. Both depend on how transport options use the settings.
 """

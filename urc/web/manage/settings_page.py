@@ -55,12 +55,12 @@ class Field:
     value: str
     """Entered value; always "" for a secret."""
     default: str
-    """Value used while the field is empty; "" without a default."""
+    """Value used while the field is empty; "" if there is no default."""
     is_optional: bool
     """Whether the field may stay empty even without a default."""
     options: tuple[Option, ...]
     is_given: bool
-    """Whether the value is fixed because it was given at the start of the server."""
+    """Whether the value is fixed because it was given when the server started."""
     is_set: bool
     """Whether a value is stored for the secret."""
     is_withheld: bool
@@ -124,7 +124,7 @@ def settings_page(
         name: the robot's name in URLs.
         profile: the robot's profile with all its interfaces.
         kept: the stored settings of the robot.
-        given: settings given at the start of the server.
+        given: settings given when the server started.
         withheld: names of unused secrets, which were entered for another destination.
         ways: navigation links of this server.
         driver: name of the driver package or driver file in use.

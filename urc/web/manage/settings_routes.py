@@ -48,7 +48,7 @@ _END_S: Final = 5.0
 
 
 class SettingsRoutes:
-    """The routes of the settings pages of all robots."""
+    """The routes of all robots' settings pages."""
 
     def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
         """Prepare.

@@ -1,7 +1,7 @@
 """Sources of uploaded packages: bundles, archives, and interface documents without a package.
 
-Layer 5. A document without a package is wrapped in one, and then stored, listed and removed like
-any package.
+Layer 5. A document without a package is wrapped in a package, and then stored, listed and removed
+like any other package.
 """
 
 from collections.abc import Sequence

@@ -106,7 +106,7 @@ class JobNews(ManageMessage, frozen=True):
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """Access to this machine without a setting; for an update, only additional access."""
+    """Access to this machine that needs no setting; for an update, only additional access."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""
@@ -130,7 +130,7 @@ class RepositoryInfo(ManageMessage, frozen=True):
     count: int
     """Number of package versions in the repository."""
     fault: str
-    """Reason for the last request's failure; "" if it succeeded."""
+    """Reason why the last request failed; "" if it succeeded."""
     is_kept: bool
     """Whether the repository's cached list is in use."""
     is_plain: bool
@@ -140,7 +140,7 @@ class RepositoryInfo(ManageMessage, frozen=True):
 
 
 class Installed(ManageMessage, frozen=True):
-    """A directly installed package, not only a dependency."""
+    """A package that was installed directly, not only as a dependency."""
 
     package: str
     name: str
@@ -154,9 +154,9 @@ class Installed(ManageMessage, frozen=True):
     newer: str
     """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Earlier version that can be restored; "" without such a version."""
+    """Earlier version that can be restored; "" if no version can be restored."""
     url: str
-    """URL of the package's page; "" without a page."""
+    """URL of the package's page; "" if it has no page."""
     settings_url: str
     fits: tuple[str, ...]
     """Titles of robots that offer the interface."""
@@ -295,7 +295,7 @@ class SettingsAsked(ManageMessage, frozen=True):
 
 
 class ProbedTransport(ManageMessage, frozen=True):
-    """Result of the connection test of one transport."""
+    """Result of one transport's connection test."""
 
     transport: str
     type: str
@@ -304,7 +304,7 @@ class ProbedTransport(ManageMessage, frozen=True):
     text: str
     advice: str
     cause: str = ""
-    """Name of the cause of a failure; "" if it is unknown."""
+    """Name of the failure's cause; "" if it is unknown."""
     field: str = ""
     """Setting that most likely caused the failure; "" if unknown."""
 

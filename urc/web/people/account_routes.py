@@ -1,4 +1,4 @@
-"""Routes of visitors' own accounts: passphrase, devices and sign-ins; and the entry of guests.
+"""Routes for visitors' own accounts (passphrase, devices and sign-ins), and for admitting guests.
 
 Layer 5. Visitors can change only their own devices and sign-ins.
 """
@@ -177,7 +177,7 @@ class AccountRoutes:
         return answer(ResultLine(t("the sign-in has ended")))
 
     def _own(self, who: Identity) -> set[str]:
-        """Return the ids of a person and its devices; for other visitors, only their own id."""
+        """Return the ids of a person and their devices; for other visitors, only their own id."""
         if not who.principal or not _is_person(who):
             return {who.principal}
         principals = self._control.directory.principals.values()
@@ -185,5 +185,5 @@ class AccountRoutes:
 
 
 def _is_person(who: Identity) -> bool:
-    """Return whether the visitor is a stored person and signed in as that person."""
+    """Return whether the visitor is signed in as a stored person."""
     return who.kind == "person" and who.way not in ("key", "token")

@@ -115,7 +115,7 @@ class AdminRoutes:
 
     @answers_changes
     async def pairing(self, request: Request) -> Response:
-        """Return the state of a pairing; only its maker has the random identifier."""
+        """Return the state of a pairing; only the pairing's creator has its random identifier."""
         state = self._pairings.state(request.path_params["id"], self._control.now())
         return answer(state)
 
@@ -181,7 +181,7 @@ class AdminRoutes:
 
     @answers_changes
     async def revoke(self, request: Request) -> Response:
-        """End all sign-ins of a person, device, program or guest, and of its devices."""
+        """End all sign-ins of a person, device, program or guest, and of the person's devices."""
         one = self._chosen(await body_of(request, PrincipalChoice))
         store = self._sign_ins.store
         ended = await asyncio.to_thread(

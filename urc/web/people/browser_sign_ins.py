@@ -48,7 +48,7 @@ _LONGEST_AGENT: Final = 200
 
 
 class BrowserSignIns:
-    """The sign-ins of all browsers of one server."""
+    """The sign-ins of all browsers on one server."""
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class BrowserSignIns:
 
         Args:
             request: the attempt.
-            names: further keys for counting the attempt, such as the person's name.
+            names: additional keys for counting the attempt, such as the person's name.
         """
         wait_s = self._throttle.wait_s(self._clock(), place_of(address_of(request)), *names)
         if wait_s > 0:
@@ -106,7 +106,7 @@ class BrowserSignIns:
             request: the attempt.
             way: the sign-in method.
             error: the reason.
-            names: further keys of the attempt, as for `check_wait`.
+            names: additional keys of the attempt, as for `check_wait`.
             person: id of the person in the attempt; "" for an unknown person.
         """
         place = address_of(request)
@@ -121,7 +121,7 @@ class BrowserSignIns:
 
     @asynccontextmanager
     async def hashing(self) -> AsyncIterator[None]:
-        """Wait for a turn to hash a passphrase; raise `ApiError` 503 if too many wait."""
+        """Wait for a turn to hash a passphrase; raise `ApiError` 503 if too many attempts wait."""
         # Each attempt delays all later attempts, so a crowd is refused immediately.
         if self._waiting >= MOST_WAITING:
             raise ApiError(503, t("Too many people sign in at this moment: try again."))
@@ -194,7 +194,7 @@ class BrowserSignIns:
         self.recorder.signed_in(actor, agent)
 
     async def _end_previous(self, request: Request) -> None:
-        """End the browser's previous sign-in of a person, and load the new sign-in."""
+        """End the browser's previous sign-in as a person, and load the new sign-in."""
         before = visitor_of(request).identity
         if before.kind == "person" and before.way != "token":
             # The previous sign-in may already have ended.

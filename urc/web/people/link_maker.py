@@ -36,7 +36,7 @@ class LinkMaker:
         Args:
             sign_ins: the sign-ins of all browsers.
             pairings: the pending pairings of administrators.
-            data: the data folder; None without a data folder.
+            data: the data folder; None if the server has no data folder.
         """
         self._sign_ins = sign_ins
         self._pairings = pairings
@@ -83,12 +83,13 @@ class LinkMaker:
 def _public_address(request: Request, data: Path | None, instance: str) -> str:
     """Return this server's address for other devices, without a trailing slash.
 
-    A request from another device already uses such an address. For a request from the server's own
-    computer, the function returns the address announced by the server. The function reads files.
+    A request from another device already contains an address that other devices can use. For a
+    request from the server's own computer, the function returns the address announced by the
+    server. The function reads files.
 
     Args:
         request: the administrator's request; the page policy has checked its host.
-        data: data folder with the addresses of running servers; None without a data folder.
+        data: data folder with the addresses of running servers; None if there is no data folder.
         instance: identifier of this server among the running servers.
     """
     own = f"{request.url.scheme}://{request.headers['host']}"
@@ -118,7 +119,7 @@ def _qr_image(text: str) -> str:
 
 
 def _authority_fingerprint(data: Path | None) -> str:
-    """Return the local certificate authority's fingerprint; "" without an authority."""
+    """Return the local certificate authority's fingerprint; "" if there is no authority."""
     if data is None:
         return ""
     try:

@@ -77,7 +77,7 @@ class CodeInfo(PeopleMessage, frozen=True):
     suggested: str
     """Unused name for the device, such as “Chrome on Android”."""
     owner: str
-    """Name of the device's owner; "" without an owner."""
+    """Name of the device's owner; "" if it has no owner."""
     roles: tuple[str, ...]
     """Grants, such as ``drive@cart``."""
     ends_at: float
@@ -134,7 +134,7 @@ class PairingCode(PeopleMessage, frozen=True):
     """QR code of the link, as the ``data:`` URL of an image."""
     code: str
     fingerprint: str
-    """Fingerprint of the local certificate authority; "" without an authority."""
+    """Fingerprint of the local certificate authority; "" if there is no authority."""
     is_reachable: bool
     """Whether other devices can open the link."""
     lasts_s: float
@@ -160,7 +160,7 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     kind: str
     name: str
     owner: str
-    """Name of the device's owner; "" without an owner."""
+    """Name of the device's owner; "" if it has no owner."""
     roles: tuple[str, ...]
     commands: tuple[str, ...]
     """Commands that the program may send; empty permits all commands of its role."""

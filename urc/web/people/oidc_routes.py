@@ -1,8 +1,8 @@
 """Routes for signing in with an identity provider: to the provider's page and back.
 
 Layer 5. A sign-in begins with a POST request from one of URC's pages. The provider redirects the
-browser to `CALLBACK`. The response there is a page, because browsers send strict cookies only after
-navigation from one of URC's pages.
+browser to `CALLBACK`. The response to `CALLBACK` is a page, because browsers send strict cookies
+only after navigation from one of URC's pages.
 """
 
 import asyncio
@@ -35,20 +35,20 @@ class ProviderPage:
 
     head: PageHead
     fault: str
-    """Reason for a failed sign-in; "" after success."""
+    """Reason why the sign-in failed; "" after success."""
     title: str
     """Displayed name of the provider."""
 
 
 class OidcRoutes:
-    """The routes of the provider sign-in; without a provider, both refuse."""
+    """The routes of the provider sign-in; without a provider, both routes refuse requests."""
 
     def __init__(self, sign_ins: BrowserSignIns, provider: OidcSignIn | None) -> None:
         """Prepare.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            provider: the sign-ins with the provider; None for a server without a provider.
+            provider: the sign-ins with the provider; None if the server has no provider.
         """
         self._sign_ins = sign_ins
         self._known = provider
@@ -56,7 +56,7 @@ class OidcRoutes:
 
     @property
     def title(self) -> str:
-        """Text of the button on the sign-in page; "" without a provider."""
+        """Text of the button on the sign-in page; "" if there is no provider."""
         return self._known.options.title if self._known else ""
 
     def routes(self) -> list[ProtectedRoute]:

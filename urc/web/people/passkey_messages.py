@@ -49,7 +49,7 @@ class PasskeyLine(msgspec.Struct, frozen=True):
     created_at: float
     """UTC time at which the passkey was added, in seconds since 1970."""
     used_at: float | None
-    """UTC time of the last sign-in, in seconds since 1970; null before the first."""
+    """UTC time of the last sign-in, in seconds since 1970; null before the first sign-in."""
 
 
 class PasskeyList(msgspec.Struct, frozen=True):

@@ -43,7 +43,7 @@ class PeopleRoutes:
             robots: function that returns the titles of all robots, keyed by their names in URLs.
             tags_of: function that returns a robot's tags.
             ways: navigation links of this server.
-            data: the data folder; None for a server without a data folder.
+            data: the data folder; None if the server has no data folder.
         """
         sign_ins = ways_in.sign_ins
         further = FurtherWays(sign_ins.control.store is not None, ways_in.oidc.title)

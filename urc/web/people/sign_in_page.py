@@ -1,4 +1,4 @@
-"""The sign-in page, which replaces the requested page for every visitor without a sign-in.
+"""The sign-in page, which replaces the requested page for every visitor who has not signed in.
 
 Layer 5. The page also has a STOP button for each robot with motion.
 """
@@ -40,7 +40,7 @@ class FurtherWays(NamedTuple):
 
     has_passkeys: bool = False
     provider: str = ""
-    """Displayed name of the identity provider; "" without a provider."""
+    """Displayed name of the identity provider; "" if there is no provider."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class AccessPage:
     this path."""
     robots: tuple[Stoppable, ...]
     has_people: bool
-    """Whether the server has people, who can sign in with name and passphrase."""
+    """Whether the server has people, who can sign in with a name and a passphrase."""
     keeps_people: bool
     """Whether the server can pair devices."""
     ways: FurtherWays
@@ -78,7 +78,7 @@ class SignInPages:
         Args:
             access: the identities and rights of the server.
             robots: function that returns all robots with motion.
-            ways: further sign-in methods.
+            ways: additional sign-in methods.
         """
         self._access = access
         self._robots = robots
@@ -135,7 +135,7 @@ def own_path(path: str) -> str:
 
 
 def _requested(scope: Scope) -> str:
-    """Return path and query of a request; never "//…", which browsers read as another host."""
+    """Return a request's path and query; never "//…", which browsers read as another host."""
     path = "/" + quote(scope["path"].lstrip("/"))
     query: Any = scope["query_string"].decode("latin-1")
     return f"{path}?{query}" if query else path

@@ -1,4 +1,4 @@
-"""Routes for signing in with name and passphrase, and for signing out.
+"""Routes for signing in with a name and a passphrase, and for signing out.
 
 Layer 5. Attempts are limited per address and per name. At most two passphrases are hashed at a
 time.
@@ -42,7 +42,7 @@ class SignInRoutes:
 
     @answers_refusals
     async def sign_in(self, request: Request) -> Response:
-        """Sign in a person with name and passphrase."""
+        """Sign in a person with a name and a passphrase."""
         sign_ins = self._sign_ins
         said = await body_of(request, SignInRequest)
         key = f"name {' '.join(said.name.split()).casefold()}"

@@ -23,7 +23,7 @@ class SignInOptions(NamedTuple):
     """Options of the sign-in methods."""
 
     oidc: OidcOptions | None = None
-    """Options of the identity provider; None without a provider."""
+    """Options of the identity provider; None if there is no provider."""
     proxies: tuple[TrustedProxy, ...] = ()
     """Trusted proxies, which identify the person of a request."""
 

@@ -56,7 +56,8 @@ class Access:
 
         Args:
             control: identities and rights; None creates a control with only the local user.
-            anonymous: role of visitors without a sign-in; None permits them only to press STOP.
+            anonymous: role of visitors who have not signed in; None permits them only to press
+                STOP.
             key: the start key of a server without `control`; "" to generate a key.
             instance: identifier of this server start in cookie names; "" to generate an identifier.
         """
@@ -75,8 +76,8 @@ class Access:
         self.tags_of: Callable[[str], Collection[str]] = _untagged
         """Function that returns a robot's tags."""
         self.on_admit: Callable[[Identity, str, str], None] = _unrecorded
-        """Callback for each use of a start key or code. Its arguments are the new identity, or
-        `NOBODY` for a wrong key, the network address, and the browser."""
+        """Callback for each use of a start key or code. Its arguments are the new identity
+        (`NOBODY` for a wrong key), the network address and the browser."""
         self.on_bad_token: Callable[[str], None] = _unheard
         """Callback for each request with an unknown, expired or revoked token. Its argument is the
         network address."""
@@ -189,7 +190,7 @@ class Access:
 
         Args:
             headers: headers of the request.
-            is_device: whether to delete the paired device's key, too.
+            is_device: whether to delete the paired device's key as well.
         """
         ours = {self.cookie, self.sign_in_cookie, *([self.device_cookie] if is_device else [])}
         return _deleted({one for one, _ in _cookies(headers) if one.removeprefix(SECURE) in ours})
@@ -197,12 +198,12 @@ class Access:
     # Rights
 
     def role(self, who: Identity, robot: str = "") -> Role | None:
-        """Return the current role of `who` at a robot; "" stands for the whole server."""
+        """Return the current role of `who` for a robot; "" stands for the whole server."""
         tags = self.tags_of(robot) if robot else ()
         return self.control.role(who, robot, tags) or self.anonymous
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest current role of `who` at any robot."""
+        """Return the highest current role of `who` for any robot."""
         return self.control.best_role(who) or self.anonymous
 
     def may_give(self, who: Identity, command: str) -> bool:
@@ -210,7 +211,7 @@ class Access:
         return self.control.directory.may_give(self._seen(who), command)
 
     def signed_in_s(self, who: Identity) -> float:
-        """Return the time since the sign-in of `who`, in seconds; infinite without a sign-in."""
+        """Return the time since `who` signed in, in seconds; infinite without a sign-in."""
         sign_in = self.control.directory.sign_ins.get(who.sign_in)
         return self.control.now() - sign_in.created_at if sign_in else inf
 

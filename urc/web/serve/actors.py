@@ -1,4 +1,4 @@
-"""The sender of a request, with the name for other people and the audit log.
+"""The sender of a request, with the name shown to other people and in the audit log.
 
 Layer 5. Pure.
 """
@@ -18,7 +18,7 @@ def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
 
     Args:
         connection: the request.
-        robot: name of the robot concerned; "" for the server.
+        robot: name of the robot in question; "" for the server.
     """
     visitor = visitor_of(connection)
     who = visitor.identity
@@ -29,7 +29,7 @@ def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
 
 
 def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
-    """Return the visitor who presses STOP at a robot, with the name shown to other people."""
+    """Return the visitor who presses a robot's STOP, with the name shown to other people."""
     visitor = visitor_of(connection)
     who = visitor.identity
     host = connection.client.host if connection.client else ""

@@ -32,7 +32,7 @@ _SYSTEMS: Final = (
 
 
 def browser_name(agent: str) -> str:
-    """Return browser and operating system in words, such as “Chrome on Android”; "" if unknown.
+    """Return the browser and operating system, such as “Chrome on Android”; "" if unknown.
 
     Args:
         agent: the ``User-Agent`` header.

@@ -33,7 +33,7 @@ class LoadedCertificate(NamedTuple):
 
     context: ssl.SSLContext
     fingerprint: str
-    """SHA-256 of the certificate to trust: the authority's, or the given certificate."""
+    """SHA-256 of the certificate to trust: the authority's certificate or the given certificate."""
     file: Path
     """PEM file with which local programs verify the server."""
     name: str

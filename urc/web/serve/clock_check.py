@@ -1,4 +1,4 @@
-"""The check of the machine's clock against all recorded times in the data folder.
+"""Comparison of the machine's clock with all recorded times in the data folder.
 
 Layer 5. `clock_warning` reads files, so call it in a thread.
 """

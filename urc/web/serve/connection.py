@@ -25,7 +25,7 @@ the oldest idle connection from the address with the most idle connections."""
 RESERVE = 64
 """Number of additional connections that accept only STOP, used while no connection is idle."""
 REQUEST_S = 5.0
-"""Time limit for the arrival of a complete request with its body, in seconds. The time starts when
+"""Time limit for receiving a complete request with its body, in seconds. The time starts when
 the connection opens for the first request, and at the first byte for later requests."""
 
 
@@ -50,7 +50,7 @@ def _stops(data: bytes) -> bool:
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
+    """uvicorn's HTTP/1.1 protocol, with a time limit for receiving a request.
 
     The request state has two keys for endless responses. The event ``closing`` is set when the
     server ends. The function ``abort`` closes the connection.
@@ -114,7 +114,7 @@ class HttpConnection(H11Protocol):
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def shutdown(self) -> None:
-        """Allow the response in progress to end; the ending server calls this method."""
+        """Allow the response in progress to end; the server calls this method when it ends."""
         super().shutdown()
         self._closing.set()
 

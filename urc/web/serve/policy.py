@@ -1,4 +1,4 @@
-"""Access checks and page policy for every request, before any route is looked up.
+"""Access checks and the page policy for every request, before any route is looked up.
 
 Layer 5. This ASGI middleware wraps the whole application, so that error responses also get the
 policy's headers. The Host check refuses foreign host names that resolve to this machine. The Origin

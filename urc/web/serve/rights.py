@@ -1,6 +1,6 @@
 """The right required by each route, and route classes that check it before calling the endpoint.
 
-Layer 5. All routes of the application are a `ProtectedRoute` or `ProtectedSocket`, so no route
+Layer 5. Every route of the application is a `ProtectedRoute` or `ProtectedSocket`, so no route
 lacks a right. A contract test checks this rule.
 """
 
@@ -54,7 +54,7 @@ class Right(NamedTuple):
 
     @property
     def refusal(self) -> str:
-        """The message for visitors without the right."""
+        """The message for visitors who lack the right."""
         if self.is_local:
             return t("This needs the key in the address that URC printed.")
         if self.scope == "server":
@@ -63,8 +63,8 @@ class Right(NamedTuple):
 
 
 FRESH_S: Final = 300.0
-"""Time after a sign-in in which people can change packages, settings and rights, in seconds. A
-tablet that was left signed in is therefore not enough."""
+"""Period after a sign-in during which people can change packages, settings and rights, in seconds.
+A tablet that was left signed in is therefore not enough."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
@@ -81,7 +81,7 @@ LOCAL: Final = Right("administer", "server", is_local=True)
 
 
 class RightHolder(Protocol):
-    """The interface of a visitor for routes; see `urc.web.serve.visitor.Visitor`."""
+    """The rights of a visitor, as routes check them; see `urc.web.serve.visitor.Visitor`."""
 
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor has a right now."""

@@ -61,7 +61,7 @@ async def serve(
         port: TCP port; 0 lets the system choose one.
         on_ready: callback that is called once, with the first of `reachable_urls`, such as
             ``http://127.0.0.1:8080/``.
-        request_s: time limit for the arrival of a complete request, in seconds.
+        request_s: time limit for receiving a complete request, in seconds.
         connections: maximum number of open connections; above it, new connections get status 503.
         certificates: certificates for HTTPS; None for plain HTTP.
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
@@ -135,7 +135,7 @@ def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -
 
 
 class _UvicornServer(uvicorn.Server):
-    """A uvicorn server that signals its end by an event, without polling."""
+    """A uvicorn server that signals its end through an event instead of being polled."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -160,7 +160,7 @@ class _UvicornServer(uvicorn.Server):
 
 
 class _DashboardSocket(WebSocketsSansIOProtocol):
-    """A uvicorn WebSocket without a send queue, and with a callback when the socket is writable.
+    """A uvicorn WebSocket that has no send queue and calls back when the socket is writable.
 
     WARNING: this class may use only asyncio's protocol methods and the arguments of the
         constructor; the rest of the base class is private to uvicorn. The application finds the

@@ -1,4 +1,4 @@
-"""Messages to systemd that the server is ready, alive or ending (sd_notify(3)).
+"""Messages that report to systemd whether the server is ready, alive or ending (sd_notify(3)).
 
 Without systemd, or under another service manager, `NOTIFY_SOCKET` is not set, and no messages are
 sent.
@@ -78,7 +78,7 @@ class ServiceManager:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float:
-    """Return this process's watchdog interval, in seconds; 0 without a watchdog."""
+    """Return this process's watchdog interval, in seconds; 0 if there is no watchdog."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return 0.0
     text = environment.get("WATCHDOG_USEC", "")
@@ -86,7 +86,7 @@ def _watchdog_s(environment: Mapping[str, str]) -> float:
 
 
 async def answers(url: str, within_s: float) -> bool:
-    """Return whether a server answers a plain HTTP request for `/healthz` within a time limit.
+    """Return whether a server answers a plain HTTP request for `/healthz` in time.
 
     Any answer counts, even a refusal because of too many connections, because a busy server is not
     broken.

@@ -3,7 +3,7 @@
 Layer 5. The standard library's `ssl.SSLObject` encrypts the data. An event loop's own TLS layer has
 a buffer above the TCP transport, and reports a full buffer one write too late. The dashboard would
 then write one more frame, which becomes outdated in the buffer. This class passes each write to TCP
-immediately, so TCP's callbacks are exact, and paused data stays in the kernel.
+immediately, so TCP's callbacks arrive at the right time, and paused data stays in the kernel.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             context: certificate and options of the server.
             make: function that creates the upper protocol after the handshake.
             on_data: callback for received handshake data, which `continue_handshake` processes.
-            on_end: callback for the end of the handshake: success, failure or lost connection.
+            on_end: callback when the handshake has succeeded, failed or lost its connection.
         """
         super().__init__()
         self._tcp = tcp
@@ -159,7 +159,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         return self._protocol or self
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        """Replace the upper protocol, for example at the start of a WebSocket."""
+        """Replace the upper protocol, for example when a WebSocket starts."""
         self._protocol = protocol
 
     def write(self, data: bytes | bytearray | memoryview) -> None:

@@ -69,7 +69,7 @@ class Handshakes:
             min(crowd, key=lambda each: each.has_replied).abort()
 
     def remove(self, one: "FirstBytes") -> None:
-        """Remove a connection after the end of its handshake or the loss of the connection."""
+        """Remove a connection whose handshake has ended or that was lost."""
         self._waiting.pop(one, None)
         timer = self._open.pop(one, None)
         if timer is not None:

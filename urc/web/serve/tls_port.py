@@ -59,7 +59,7 @@ class TlsPort:
 
 
 class BehindProxy:
-    """The middleware of a server with public names behind a web server that provides TLS."""
+    """The middleware of a server that has public names behind a web server that provides TLS."""
 
     def __init__(self, app: ASGIApp, names: Iterable[str]) -> None:
         """Prepare.

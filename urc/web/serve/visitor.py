@@ -17,19 +17,19 @@ __all__ = ["Visitor", "VisitorRights", "is_loopback", "peer_of", "visitor_of"]
 
 
 class VisitorRights(Protocol):
-    """The interface of `urc.web.serve.access.Access` for visitors."""
+    """The part of `urc.web.serve.access.Access` that visitors use."""
 
     def role(self, who: Identity, robot: str = "") -> Role | None:
-        """Return the current role of `who` at a robot; "" stands for the whole server."""
+        """Return the current role of `who` for a robot; "" stands for the whole server."""
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest current role of `who` at any robot."""
+        """Return the highest current role of `who` for any robot."""
 
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether a token permits a command; "" stands for all commands."""
 
     def signed_in_s(self, who: Identity) -> float:
-        """Return the time since the sign-in of `who`, in seconds."""
+        """Return the time since `who` signed in, in seconds."""
 
     def is_local(self, who: Identity) -> bool:
         """Return whether `who` is the local user with a valid sign-in."""
@@ -86,11 +86,11 @@ class Visitor:
         return who.sign_in if self.is_local else who.principal
 
     def role(self, robot: str = "") -> Role | None:
-        """Return the current role at a robot; "" stands for the whole server."""
+        """Return the current role for a robot; "" stands for the whole server."""
         return self._rights.role(self.identity, robot)
 
     def best_role(self) -> Role | None:
-        """Return the highest current role at any robot."""
+        """Return the highest current role for any robot."""
         return self._rights.best_role(self.identity)
 
     def may_give(self, command: str) -> bool:
@@ -98,7 +98,7 @@ class Visitor:
         return self._rights.may_give(self.identity, command)
 
     def may(self, right: Right, robot: str = "") -> bool:
-        """Return whether the visitor currently has a right; `robot` is for rights at one robot.
+        """Return whether the visitor currently has a right; `robot` names the robot, if any.
 
         A token for single commands never permits maintenance or administration, regardless of its
         role.
@@ -115,7 +115,7 @@ class Visitor:
 
 
 class _RobotRights:
-    """A visitor's current rights at one robot; see `urc.web.feed.client_socket.PeerRights`."""
+    """A visitor's current rights for one robot; see `urc.web.feed.client_socket.PeerRights`."""
 
     def __init__(self, visitor: Visitor, robot: str, *, only_watches: bool) -> None:
         self._visitor = visitor
@@ -139,7 +139,7 @@ def visitor_of(connection: HTTPConnection) -> Visitor:
 
 
 def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = False) -> SocketPeer:
-    """Return the visitor of a robot's socket, with its current rights at the robot.
+    """Return the visitor of a robot's socket, with its current rights for the robot.
 
     Args:
         connection: the handshake.

@@ -1,4 +1,4 @@
-"""The content of a robot's card on the menu: a camera image, the pose in the world, or main values.
+"""The content of a robot's menu card: a camera image, the pose in the world, or the main values.
 
 Layer 5. A card never connects a robot. An emulated robot shows its simulated world. A real robot
 shows data while it is connected, and the last image afterwards.
@@ -41,7 +41,7 @@ class Cards:
         return [ProtectedRoute("/robots/{name}/card", self.card, WATCH)]
 
     async def card(self, request: Request) -> Response:
-        """Return an image, or values as JSON ``[[title, text], …]``; status 204 without data.
+        """Return an image, or values as JSON ``[[title, text], …]``; without data, status 204.
 
         The header ``x-urc-old`` marks the last image of a session that has ended.
         """
@@ -61,7 +61,7 @@ class Cards:
 
 
 def small_values(driver: Driver, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Return title and text of the robot's first values, as many as a card can show."""
+    """Return the titles and texts of the values shown on the robot's card."""
     found = [
         (one.title or spoken(name), _text(one, readings[name]))
         for name, one in driver.signals.items()

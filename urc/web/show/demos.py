@@ -42,11 +42,11 @@ class WidgetState(NamedTuple):
     news: str
     """Values of the robot, as JSON for ``gallery.js``."""
     shows: tuple[str, ...]
-    """Required texts of the widget in this state."""
+    """Texts that the widget must show in this state."""
 
 
 def demo_states(widget: Widget) -> list[WidgetState]:
-    """Return the states in the widget's ``demo.yaml``, in the order of the file.
+    """Return the states in the widget's ``demo.yaml``, in the file's order.
 
     Raises:
         ProblemsError: the demo is missing or invalid.

@@ -49,7 +49,7 @@ class FramedPage:
     fault: str
     """Reason for a refusal, in one line; otherwise ""."""
     style: Markup = _STYLE
-    """Exact style text, because the policy contains its digest."""
+    """Exact text of the style; the policy contains the text's digest."""
 
 
 class ExternalPages:

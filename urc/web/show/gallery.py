@@ -104,7 +104,7 @@ def mark(text: str) -> str:
 
 
 EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
-"""Names of common states; a demo may add further states."""
+"""Names of common states; a demo may add other states."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Maximum number of widgets on one page."""
@@ -154,7 +154,7 @@ class WidgetView(NamedTuple):
     widget: Widget | None
     states: list[WidgetState]
     problems: tuple[Problem, ...] = ()
-    """Problems in the widget, which prevent the display of its states."""
+    """Problems in the widget that prevent its states from being shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class DemoPage:
     faults: tuple[WidgetProblem, ...]
     """Problems of widgets that cannot be shown."""
     stamp_url: str
-    """URL of the current stamp, for reloads after an edit; "" for a page without reloads."""
+    """URL of the current stamp, for reloads after an edit; "" for a page that does not reload."""
     stamp: str
     """Stamp of the widget files, computed before the files were read."""
 

@@ -35,9 +35,8 @@ DEBUGGING: Final = Interface(DEBUG, "Debug")
 """Placeholder for the debug interface, because the debug interface has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Name of the cookie that stores the interface last shown on this device for a robot. The cookie's
-path is the page of the robot; ``interfaces.js`` writes the cookie.
-"""
+"""Name of the cookie that stores the interface that this device last showed for a robot. The
+cookie's path is the robot's page; ``interfaces.js`` writes the cookie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,7 @@ class DebugPart:
     count: int
     """Number of commands."""
     wire: str
-    """Path of the developer page's socket; "" without a developer page."""
+    """Path of the developer page's socket; "" if there is no developer page."""
     dev_url: str
 
 
@@ -80,7 +79,8 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
     Args:
         profile: profile of the robot.
         wanted: name of the interface in the URL; None for a URL without an interface.
-        kept: name of the device's last shown interface; ignored if the interface no longer exists.
+        kept: name of the interface that the device last showed; ignored if the interface no longer
+            exists.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
     if wanted is not None:

@@ -3,19 +3,19 @@
 Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
 element.
 
-A row or column without a slot is a margin. It keeps its position, with an eighth of the normal
-size. Phones show no margins. A phone in portrait shows the first available grid of
+A row or column without a slot is a margin. The margin keeps its position, at an eighth of the
+normal size. Phones show no margins. A phone in portrait shows the first available grid of
 ``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``portrait`` or
 ``landscape`` in reading order if the grid has more than two columns. A phone in landscape shows
 ``phone_landscape``, or else ``landscape``.
 
-Over a background, each widget has the size of its footprint, and is at its slot's side of the
-screen. Empty rows and columns take the remaining space, where the background is visible. On a phone
-in portrait, the background takes the height above the widgets.
+Over a background, each widget has the size of its footprint, and is placed at its slot's side of
+the screen. Empty rows and columns fill the remaining space, where the background is visible. On a
+phone in portrait, the background fills the space above the widgets.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
 extend down next to it. Over a background, columns of buttons and values in the corners also extend
-down, but rows of them do not.
+down, but rows of buttons and values do not.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -40,16 +40,17 @@ _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(
 _LOW_ROW = "minmax(6.5rem,1fr)"
 """Row height on a phone in landscape; two such rows fit on the screen."""
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
-"""Sizes of rows and columns over a background, with a widget and empty."""
+"""Sizes of rows and columns over a background: with a widget, and empty."""
 _PHONE_WINDOW = "minmax(min-content,.01fr)"
-"""Size of an empty or growing row on a phone in portrait. The background takes nearly all space."""
+"""Size of an empty or growing row on a phone in portrait. The background fills nearly all of the
+space."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
 do."""
 _SHRINKING = ("value", "instrument", "view", "list")
-"""Footprints with rows that shrink for sticks and buttons on a phone in landscape."""
+"""Footprints whose rows shrink to make room for sticks and buttons on a phone in landscape."""
 _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-drive)"}
 """Heights of footprints with a fixed height."""
 _SOFT = "minmax(3.625rem,max-content)"
@@ -88,7 +89,7 @@ class _Canvas(NamedTuple):
 
     slots: Sequence[str]
     background: str = ""
-    """Slot behind all other slots, for example with a camera; "" without a background."""
+    """Slot behind all other slots, for example with a camera; "" if there is no background."""
     footprints: Mapping[str, Footprint] = NOTHING
 
 
@@ -113,7 +114,7 @@ def mirrored(grid: Layout) -> Layout:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone in portrait shows another layout than the designed one."""
+    """Return whether a phone in portrait shows a layout other than the designed layout."""
     base = _placed(page.layouts, _Canvas(slots)).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
@@ -269,7 +270,7 @@ def _across(slot: Slot, grid: Layout) -> str:
 
 
 def _down(slot: Slot, grid: Layout) -> str:
-    """Return the vertical position of a slot: the upper or lower half of the screen."""
+    """Return a slot's vertical position: the upper or lower half of the screen."""
     return "start" if 2 * slot.row + slot.row_span < grid.rows else "end"
 
 
@@ -285,7 +286,7 @@ def _third(first: int, span: int, count: int) -> int:
 
 
 def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> str:
-    """Return the rules of one cell; with `is_below`, the background takes the first row."""
+    """Return the rules of one cell; with `is_below`, the background fills the first row."""
     if slot is None:
         return "display:none"
     row, column = slot.row + 1 + is_below, slot.column + 1

@@ -51,7 +51,7 @@ class SettingRow:
     title: str
     name: str
     value: str
-    """Displayed value of the setting; "" without a value."""
+    """Displayed value of the setting; "" if it has no value."""
     description: str
     is_missing: bool
 
@@ -66,7 +66,8 @@ class Card:
     summary: str
     url: str
     link: str
-    """URL of the robot's page, or of its settings while a setting is missing; "" without a URL."""
+    """URL of the robot's page, or of its settings while a setting is missing; "" if there is no URL
+    to open."""
     link_label: str
     """Link name for screen readers."""
     driver: str
@@ -82,7 +83,7 @@ class Card:
     initials: str
     """One or two letters, shown in place of a missing image."""
     settings_url: str = ""
-    """URL of the robot's settings page; "" without such a page."""
+    """URL of the robot's settings page; "" if it has no settings page."""
     dev_url: str = ""
     """URL of the robot's developer page; "" for a robot without a developer page."""
     is_live: bool = False

@@ -125,7 +125,7 @@ def motion_lines(driver: Driver) -> list[str]:
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport whose loss disables the command; "" without such a transport."""
+    """Return the transport whose loss disables the command; "" if there is no such transport."""
     line = command.transport if command else ""
     return "" if opens_on_demand(line, driver) else line
 
@@ -133,7 +133,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 def opens_on_demand(transport: str, driver: Driver) -> bool:
     """Return whether only a command opens the transport.
 
-    Losing such a transport disables no controls, because the next command opens it again.
+    Losing a transport of this kind disables no controls, because the next command reopens it.
     """
     spec = driver.transports.get(transport)
     is_polled = any(poll.transport == transport for poll in driver.polls)

@@ -74,7 +74,7 @@ class RobotPage:
     head: PageHead
     title: str
     url: str
-    """Path of the page, for the return from the sign-in page."""
+    """Path of the page, to return to it from the sign-in page."""
     socket: str
     """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]
@@ -102,7 +102,7 @@ class RobotPage:
     can_move: bool
     """Whether the page shows controls and STOP."""
     playback: str
-    """API path of the playback; "" without a playback."""
+    """API path of the playback; "" if there is no playback."""
     is_emulated: bool
     """Whether the robot is emulated."""
     settings_url: str
@@ -125,7 +125,7 @@ class ErrorPage:
 
 @dataclass(frozen=True, slots=True)
 class ServerParts:
-    """The shared parts of all robot pages of a server."""
+    """The parts that all robot pages of a server share."""
 
     modules: Mapping[str, object]
     """The import map."""
@@ -148,7 +148,7 @@ class RobotPageRequest:
     is_part: bool = False
     """Whether an open page requests this page to switch its interface."""
     may_act: bool = True
-    """Whether the visitor has the role ``drive`` at the robot."""
+    """Whether the visitor has the role ``drive`` for the robot."""
     dev_url: str = ""
     """Path of the developer page; "" if the visitor may not open it."""
 
@@ -160,7 +160,7 @@ def robot_page(
     server: ServerParts,
     request: RobotPageRequest,
 ) -> str:
-    """Return the page of one interface of a robot.
+    """Return the page of one of a robot's interfaces.
 
     Another process renders third-party widgets; the call blocks until that process has ended.
 

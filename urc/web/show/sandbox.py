@@ -23,7 +23,7 @@ __all__ = ["TEMPLATE", "fault_line", "markdown", "widget_environment", "widget_t
 
 
 FIRST_HEADING = 4
-"""HTML heading level for ``#`` in Markdown; the page and its cells use the levels above."""
+"""HTML heading level for ``#`` in Markdown; the page and its cells use the higher levels."""
 
 
 def markdown(text: str) -> Markup:

@@ -39,7 +39,7 @@ class DeviceGuide:
     removal: str
     """Step to remove the certificate again."""
     command: str = ""
-    """Command of the last step; "" without a command."""
+    """Command of the last step; "" if it has no command."""
     removal_command: str = ""
 
 
@@ -104,7 +104,7 @@ _GUIDES: Final = (
         phrase("Choose it in the same list, then “Delete or Distrust”."),
     ),
 )
-"""Guides in English, for translation. Menu names are those of the systems."""
+"""Guides in English, to be translated. Menu names match those in the operating systems."""
 
 
 @dataclass(frozen=True, slots=True)

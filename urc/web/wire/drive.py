@@ -93,7 +93,7 @@ def encode_stopped(command: str, reason: Reason) -> str:
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
-    """Return the message about the refusal of a tick or of a request about the controls."""
+    """Return the message that a tick or a request about the controls was refused."""
     return encoded(RefusedMessage(about, cut(message), command))
 
 

@@ -225,7 +225,7 @@ def encode_reply(
     code: str = "",
     message: str = "",
 ) -> str:
-    """Return the reply to a command, with its values, or with `code` and `message` of a failure."""
+    """Return the reply to a command, with its values or a failure's `code` and `message`."""
     if code:
         return encoded(ReplyMessage(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}

@@ -4,7 +4,7 @@ Layer 5. Pure. Each message contains one complete image. `urc.wire.picture` defi
 ``frames.js`` decodes it.
 
 All clients receive identical bytes, so the WebSocket frame is built only once. According to RFC
-6455, section 5.2, a server does not mask.
+6455, section 5.2, a server does not mask frames.
 """
 
 from urc.images import media_type

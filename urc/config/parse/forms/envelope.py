@@ -32,7 +32,7 @@ _STAMPED: Final = {
     "Vector3": "vector",
     "Wrench": "wrench",
 }
-"""Name of a stamped geometry_msgs type's value field, by plain type (ROS common_interfaces)."""
+"""Value field of each stamped geometry_msgs type, by plain type (ROS common_interfaces)."""
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:

@@ -17,7 +17,7 @@ _STEP = re.compile(
 _TEST = re.compile(rf"""\[@({_NAME})=(?:'([^']*)'|"([^"]*)")\]""")
 _ATTRIBUTE = re.compile(r"@([A-Za-z_][\w.:-]*)")
 _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
-"""Pattern of the text up to the next slash outside brackets."""
+"""Pattern for the text up to the next slash outside brackets."""
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:

@@ -286,7 +286,7 @@ class ItemParser:
         return items
 
     def _check_case(self, part: Node, subject: Item | None) -> None:
-        """Report a switch case with an impossible value of the switch's item."""
+        """Report a switch case for a value that the switch's item cannot have."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
             return

@@ -44,11 +44,11 @@ def written_constant(text: str) -> int | float | bool | None:
 _NUMBER_WORD: Final = re.compile(
     r"(?P<sign>u?)int(?P<bits>8|16|32|64)(?:_t)?_?(?P<order>be|le)?|(?P<word>byte|char|float|double)"
 )
-"""Pattern of number type names in C, Python and ROS."""
+"""Pattern for the names of number types in C, Python and ROS."""
 
 
 def _our_type(found: re.Match[str]) -> str:
-    """Return the type for another language's word; most small robots are little-endian."""
+    """Return the type for another language's type name, little-endian by default."""
     if found["word"]:
         return {"byte": "u8", "char": "i8", "float": "f32le", "double": "f64le"}[found["word"]]
     name = ("u" if found["sign"] else "i") + found["bits"]
