@@ -104,11 +104,8 @@ SLOW = (
             *("-n", "3", "--dist", "loadgroup"),
         ),
     ),
-    # These tests measure the time until a robot stops, and mostly wait: two at a time.
-    Step(
-        "tests motion",
-        (*PYTEST, "tests/e2e", "-m", "alone", "-n", "2", "--dist", "loadgroup"),
-    ),
+    # These tests measure the time until a robot stops, and the rig has one set of addresses.
+    Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),
 )
 
 

@@ -1,7 +1,7 @@
 """Which modules stay in one process, where a run has several.
 
-Some share something of the machine: an account, a pair of terminals, network addresses. Others
-begin with something that takes long, and is made once for all their tests.
+Some share something of the machine: an account, a pair of terminals. Others begin with something
+that takes long, and is made once for all their tests.
 """
 
 from pathlib import PurePosixPath
@@ -23,17 +23,6 @@ TOGETHER = {
     "test_wheel": "wheel",
     "test_other_browsers": "other browsers",
     "test_site": "site",
-    # Network namespaces with fixed addresses.
-    "test_cuts": "rig",
-    "test_deaths": "rig",
-    "test_engine": "rig",
-    "test_flood": "rig",
-    "test_freeze": "rig",
-    "test_guard": "rig",
-    "test_input": "rig",
-    "test_precedence": "rig",
-    "test_revoked": "rig",
-    "test_siege": "rig",
     "test_playground": "playground",
 }
 """Module → the group that it is in. Not by the marks of ``pytest-xdist``, which adds its groups to

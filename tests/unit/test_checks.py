@@ -67,7 +67,7 @@ def test_the_verdict(
 @pytest.mark.parametrize(
     ("arguments", "code", "groups", "needs_browser"),
     [
-        ([], 0, [QUICK, ["tests e2e"], ["tests motion"]], True),
+        ([], 0, [QUICK, ["site"], ["tests e2e"], ["tests motion"]], True),
         (["quick"], 0, [QUICK], False),
         (["fast"], 2, [], False),
     ],

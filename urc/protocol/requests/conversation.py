@@ -292,9 +292,8 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Processing short frames one by one takes almost twice as long as processing them in batches
-        (decision 27). A batch ends after the expected reply or a refused value, or before another
-        kind of frame.
+        Short frames take almost twice as long one by one as in batches (decision 27). A batch
+        ends after the expected reply or a refused value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
