@@ -70,6 +70,15 @@ class Freshness:
         self._newest[of] = given.number
         return ""
 
+    def release(self, number: int, of: str = "") -> None:
+        """Store the number of a release, so that no earlier input of this control counts again.
+
+        Args:
+            number: number of the release, which shares one count with the inputs; 0 for none.
+            of: the released control.
+        """
+        self._newest[of] = max(number, self._newest.get(of, -1))
+
 
 class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.

@@ -286,12 +286,17 @@ class MotionController:
             backend.release(command)
         self._close(control, why)
 
-    def release(self, client: str, command: str) -> None:
-        """Handle the release of a control; only its holder may release it."""
+    def release(self, client: str, command: str, number: int = 0) -> None:
+        """Handle the release of a control; only its holder may release it.
+
+        `number` is the number of the release: ticks with lower numbers no longer count; 0 for none.
+        """
         holder = self.lease.state.holder
         control = self._controls.get(command)
         if control is None or holder is None or holder.id != client:
             return
+        if number:
+            self._screens[client].freshness.release(number, command)
         control.needs_release = False
         if control.motion_state == "moving":
             control.motion_state = "ending"

@@ -32,6 +32,20 @@ def test_an_input_of_another_lease_is_refused() -> None:
     assert "lease 2" in fresh.refusal(ControlInput(2, 1, echo), 3, 10.0)
 
 
+def test_no_input_from_before_a_release_counts_after_it() -> None:
+    """A program may send a tick and the release from two threads, and swap them."""
+    fresh = Freshness()
+    echo = fresh.issue(10.0)
+    fresh.release(7, "drive")
+    for number in (6, 7):
+        refusal = fresh.refusal(ControlInput(3, number, echo), 3, 10.0, "drive")
+        assert refusal == "the input is not newer than the last one"
+    assert fresh.refusal(ControlInput(3, 8, echo), 3, 10.0, "drive") == ""
+    fresh.release(2, "drive")
+    assert fresh.refusal(ControlInput(3, 8, echo), 3, 10.0, "drive") != ""
+    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.0, "turn") == ""
+
+
 def test_ticks_are_remembered_in_a_bounded_way() -> None:
     fresh = Freshness()
     first = fresh.issue(0.0)

@@ -201,6 +201,23 @@ async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes(
             it.controls.remove_page(ann)
 
 
+async def test_a_tick_from_before_the_release_moves_nothing_after_it() -> None:
+    """Two threads of a program may swap them; the numbers tell their order."""
+    async with scene() as it:
+        ann = it.add_page()
+        it.say(ann, "take")
+        it.tick(ann, 0.1)
+        await it.clock.advance(0.1)
+        it.controls.handle(ann, wire.Release("drive", number=3))
+        it.tick(ann, 0.2)  # its number is 2
+        await it.clock.advance(0.1)
+        assert it.backend.texts == ["drive speed=0.1", "drive stop"]
+        it.tick(ann, 0.3)  # nor 3, the number of the release
+        it.tick(ann, 0.4)
+        await it.clock.advance(0.1)
+        assert it.backend.texts[2:] == ["drive speed=0.4"]
+
+
 async def test_a_stop_that_nobody_made_is_told_once_to_all() -> None:
     """The lease ran out: the holder's page must let go, and the others may know."""
     async with scene() as it:

@@ -295,7 +295,7 @@ class ControlService:
                     return
                 operator.forget(said.command)
                 operator.moved_s.pop(said.command, None)
-                self.controller.release(operator.client.id, said.command)
+                self.controller.release(operator.client.id, said.command, said.number)
             case wire.Stop():
                 if not operator.is_first("", said.number):
                     return
