@@ -27,6 +27,7 @@ import socket
 import struct
 import sys
 import time
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 TICK_NS = 50_000_000
@@ -283,12 +284,23 @@ def live(plan: Plan) -> None:
     _die(page, plan)
 
 
+@contextlib.contextmanager
+def _no_release_meanwhile() -> Iterator[None]:
+    """Hold the order to release back, so that no release overtakes a tick with a lower number."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGUSR1])
+
+
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
     """Send ticks at a fixed rate until the time `until`."""
     while next_ns < until_ns:
         page.wait(next_ns)
-        if not page.has_let_go:
-            page.tick()
+        with _no_release_meanwhile():
+            if not page.has_let_go:
+                page.tick()
         next_ns += every_ns
     page.wait(until_ns)
 
