@@ -147,7 +147,7 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
             words["■ Stopped by {who}"][:5]
         )
         await page.locator("[data-verb='reset']").click()
-        await expect(page.locator("[data-who]")).to_have_text(words["Nobody drives"])
+        await expect(page.locator("[data-latched]")).to_be_hidden()
     await expect(page.locator("[data-who]")).to_have_text(words["Not connected to URC"])
     await page.locator("[data-stop-button]").click()
     await expect(page.locator("[data-stop-note]")).to_have_text(

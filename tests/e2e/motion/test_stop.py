@@ -164,6 +164,20 @@ async def test_no_link_is_said_when_stop_cannot_be_delivered(new_page: PageMaker
         assert robot.line.texts == []
 
 
+async def test_no_link_is_said_of_a_press_after_the_server_has_gone(new_page: PageMaker) -> None:
+    """The robot was stopped before; somebody else may have reset it since."""
+    async with calmly_driven() as (_, address):
+        page = await opened(new_page, address)
+        new_page.allow(page, lambda text: "/stop" in text)
+        await touch(page)
+        await until_text(page, NOTE, DONE)
+    await until_text(page, "[data-who]", "Not connected to URC")
+    await until_text(page, NOTE, DONE)
+    await touch(page)
+    await until_text(page, NOTE, "▲ NO LINK: use the robot's own stop switch")
+    await until_attribute(page, STOP, "data-phase", "failed")
+
+
 async def test_a_robot_that_is_lost_is_told_as_no_link_and_stopped_when_it_is_back(
     new_page: PageMaker,
 ) -> None:

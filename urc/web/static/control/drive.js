@@ -203,7 +203,8 @@ export class Drive {
       if (this.phase !== "") this.settle("");
     } catch (error) {
       console.warn("URC: STOP could not be delivered:", error);
-      if (!this.isLatched) this.settle("failed");
+      // Also after an earlier STOP: the latch may have been reset while this page had no link.
+      if (this.phase !== "") this.settle("failed");
     }
     this.changed();
   }

@@ -105,7 +105,8 @@ export class StopButton {
     const { drive } = this;
     const { isLatched, isConfirmed } = drive;
     const by = drive.lease?.latched || drive.posted?.latched || "";
-    const phase = isLatched ? (isConfirmed ? "confirmed" : "latched") : drive.phase;
+    const known = isLatched ? (isConfirmed ? "confirmed" : "latched") : drive.phase;
+    const phase = drive.phase === "failed" ? "failed" : known;
     return { phase, isLatched, isConfirmed, by, fault: this.fault() };
   }
 
