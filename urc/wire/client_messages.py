@@ -146,8 +146,8 @@ class Release(
 ):
     """The release of a held control.
 
-    Releases and ticks share one count. After a release, ticks with lower numbers have no effect. A
-    page without a redundant socket keeps their order itself and sends 0.
+    Releases and ticks share one count: after a release, ticks with lower numbers have no effect. A
+    program that sends both in order may send 0.
     """
 
     command: str
