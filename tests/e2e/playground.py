@@ -11,6 +11,7 @@ from typing import Any
 from playwright.async_api import Browser, BrowserContext, Page, Route, expect
 
 from playground.checker import report
+from tests.e2e import axe
 from tests.e2e.browser import LOCALE, PageFaults
 
 __all__ = ["WITHIN_MS", "all_files", "command_report", "opened", "served", "shown_report"]
@@ -51,7 +52,7 @@ async def opened(browser: Browser, address: str, fragment: str = "") -> AsyncIte
     context.set_default_timeout(WITHIN_MS)
     origin = "/".join(address.split("/")[:3])
     await context.route(lambda url: not url.startswith((origin, "blob:", "data:")), refuse)
-    page = await context.new_page()
+    page = await axe.prepare(await context.new_page())
     faults = PageFaults(page)
     try:
         await page.goto(address + fragment)

@@ -1,9 +1,10 @@
 """The playground in a real browser, from static files under a path, with no other host in reach."""
 
 import json
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from pathlib import Path
 from random import Random
+from typing import Literal
 
 import pytest
 from playwright.async_api import Browser, Locator, Page, expect
@@ -31,6 +32,7 @@ pytestmark = [
 GESTURES = 5
 """Gestures until the robot has moved: the first one may only take the controls, and a pause of a
 busy machine ends a gesture."""
+FIRST = "dash/robots/turtlebot4.yaml"
 SAMPLE = Random(22).sample(DOCUMENTS, 12)  # noqa: S311  # no secret
 """A browser takes a second for each; `tests/contract/test_stand_ins.py` compares all of them."""
 
@@ -44,34 +46,51 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield f"{url}some/path/playground/"
 
 
-async def test_reports_are_those_of_the_command(browser: Browser, address: str) -> None:
-    """Place, severity, code and message of every problem, for a sample of the broken documents."""
+@pytest.fixture(scope="module")
+async def started(browser: Browser, address: str) -> AsyncIterator[Page]:
+    """One page for all tests that change only its text: the start of Python takes half a minute."""
     async with opened(browser, address) as page:
-        found = await put(page, all_files(BROKEN), SAMPLE)
+        await start(page)
+        yield page
+
+
+@pytest.fixture
+async def page(started: Page) -> Page:
+    """The page with the TurtleBot in its frame, and without problems in its text."""
+    area = started.locator("textarea")
+    await area.fill(await started.evaluate(f"async () => (await fetch({FIRST!r})).text()"))
+    title = started.frame_locator("iframe").locator(".urc-bar-title")
+    await expect(title).to_have_text("TurtleBot 4", timeout=WITHIN_MS)
+    await expect(started.locator(".urc-editor-problems li")).to_have_count(0, timeout=WITHIN_MS)
+    return started
+
+
+async def test_reports_are_those_of_the_command(page: Page) -> None:
+    """Place, severity, code and message of every problem, for a sample of the broken documents."""
+    found = await put(page, all_files(BROKEN), SAMPLE)
     mine = {name: shown_report(one) for name, one in zip(SAMPLE, found, strict=True)}
     assert mine == {name: shown_report(command_report(BROKEN, name)) for name in SAMPLE}
     assert any(mine.values())
 
 
-async def test_a_turtlebot_is_driven_let_go_and_stopped(browser: Browser, address: str) -> None:
+async def test_a_turtlebot_is_driven_let_go_and_stopped(page: Page) -> None:
     """By a hand on the real dashboard: it moves while held, and not after STOP."""
-    async with opened(browser, address) as page:
-        frame = await start(page)
-        place = frame.locator("[data-cell]").filter(has_text="Position")
-        speed = frame.locator("[data-cell]").filter(has_text="Speed").first
-        pad = frame.locator(".joystick-pad")
-        before = await place.inner_text()
-        for _ in range(GESTURES):
-            if await pushed(page, pad, lambda: place.inner_text(), before):
-                break
-        assert await place.inner_text() != before
-        await expect(speed).to_contain_text("0.00")
-        await frame.locator("[data-stop-button]").click()
-        await expect(frame.locator("[data-latched]")).to_be_visible()
-        still = await place.inner_text()
-        assert not await pushed(page, pad, lambda: place.inner_text(), still)
-        await frame.locator("[data-verb='reset']").first.click()
-        await expect(frame.locator("[data-latched]")).to_be_hidden()
+    frame = page.frame_locator("iframe")
+    place = frame.locator("[data-cell]").filter(has_text="Position")
+    speed = frame.locator("[data-cell]").filter(has_text="Speed").first
+    pad = frame.locator(".joystick-pad")
+    before = await place.inner_text()
+    for _ in range(GESTURES):
+        if await pushed(page, pad, lambda: place.inner_text(), before):
+            break
+    assert await place.inner_text() != before
+    await expect(speed).to_contain_text("0.00")
+    await frame.locator("[data-stop-button]").click()
+    await expect(frame.locator("[data-latched]")).to_be_visible()
+    still = await place.inner_text()
+    assert not await pushed(page, pad, lambda: place.inner_text(), still)
+    await frame.locator("[data-verb='reset']").first.click()
+    await expect(frame.locator("[data-latched]")).to_be_hidden()
 
 
 async def pushed(page: Page, pad: Locator, read: Callable[[], Awaitable[str]], before: str) -> bool:
@@ -90,47 +109,38 @@ async def pushed(page: Page, pad: Locator, read: Callable[[], Awaitable[str]], b
     return await read() != before
 
 
-async def test_an_edit_changes_the_robot_and_an_error_does_not(
-    browser: Browser, address: str
-) -> None:
+async def test_an_edit_changes_the_robot_and_an_error_does_not(page: Page) -> None:
     """The frame shows the newest valid text; a problem is listed with its place."""
-    async with opened(browser, address) as page:
-        frame = await start(page)
-        area = page.locator("textarea")
-        text = await area.input_value()
-        await area.fill(text.replace("title: TurtleBot 4\n", "title: Edited robot\n", 1))
-        title = frame.locator(".urc-bar-title")
-        await expect(title).to_have_text("Edited robot", timeout=WITHIN_MS)
-        await area.fill(text.replace("kind: robot", "kind: robbot", 1))
-        problem = page.locator(".urc-editor-problems li").first
-        await expect(problem).to_contain_text("line 9", timeout=WITHIN_MS)
-        await expect(title).to_have_text("Edited robot")
+    area = page.locator("textarea")
+    text = await area.input_value()
+    await area.fill(text.replace("title: TurtleBot 4\n", "title: Edited robot\n", 1))
+    title = page.frame_locator("iframe").locator(".urc-bar-title")
+    await expect(title).to_have_text("Edited robot", timeout=WITHIN_MS)
+    await area.fill(text.replace("kind: robot", "kind: robbot", 1))
+    problem = page.locator(".urc-editor-problems li").first
+    await expect(problem).to_contain_text("line 9", timeout=WITHIN_MS)
+    await expect(title).to_have_text("Edited robot")
 
 
-async def test_a_link_carries_the_text(browser: Browser, address: str) -> None:
+async def test_a_link_carries_the_text(page: Page, browser: Browser, address: str) -> None:
     """The fragment has the whole text, which is checked at once."""
     text = json.loads('"urc: 1\\nkind: robot\\nname: é😀\\n"')
-    async with opened(browser, address) as page:
-        await start(page)
-        link = await page.evaluate(
-            "async (text) => (await import('./text_link.js')).fragmentOf(text)", text
-        )
-        await page.goto("about:blank")
-        await page.goto(f"{address}{link}")
-        assert await page.locator("textarea").input_value() == text
-        await expect(page.locator(".urc-editor-problems li").first).to_be_visible(timeout=WITHIN_MS)
+    link = await page.evaluate(
+        "async (text) => (await import('./text_link.js')).fragmentOf(text)", text
+    )
+    async with opened(browser, address, link) as other:
+        assert await other.locator("textarea").input_value() == text
+        problem = other.locator(".urc-editor-problems li").first
+        await expect(problem).to_be_visible(timeout=WITHIN_MS)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-async def test_the_page_is_accessible(browser: Browser, address: str, theme: str) -> None:
+async def test_the_page_is_accessible(page: Page, theme: Literal["light", "dark"]) -> None:
     """By the rules of axe, with a report in sight."""
-    async with opened(browser, address) as page:
-        await axe.prepare(page)
-        await page.emulate_media(color_scheme=theme)
-        await page.reload()
-        await page.locator("textarea").fill("urc: 1\nkind: robbot\nname: x\n")
-        await expect(page.locator(".urc-editor-problems li").first).to_be_visible(timeout=WITHIN_MS)
-        assert await axe.faults(page) == []
+    await page.emulate_media(color_scheme=theme)
+    await page.locator("textarea").fill("urc: 1\nkind: robbot\nname: x\n")
+    await expect(page.locator(".urc-editor-problems li").first).to_be_visible(timeout=WITHIN_MS)
+    assert await axe.faults(page) == []
 
 
 def test_the_build_names_no_other_host(
