@@ -20,7 +20,7 @@ __all__ = ["run"]
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _SAMPLED: Final = "from tests.effort import"
-_FOLDERS: Final = ("tests/contract", "tests/e2e")
+_FOLDERS: Final = ("tests/contract", "tests/e2e", "tests/unit")
 """Folders whose tests `tests/sampling.py` samples."""
 _STEPS_IN_QUICK: Final = 20
 """Number of steps without `--full`."""

@@ -1,14 +1,16 @@
 """The command `./dev test`: run lint, type checks and all tests, then print a summary.
 
 `./dev test quick` skips the tests with real servers and browsers, and needs only Node. The quick
-steps run in parallel, before all other steps. A failed step does not stop later steps. The exit
-code is 0 if all steps pass, otherwise 1. If a required program is missing, its tests are skipped
-and listed; with ``CI=true``, a skipped test is a failure.
+steps run in parallel, before all other steps. The tests of stopping leave most of the processors
+idle, so they run in parallel with the other end-to-end tests. A failed step does not stop later
+steps. The exit code is 0 if all steps pass, otherwise 1. If a required program is missing, its
+tests are skipped and listed; with ``CI=true``, a skipped test is a failure.
 """
 
 import asyncio
 import hashlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -30,6 +32,7 @@ PYTHON = sys.executable
 NODE_MODULES = ROOT / "node_modules"
 BUILT_SITE = "URC_BUILT_SITE"
 """Environment variable with the folder of the built site; without it, the tests build the site."""
+PROCESSORS = os.cpu_count() or 1
 HANGS_AFTER_S = 3600
 """Timeout for a step, in seconds. A busy machine takes several times as long as an idle one."""
 
@@ -41,6 +44,13 @@ class Step:
     name: str
     command: tuple[str, ...]
     timeout_s: float = HANGS_AFTER_S
+    is_yielding: bool = False
+    """Whether the step runs with a lower priority, so that it does not delay a measuring step."""
+
+    def command_line(self) -> tuple[str, ...]:
+        """Return the command, with its priority where the system has the program ``nice``."""
+        nice = shutil.which("nice") if self.is_yielding else None
+        return (nice, "-n", "10", *self.command) if nice else self.command
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,56 +67,44 @@ STATIC = (
     Step("lint", (PYTHON, "-m", "ruff", "check", ".")),
     Step("prose", (PYTHON, "-m", "scripts.prose")),
     Step("format", (PYTHON, "-m", "ruff", "format", "--check", ".")),
-    Step("types", (PYTHON, "-m", "mypy")),
     # The step `site` checks all other links.
     Step("docs", (PYTHON, "-m", "scripts.docs", "--links")),
 )
 PYTEST = (PYTHON, "-m", "pytest")
 
 
-def halves(tests: str, *half: str) -> tuple[Step, Step]:
-    """Return two test steps: one for the folders of `tests` in `half`, one for all other tests.
-
-    The processes of the two steps do not communicate. A third process for distributing thousands of
-    small tests would use a fifth of the processor time.
-    """
-    name = f"tests {tests.rpartition('/')[2]}"
-    chosen = tuple(f"{tests}/{one}" for one in half)
-    others = (tests, *(f"--ignore={path}" for path in chosen))
-    return (
-        Step(f"{name} 1", (*PYTEST, *others)),
-        Step(f"{name} 2", (*PYTEST, *chosen)),
-    )
-
-
-# Longest first, so that few steps are still running at the end.
+_HALF_OF_UNIT = ("protocol", "runtime", "guard", "simulator", "motion", "config")
+# Processes that do not communicate. A process for distributing thousands of small tests would use a
+# fifth of the processor time. Longest first, so that few steps are still running at the end.
 QUICK = (
-    *halves(
-        "tests/contract",
-        *("test_robots.py", "test_protocols.py", "test_worlds.py", "test_schemas.py"),
-        *("test_codes.py", "test_circles.py", "test_floors.py", "test_house.py"),
+    Step("tests contract", (*PYTEST, "tests/contract")),
+    Step(
+        "tests unit 1",
+        (*PYTEST, "tests/unit", *(f"--ignore=tests/unit/{one}" for one in _HALF_OF_UNIT)),
     ),
-    *halves(
-        "tests/unit",
-        *("protocol", "runtime", "guard", "simulator", "motion", "config"),
-    ),
+    Step("types", (PYTHON, "-m", "mypy")),
+    Step("tests unit 2", (*PYTEST, *(f"tests/unit/{one}" for one in _HALF_OF_UNIT))),
 )
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
 SLOW = (
-    # Built with all processors, for the tests of the site.
-    Step("site", (PYTHON, "-m", "scripts.site")),
-    # Most of these tests wait for a server or for silence, so a few in parallel need no more
-    # processor time.
-    Step(
-        "tests e2e",
-        (
-            *(*PYTEST, "tests/e2e", "-m", "not alone"),
-            *("-n", "3", "--dist", "loadgroup"),
+    (
+        # Built with all processors, for the tests of the site.
+        Step("site", (PYTHON, "-m", "scripts.site"), is_yielding=True),
+        # Most of these tests wait for a server or for silence, so a few in parallel need no more
+        # processor time.
+        Step(
+            "tests e2e",
+            (
+                *(*PYTEST, "tests/e2e", "-m", "not alone"),
+                *("-n", "3", "--dist", "loadgroup"),
+            ),
+            is_yielding=True,
         ),
     ),
     # These tests measure the time until a robot stops, and the rig has one set of addresses.
-    Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),
+    (Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),),
 )
+"""Sequences of steps; the sequences run in parallel."""
 
 
 def main() -> int:
@@ -124,11 +122,14 @@ def main() -> int:
     # Hundreds of tests start Python; without cached bytecode, each start compiles all of URC.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     environment[BUILT_SITE] = str(HTML)
-    quick = (*STATIC, *([javascript] if javascript else []), *QUICK)
+    quick = (*QUICK, *([javascript] if javascript else []), *STATIC)
     try:
-        outcomes += run(quick, environment)
-        for step in () if is_quick else SLOW:
-            outcomes += run([step], environment)
+        # One more than processors, because some of these tests wait.
+        outcomes += run([(step,) for step in quick], environment, at_once=PROCESSORS + 1)
+        if not is_quick:
+            names = ", ".join(step.name for steps in SLOW for step in steps)
+            print(f"\n== running, with output at the end of each: {names}", flush=True)
+            outcomes += run(SLOW, environment)
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
         return 1
@@ -167,41 +168,48 @@ def install_checkers() -> None:
     stamp.write_text(lock, encoding="utf-8")
 
 
-def run(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
-    """Run the steps in parallel, one per processor, and kill all processes left by the steps.
+def run(
+    sequences: Sequence[Sequence[Step]],
+    environment: Mapping[str, str],
+    at_once: int = PROCESSORS,
+) -> list[Outcome]:
+    """Run sequences of steps, `at_once` in parallel; kill all processes left by the steps.
 
-    A single step shows its output immediately. With several steps, each step shows its output when
-    it ends.
+    Each step shows its output when it ends.
     """
-    return asyncio.run(_run_all(steps, environment))
+    return asyncio.run(_run_all(sequences, environment, at_once))
 
 
-async def _run_all(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
-    free = asyncio.Semaphore(os.cpu_count() or 1)
+async def _run_all(
+    sequences: Sequence[Sequence[Step]], environment: Mapping[str, str], at_once: int
+) -> list[Outcome]:
+    free = asyncio.Semaphore(at_once)
 
-    async def in_turn(step: Step) -> Outcome:
+    async def in_turn(steps: Sequence[Step]) -> list[Outcome]:
         async with free:
-            if len(steps) == 1:
-                print(f"\n== {step.name}", flush=True)
-                return await _run(step, environment, None)
-            with TemporaryFile() as output:
-                outcome = await _run(step, environment, output)
-                output.seek(0)
-                said = output.read().decode("utf-8", "replace")
-            print(f"\n== {step.name}\n{said}", end="", flush=True)
-            return outcome
+            return [await _shown(step, environment) for step in steps]
 
     async with asyncio.TaskGroup() as group:  # after an interrupt, it waits for the end of each
-        tasks = [group.create_task(in_turn(step)) for step in steps]
-    return [task.result() for task in tasks]
+        tasks = [group.create_task(in_turn(steps)) for steps in sequences]
+    return [outcome for task in tasks for outcome in task.result()]
 
 
-async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes] | None) -> Outcome:
-    """Run a step; `output` replaces standard output and standard error."""
+async def _shown(step: Step, environment: Mapping[str, str]) -> Outcome:
+    """Run a step, then show its output."""
+    with TemporaryFile() as output:
+        outcome = await _run(step, environment, output)
+        output.seek(0)
+        said = output.read().decode("utf-8", "replace")
+    print(f"\n== {step.name}\n{said}", end="", flush=True)
+    return outcome
+
+
+async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) -> Outcome:
+    """Run a step; `output` receives its standard output and standard error."""
     start = time.monotonic()
     # A separate session, so that the processes of a killed test can also be ended.
     process = await asyncio.create_subprocess_exec(
-        *step.command,
+        *step.command_line(),
         cwd=ROOT,
         env=dict(environment),
         stdin=asyncio.subprocess.DEVNULL,

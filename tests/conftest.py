@@ -7,6 +7,7 @@ and its summary lists them. With ``CI=true`` a run in which anything was skipped
 """
 
 import asyncio
+import gc
 import os
 import signal
 from collections.abc import Awaitable, Callable, Iterator
@@ -22,6 +23,9 @@ from hypothesis import settings
 from scripts.needs import NEEDS
 from tests.effort import examples, seed
 from tests.sampling import left_out
+
+# Python's own threshold checks all new objects 1,400 times while the tests are collected.
+gc.set_threshold(200_000, 20, 50)
 
 # Properties that name no number of their own; a busy machine is no failure.
 settings.register_profile("urc", max_examples=examples(100), deadline=None)
@@ -99,10 +103,16 @@ def needs_of(item: pytest.Item) -> set[str]:
     return named | {names[0] for names in found}
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect what this run does not try; skip what was left out by name.
+def pytest_collection_finish() -> None:
+    """Exempt modules and tests from garbage collection; they exist until the end of the run."""
+    gc.collect()
+    gc.freeze()
 
-    A program that nobody knows how to bring is refused.
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect the tests outside the sample, and skip tests whose programs are missing.
+
+    A test that needs a program outside `scripts/needs.py` is a usage error.
     """
     is_named = any("::" in argument for argument in config.args)
     if not is_named and (deselected := left_out(items)):

@@ -25,8 +25,9 @@ class Share(NamedTuple):
 
 
 SHARES: Mapping[str, Share] = {
-    "/tests/contract/": Share(cases=20),
-    "/tests/e2e/": Share(cases=2, functions=0.4),
+    "/tests/unit/": Share(cases=8),
+    "/tests/contract/": Share(cases=8),
+    "/tests/e2e/": Share(cases=2, functions=1 / 3),
 }
 WHOLE = "/tests/e2e/motion/"
 """The tests of stopping: all of them, each time."""

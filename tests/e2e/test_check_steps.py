@@ -39,13 +39,13 @@ RELEASE_TIMEOUT_S = 10
 def test_a_step_ends_well_or_says_how(program: str, timeout_s: float, fault: str) -> None:
     """Exit code 0 is the only success; a hang is a failure too."""
     step = Step("step", (sys.executable, "-c", program), timeout_s)
-    assert [one.fault for one in run([step], os.environ)] == [fault]
+    assert [one.fault for one in run([[step]], os.environ)] == [fault]
 
 
 def test_steps_in_parallel_have_their_own_faults_and_outputs(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    """A failed step ends no other step; the output of each is whole, and shown however it ends."""
+    """A failed step ends neither the next one of its sequence nor any other; each shows all."""
     say = "import sys, time; print('I am', flush=True); time.sleep(0.5);"
     ends = ["", "print('late', file=sys.stderr); raise SystemExit(3)", SLEEP, ""]
     faults = ["", "exit code 3", "not finished within 5 s", ""]
@@ -53,7 +53,7 @@ def test_steps_in_parallel_have_their_own_faults_and_outputs(
         Step(f"step {place}", (sys.executable, "-c", say + end), 5)
         for place, end in enumerate(ends)
     ]
-    outcomes = run(steps, os.environ)
+    outcomes = run([steps[:2], *([step] for step in steps[2:])], os.environ)
     assert [(one.name, one.fault) for one in outcomes] == [
         (step.name, fault) for step, fault in zip(steps, faults, strict=True)
     ]
@@ -75,7 +75,7 @@ def test_an_interrupt_ends_all_steps() -> None:
     interrupt.start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        run(steps, os.environ)
+        run([steps[:10], *([step] for step in steps[10:])], os.environ)
     interrupt.join()
     assert time.monotonic() - start < 30
 
@@ -87,7 +87,7 @@ def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
     import fcntl  # not on Windows
 
     step = Step("step", (sys.executable, "-c", WITH_CHILD + ending, str(tmp_path / "lock")), 3)
-    run([step], os.environ)
+    run([[step]], os.environ)
     with (tmp_path / "lock").open() as lock:
         deadline = time.monotonic() + RELEASE_TIMEOUT_S
         while True:
@@ -102,7 +102,7 @@ def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
 def test_modules_that_belong_together_are_run_by_one_process() -> None:
     """As the step says it; a group that nobody keeps is a fault that shows now and then only."""
     assert sorted(TOGETHER) == sorted({file.stem for file in HERE.rglob("*.py")} & {*TOGETHER})
-    command = next(step.command for step in SLOW if "loadgroup" in step.command)
+    command = next(step.command for steps in SLOW for step in steps if "loadgroup" in step.command)
     several = command[command.index("-n") :]
     done = subprocess.run(
         [*command[:3], str(HERE / "test_editor.py"), "-k", "shipped", "-v", *several],

@@ -4,7 +4,6 @@ Whether a file survives a power cut can't be seen here; the tests that end a pro
 or fill the disk, put their own function in the place of ``os.fsync``.
 """
 
-import gc
 import os
 from collections.abc import Iterator
 from functools import cache
@@ -18,15 +17,6 @@ from urc.config.parse.widget import WidgetFolder
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web.load import file_routes
-
-# By default what is new is gone over at each 700 objects; making the tests makes a million.
-gc.set_threshold(200_000, 20, 50)
-
-
-def pytest_collection_finish() -> None:
-    """Let the collector pass over what lives as long as the run: modules and tests."""
-    gc.collect()
-    gc.freeze()
 
 
 def seen_to_be_open(number: int) -> None:

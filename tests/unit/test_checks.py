@@ -16,7 +16,7 @@ from scripts.needs import NEEDS, Brought, Need
 OK = check.Outcome("lint", "", 0.1)
 BAD = check.Outcome("tests", "exit code 1", 2.0)
 COMPLETE = Brought()
-QUICK = [step.name for step in (*check.STATIC, *check.QUICK)]
+QUICK = [[step.name] for step in (*check.QUICK, *check.STATIC)]
 WITHOUT_NETCAT = Brought(left_out=[need for need in NEEDS if need.name == "netcat"])
 
 
@@ -67,7 +67,7 @@ def test_the_verdict(
 @pytest.mark.parametrize(
     ("arguments", "code", "groups", "needs_browser"),
     [
-        ([], 0, [QUICK, ["site"], ["tests e2e"], ["tests motion"]], True),
+        ([], 0, [QUICK, [["site", "tests e2e"], ["tests motion"]]], True),
         (["quick"], 0, [QUICK], False),
         (["fast"], 2, [], False),
     ],
@@ -76,20 +76,22 @@ def test_the_quick_check_has_no_servers(
     monkeypatch: pytest.MonkeyPatch,
     arguments: list[str],
     code: int,
-    groups: list[list[str]],
+    groups: list[list[list[str]]],
     needs_browser: bool,
 ) -> None:
     """Both run the same quick steps; a program for the other tests is not installed for them."""
-    ran: list[list[str]] = []
+    ran: list[list[list[str]]] = []
     wanted: list[str] = []
 
     def bring(names: tuple[Need, ...]) -> Brought:
         wanted.extend(need.name for need in names)
         return Brought()
 
-    def run(steps: Sequence[check.Step], environment: object) -> list[check.Outcome]:
-        ran.append([step.name for step in steps])
-        return [check.Outcome(step.name, "", 0.1) for step in steps]
+    def run(
+        sequences: Sequence[Sequence[check.Step]], environment: object, at_once: int = 2
+    ) -> list[check.Outcome]:
+        ran.append([[step.name for step in steps] for steps in sequences])
+        return [check.Outcome(step.name, "", 0.1) for steps in sequences for step in steps]
 
     monkeypatch.setattr(check, "bring", bring)
     monkeypatch.setattr(check, "javascript_step", lambda: (None, ""))

@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from urc.config.node import Node, Problems
+from urc.config.values import shown
 
 __all__ = ["CONTROL_NAMES", "parse_bytes"]
 
@@ -31,7 +32,7 @@ def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes |
         pieces = [parse_bytes(inner, encoding, problems) for inner in part.items()]
         return None if None in pieces else b"".join(piece for piece in pieces if piece)
     if not isinstance(part.data, str):
-        return bytes((int(part.data),))
+        return _byte(part, problems)
     text: str = part.data
     if text in CONTROL_NAMES:
         return CONTROL_NAMES[text]
@@ -39,6 +40,15 @@ def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes |
     if in_hex:
         return bytes.fromhex(in_hex[1])
     return _literal(text, part, encoding, problems)
+
+
+def _byte(part: Node, problems: Problems) -> bytes | None:
+    number = part.data
+    if isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 255:
+        return bytes((number,))
+    text = f"expected bytes as text, or a whole number from 0 to 255, found {shown(number)}"
+    problems.error(part, "does-not-fit", text)
+    return None
 
 
 def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes | None:

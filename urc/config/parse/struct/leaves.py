@@ -123,6 +123,8 @@ def parse_content(part: Node, item: Item, encoding: str, problems: Problems) -> 
                 problems.error(part, "misplaced-key", text, at=key, key=True)
                 return None
         return item._replace(const=const, size=Extent("fixed", len(const)), encoding=own)
+    if "const" in part.data:
+        return None  # already reported
     if (item.size is None) == (until is None):
         if item.size is None and ("size" in part.data or "until" in part.data):
             return None  # already reported
