@@ -68,7 +68,7 @@ def main() -> int:
     parser.add_argument(
         "--write-docs",
         action="store_true",
-        help=f"write the results into {' and '.join(page.name for page in PAGES)}",
+        help=f"write the results to {' and '.join(page.name for page in PAGES)}",
     )
     arguments = parser.parse_args()
     for name in arguments.names:

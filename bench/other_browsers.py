@@ -100,7 +100,7 @@ def _follows_themes(window: Window) -> None:
     for theme in THEMES:
         window.evaluate(f"document.documentElement.dataset.theme = '{theme}'")
         grounds.add(window.evaluate("getComputedStyle(document.body).backgroundColor"))
-    assert len(grounds) == len(THEMES), f"themes share their ground: {sorted(grounds)}"
+    assert len(grounds) == len(THEMES), f"themes share their background colour: {sorted(grounds)}"
 
 
 def _driven(window: Window, folder: Path, *, full: bool) -> tuple[float, int]:

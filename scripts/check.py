@@ -140,11 +140,11 @@ def javascript_step() -> tuple[Step | None, str]:
     """Return the step that checks the types in URC's JavaScript, or None and the reason."""
     node = node_executable()
     if node is None:
-        return None, "the type check of the JavaScript: no Node"
+        return None, "JavaScript type check: Node is missing"
     try:
         install_checkers()
     except VendorError as error:
-        return None, f"the type check of the JavaScript: {error}"
+        return None, f"JavaScript type check: {error}"
     compiler = NODE_MODULES / "typescript" / "bin" / "tsc"
     return Step("javascript", (node, str(compiler), "--project", "tsconfig.json")), ""
 

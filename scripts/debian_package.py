@@ -42,7 +42,7 @@ def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
     (debian / "source" / "format").write_text("3.0 (native)\n", "utf-8")
     who = re.search(r"^Maintainer: (.+)$", (debian / "control").read_text("utf-8"), re.M)
     if who is None:
-        raise SystemExit("release: packaging/debian/control names no maintainer")
+        raise SystemExit("release: packaging/debian/control has no maintainer")
     (debian / "changelog").write_text(
         f"urc ({__version__}) unstable; urgency=medium\n\n  * See CHANGELOG.md.\n\n"
         f" -- {who[1]}  {formatdate(epoch)}\n",

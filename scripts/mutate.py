@@ -33,7 +33,7 @@ def main() -> int:
     """Run the untested mutants, print the summary, and return the exit code."""
     options = _options()
     if os.name == "nt":
-        print("mutate: mutmut needs fork, which Windows lacks; use WSL", file=sys.stderr)
+        print("mutate: mutmut needs fork, which Windows does not support; use WSL", file=sys.stderr)
         return 2
     settings = Settings.of(ROOT)
     if not options.report:
@@ -56,12 +56,12 @@ def _options() -> argparse.Namespace:
         "names",
         nargs="*",
         metavar="NAME",
-        help="test the mutants with these names again, such as 'urc.guard.motion_scheduler.*'",
+        help="retest the mutants with these names, such as 'urc.guard.motion_scheduler.*'",
     )
     add("--minutes", type=float, metavar="N", help="time limit in minutes; the next run continues")
     add("--workers", type=int, default=2, metavar="N", help="number of workers, 2 by default")
-    add("--timeouts", action="store_true", help="test mutants with timeouts again")
-    add("--report", action="store_true", help="show the stored results and test no mutants")
+    add("--timeouts", action="store_true", help="retest mutants that timed out")
+    add("--report", action="store_true", help="show the stored results without testing mutants")
     return parser.parse_args()
 
 

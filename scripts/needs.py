@@ -66,7 +66,7 @@ NEEDS = (
         name="chromium",
         executables=("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
         package="chromium",
-        purpose="tests of framed pages and of sensors, and benchmarks",
+        purpose="tests of framed pages, tests of sensors, and benchmarks",
         variable="URC_CHROMIUM",
     ),
     Need(
@@ -332,7 +332,7 @@ def _shell_of(needs: Sequence[Need]) -> str | None:
     try:
         return bring_chromium()
     except BringError as error:
-        print(f"no browser from npm: {error}", flush=True)
+        print(f"npm could not provide a browser: {error}", flush=True)
         return None
 
 

@@ -101,7 +101,7 @@ async def pictures(
             try:
                 await page.wait_for_function(LIVE, timeout=WAIT_MS)
             except Error:
-                print(f"{name} was not live in time", file=sys.stderr)
+                print(f"{name} did not become live in time", file=sys.stderr)
         await page.wait_for_timeout(SETTLE_MS)
         for screen in screens:
             width, height = SCREENS[screen]

@@ -169,7 +169,7 @@ def _compile(work: Path) -> None:
         return
     node = node_executable()
     if node is None:
-        raise BuildError("Node is missing; ./dev brings it")
+        raise BuildError("Node is missing; ./dev installs it")
     script = ROOT / "playground" / "compile.mjs"
     _run([node, str(script), str(PYODIDE), str(work)], "Python files could not be compiled")
     CACHE.mkdir(parents=True, exist_ok=True)

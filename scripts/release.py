@@ -189,7 +189,7 @@ def notices(wheel: Path) -> str:
     parts += [*dict.fromkeys(line for _, line in needed), ""]
     for name, line in bundled:
         if name not in texts:
-            raise ReleaseError(f"the wheel has no licence text of {name}")
+            raise ReleaseError(f"the wheel has no licence text for {name}")
         parts += ["-" * 72, line, "-" * 72, "", texts[name].strip(), ""]
     return "\n".join(parts)
 

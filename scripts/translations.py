@@ -92,7 +92,7 @@ def faults(tag: str, catalog: Catalog) -> Iterator[str]:
         if not said:
             yield f"{tag}.po: {text!r} is not translated"
         elif set(HOLE.findall(text)) != set(HOLE.findall(said)):
-            yield f"{tag}.po: {text!r} and {said!r} have different names in braces"
+            yield f"{tag}.po: {text!r} and {said!r} have different placeholders"
 
 
 def entries(catalog: Catalog) -> list[Message]:

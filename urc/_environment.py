@@ -17,18 +17,18 @@ SETTING: Final = "URC_SET_"
 VARIABLES: Final[Mapping[str, str]] = {
     DATA_DIR: "Data folder with people, keys, packages, settings and logs. `--data-dir` overrides"
     " the variable.",
-    f"{SETTING}NAME": "Value of the setting `name` of a robot, in upper case with `_` in place of"
-    " `-`. `--set` overrides the variable.",
+    f"{SETTING}NAME": "Value of the robot setting `name`. The variable contains the setting's name"
+    " in upper case, with `_` in place of `-`. `--set` overrides the variable.",
     TOKEN: "Token for a robot of a server, for `urc watch`, `urc send` and `urc record` with"
     " `--server`.",
     REAL_TIME: "`no` disables the real-time priority of the guard.",
 }
 """Meaning of each URC variable, by name."""
 SYSTEM: Final[Mapping[str, str]] = {
-    "DISPLAY": "Without `DISPLAY` and `WAYLAND_DISPLAY`, `urc demo` opens no browser on Linux.",
-    "LOCALAPPDATA": "On Windows, the folder of the default data folder.",
-    "NO_COLOR": "If the variable is not empty, URC prints no progress with control characters.",
-    "SSH_AUTH_SOCK": "The SSH agent with the keys of transports with `agent: true`.",
-    "XDG_DATA_HOME": "On Linux, the folder of the default data folder.",
+    "DISPLAY": "On Linux, `urc demo` opens a browser only with `DISPLAY` or `WAYLAND_DISPLAY`.",
+    "LOCALAPPDATA": "On Windows, the folder that contains the default data folder.",
+    "NO_COLOR": "If the variable is not empty, URC prints no colours.",
+    "SSH_AUTH_SOCK": "Socket of the SSH agent with the keys for transports with `agent: true`.",
+    "XDG_DATA_HOME": "On Linux, the folder that contains the default data folder.",
 }
 """Effects on URC of variables that other programs also use, by name."""

@@ -28,7 +28,7 @@ def read_bytes(path: str, most: int) -> bytes:
             )
         # Opening a pipe or a device could block.
         if not stat.S_ISREG(status.st_mode):
-            raise refused(path, "not-a-file", "this is not an ordinary file")
+            raise refused(path, "not-a-file", "this is not a regular file")
         if status.st_size > most:
             raise refused(path, "too-large", too_large(most))
         with open(path, "rb") as file:
@@ -56,7 +56,7 @@ def read_bytes(path: str, most: int) -> bytes:
 
 def too_large(most: int) -> str:
     """Return the error message for a file of more than `most` bytes."""
-    return f"a document has at most {most // 1024} KiB"
+    return f"this document is larger than {most // 1024} KiB"
 
 
 def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:

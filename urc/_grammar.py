@@ -252,7 +252,7 @@ class _ExpressionParser:
             stop = "None" if self._next.text == "]" else self.expression()
             if self._next.text == ":":
                 raise ExpressionSyntaxError(
-                    "a slice has a start and an end, but no step", self._next.offset
+                    "a slice may have a start and an end, but no step", self._next.offset
                 )
             self._expect("]")
             return f"_slice({value}, {key}, {stop})"
@@ -369,7 +369,7 @@ class _ExpressionParser:
         if token.kind != "name" or token.text not in table.FILTERS:
             known = table.filter_names()
             raise ExpressionSyntaxError(
-                f"there is no filter {token.text!r}; there are: {known}", token.offset
+                f"there is no filter {token.text!r}; the filters are: {known}", token.offset
             )
         has_arguments = self._accept("(")
         first = self._next
@@ -382,7 +382,7 @@ class _ExpressionParser:
             raise ExpressionSyntaxError(text, token.offset)
         is_last = self._next.text != "|"
         if table.FILTERS[token.text].gives_bytes and is_last and not self.allows_bytes:
-            text = f"{token.text!r} gives bytes, which only 'hex:' and 'bytes:' can send"
+            text = f"{token.text!r} returns bytes, which only 'hex:' and 'bytes:' can send"
             raise ExpressionSyntaxError(text, token.offset)
         if token.text == "default":
             # The subject may be a missing name, so this filter evaluates its subject itself.
@@ -405,7 +405,7 @@ class _ExpressionParser:
         if token.kind != "name" or token.text not in _TESTS:
             known = ", ".join(_TESTS)
             raise ExpressionSyntaxError(
-                f"there is no test {token.text!r}; there are: {known}", token.offset
+                f"there is no test {token.text!r}; the tests are: {known}", token.offset
             )
         if token.text in ("defined", "undefined"):
             python = f"_is_defined(lambda: {subject})"

@@ -78,8 +78,8 @@ _REFUSED: dict[Any, str] = {
 
 _INSTEAD: dict[Any, str] = dict.fromkeys(_REFUSED, "")
 _INSTEAD[_constants.ASSERT] = "; match the text itself, and capture the part with a named group"
-_INSTEAD[_constants.ASSERT_NOT] = "; match the allowed text instead, or exclude frames by 'when'"
-_INSTEAD[_constants.GROUPREF] = "; name both groups and compare them by 'when: a == b'"
+_INSTEAD[_constants.ASSERT_NOT] = "; match the allowed text instead, or exclude frames with 'when'"
+_INSTEAD[_constants.GROUPREF] = "; name both groups and compare them with 'when: a == b'"
 
 
 class PatternError(UrcError):
@@ -145,7 +145,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
         PatternError: the pattern is invalid or unsupported, or RE2 is required but not installed.
     """
     if len(text) > MAX_SOURCE:
-        raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
+        raise PatternError(f"a pattern may have at most {MAX_SOURCE} characters, found {len(text)}")
     try:
         with warnings.catch_warnings():
             # Python plans a new meaning for "[[", "--" and "&&" in a character class.
@@ -153,11 +153,11 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
             tree = _parser.parse(text, re.ASCII)
     except FutureWarning as error:
         words = str(error).lower()
-        raise PatternError(f"{words}: write a backslash before it: {text!r}") from None
+        raise PatternError(f"{words}: escape the character with a backslash: {text!r}") from None
     except re.error as error:
         named = _OTHER_GROUP.match(text, error.pos or 0)
         said = f"a named group begins with (?P<{named[1]}>" if named else error.msg
-        raise PatternError(f"not a pattern: {said}", error.pos or 0) from None
+        raise PatternError(f"invalid pattern: {said}", error.pos or 0) from None
     except (RecursionError, OverflowError):
         raise PatternError("the pattern is nested too deeply or repeats too often") from None
     _check_dialect(tree, text)
@@ -171,7 +171,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     if cost > MAX_COST:
         raise PatternError(
             f"this pattern has {cost} parts, and the limit is {MAX_COST}: use smaller numbers in"
-            " {…}, or start the pattern with '^' and keep every repeat distinct from the next part"
+            " {…}, or start the pattern with '^' and let no repeat match the start of the next part"
         )
     return Pattern(text, groups, _re2_search(text), False)
 
@@ -303,7 +303,7 @@ def _check_dialect(tree: Any, text: str) -> None:
         if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
             low, high, _ = argument
             if max(low, 0 if high is _constants.MAXREPEAT else high) > MAX_REPEAT:
-                raise PatternError(f"a repeat count is at most {MAX_REPEAT}: {text!r}")
+                raise PatternError(f"a repeat count may be at most {MAX_REPEAT}: {text!r}")
         for part in _parts(operation, argument):
             _check_dialect(part, text)
 
@@ -353,7 +353,7 @@ def _re2_search(text: str) -> Any:
     except ImportError:
         raise PatternError(
             "this pattern needs the package google-re2, which is not installed: start the pattern"
-            f" with '^' and keep every repeat distinct from the next part: {text!r}"
+            f" with '^' and let no repeat match the start of the next part: {text!r}"
         ) from None
     options = re2.Options()
     options.log_errors = False
@@ -363,7 +363,7 @@ def _re2_search(text: str) -> Any:
     except re2.error as error:
         reason = error.args[0] if error.args else "unknown"
         words = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)
-        raise PatternError(f"not an RE2 pattern: {words}") from None
+        raise PatternError(f"invalid RE2 pattern: {words}") from None
 
 
 class _NotProven(Exception):

@@ -58,7 +58,7 @@ def _parts(value: object) -> _Parts | None:
     try:
         length = math.hypot(*items)
     except (OverflowError, TypeError):
-        raise TypeError("the parts of a quaternion are numbers") from None
+        raise TypeError("the parts of a quaternion must be numbers") from None
     if not 0 < length < math.inf:
         return None
     x, y, z, w = (one / length for one in items)

@@ -53,8 +53,8 @@ def _unreadable(character: str) -> str:
     if character in "'\"":
         return f"the quote {character} is never closed"
     if character in "{}":
-        return "braces are not part of an expression"
-    return f"{character!r} is not part of an expression"
+        return "braces are not allowed in an expression"
+    return f"{character!r} is not allowed in an expression"
 
 
 def integer_of(token: Token) -> str:
@@ -84,7 +84,7 @@ def string_of(token: Token) -> str:
         if code:
             return chr(int(code, 16))
         if found[3] not in _ESCAPES:
-            text = f"'\\{found[3]}' is not an escape in an expression"
+            text = f"'\\{found[3]}' is not a valid escape in an expression"
             raise ExpressionSyntaxError(text, token.offset + 1 + found.start())
         return _ESCAPES[found[3]]
 

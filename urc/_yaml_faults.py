@@ -92,7 +92,7 @@ def _directive(at: _Clue) -> SyntaxFault | None:
         0,
         "unquoted",
         "a line that starts with '%' is a YAML directive",
-        "quote the value if it is text; documents of URC need no directives",
+        "quote the value if it is text; URC documents need no directives",
     )
 
 
@@ -125,9 +125,9 @@ def _escape(at: _Clue) -> SyntaxFault | None:
         at.line,
         column,
         "bad-escape",
-        f"'{shown}' is not an escape in double quotes",
-        "use single quotes, in which a backslash is plain text and a quote is written"
-        " twice: ''; in double quotes, write a backslash as \\\\",
+        f"'{shown}' is not a valid escape in double quotes",
+        "use single quotes, where a backslash is plain text and '' is a quote; in double quotes,"
+        " write a backslash as \\\\",
     )
 
 
@@ -288,7 +288,7 @@ def _rest(at: _Clue) -> SyntaxFault | None:
         return SyntaxFault(
             *place,
             "not-yaml",
-            f"{char!r} where a value is expected",
+            f"expected a value, found {char!r}",
             "quote the value if it is text",
         )
     if "block scalar" in at.context:

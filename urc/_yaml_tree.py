@@ -217,7 +217,7 @@ class TreeReader:
             self._report(
                 event,
                 "number-too-long",
-                f"found {error}, at most {DIGITS_MAX} are read",
+                f"found {error}; the limit is {DIGITS_MAX}",
                 hint="quote the value if it is text",
             )
             return None
@@ -235,7 +235,7 @@ class TreeReader:
         if found == kind or (kind, found) == ("float", "int"):
             return value
         if kind in names.values():
-            self._report(event, "wrong-tag", f"{text!r} is no {kind}")
+            self._report(event, "wrong-tag", f"{text!r} is not of type {kind}")
         else:
             self._report_tag(event, tag)
         return None
@@ -255,11 +255,11 @@ class TreeReader:
 
     def _report_duplicate(self, key: str, event: Any, mark: Mark) -> None:
         first = mark.children[key].key
-        place = f"line {first.line}, column {first.column}" if first else "above"
+        place = f"at line {first.line}, column {first.column}" if first else "above"
         self._report(
             event,
             "duplicate-key",
-            f"{key!r} is given twice; the first is at {place}",
+            f"{key!r} occurs twice; the first is {place}",
             hint="keep one of them: a later key never overrides an earlier key",
         )
 
@@ -330,7 +330,7 @@ class TreeReader:
             self._report(
                 event,
                 "too-many-nodes",
-                f"more than {self._limits.nodes} keys and values with every alias expanded",
+                f"more than {self._limits.nodes} keys and values after alias expansion",
             )
             raise StoppedError
 

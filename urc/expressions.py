@@ -53,7 +53,7 @@ MAX_OUTPUT: Final = 65536
 _INSTEAD: Final = {
     "for": "; write {{ items | join(',') }} for a list",
     "if": "; write {{ 'a' if test else 'b' }}",
-    "set": "; write the expression in the place of the variable",
+    "set": "; write the expression in place of the variable",
 }
 """Hints for unsupported Jinja statements, by keyword."""
 
@@ -97,7 +97,7 @@ class Template:
         except (ArithmeticError, TypeError, ValueError) as error:
             raise ExpressionError(f"in {self.source!r}: {error}") from None
         if isinstance(value, str) and len(value) > MAX_OUTPUT:
-            raise ExpressionError(f"{self.source!r} gives more than {MAX_OUTPUT} characters")
+            raise ExpressionError(f"{self.source!r} produces more than {MAX_OUTPUT} characters")
         return value
 
     def render(self, namespace: Mapping[str, object]) -> str:
@@ -147,7 +147,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
     """
     _check_length(text)
     if not text.strip():
-        raise ExpressionError("an expression is expected here, found nothing")
+        raise ExpressionError("expected an expression, found nothing")
     names: set[str] = set()
     settings: set[str] = set()
     python = _translate(text, 0, names, settings, allows_bytes=allows_bytes)
@@ -163,7 +163,9 @@ def text_of(value: object) -> str:
 
 def _check_length(text: str) -> None:
     if len(text) > MAX_SOURCE:
-        raise ExpressionError(f"a template has at most {MAX_SOURCE} characters, found {len(text)}")
+        raise ExpressionError(
+            f"a template may have at most {MAX_SOURCE} characters, found {len(text)}"
+        )
 
 
 def _function(python: str) -> Callable[[Mapping[str, object]], Any]:

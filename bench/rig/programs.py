@@ -110,7 +110,7 @@ class Program:
             self.changed.wait_for(lambda: is_so() or self._has_ended, timeout_s)
             if not is_so():
                 said = "\n".join(self.lines[-20:]) or "(nothing)"
-                raise AssertionError(f"{what}: not within {timeout_s:g} s; it said:\n{said}")
+                raise AssertionError(f"{what}: not within {timeout_s:g} s; output:\n{said}")
 
     def wait_for(self, word: str, timeout_s: float = ANSWER_S, *, after: int = 0) -> list[str]:
         """Return the words of the first line that begins with `word`, starting at index `after`."""

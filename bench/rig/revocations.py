@@ -126,7 +126,8 @@ class RevocationRig(Rig):
         moved = [place for place, one in enumerate(heard) if one.text != "M 0"]
         stop = next((one for one in heard[moved[-1] + 1 :] if one.text == "M 0"), None)
         if stop is None:
-            return Trial(death, float("inf"), "it moved after the stop", 0.0, REVOKED_BOUND_MS)
+            fault = "the robot moved after the stop"
+            return Trial(death, float("inf"), fault, 0.0, REVOKED_BOUND_MS)
         late_ms = self.late_ms(revoked_ns[index], stop.time_ns + 20_000_000)
         stop_ms = (stop.time_ns - revoked_ns[index]) / 1e6
         return Trial(death, stop_ms, "", late_ms, REVOKED_BOUND_MS)

@@ -11,7 +11,7 @@ __all__ = ["page", "parser_of"]
 
 # ruff: noqa: SLF001  argparse has no public list of its options
 
-_EXIT = "Exit codes: 0 for success, 1 for problems or failure, 2 for wrong use."
+_EXIT = "Exit codes: 0 for success, 1 for problems or failure, 2 for incorrect usage."
 
 
 def page() -> str:

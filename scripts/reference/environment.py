@@ -11,7 +11,7 @@ def page() -> str:
     """Return the page: one section for each variable."""
     lines = ["# Environment variables", "", "Variables that `urc` reads.", ""]
     lines += ["## Variables of URC", "", *_sections(VARIABLES)]
-    lines += ["## Variables of the system", "", *_sections(SYSTEM)]
+    lines += ["## System variables", "", *_sections(SYSTEM)]
     return "\n".join(lines).rstrip() + "\n"
 
 

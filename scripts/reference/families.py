@@ -127,7 +127,7 @@ FAMILIES: Mapping[str, Family] = {
     ),
     "checksums": Family(
         "Keys of checksums",
-        "Keys of checksums: algorithm, covered bytes, place and form.",
+        "Keys of checksums: algorithm, covered bytes, position and format.",
         _driver(
             "checksums checksum checksumAlgorithm algorithmParameters crcAlgorithm foldAlgorithm"
             " checksumOver checksumWindow checksumSalt saltTable"

@@ -19,8 +19,8 @@ def page() -> str:
     lines = [
         "# HTTP API reference",
         "",
-        "Every call of the [HTTP API](../api.md), with its right, body and answers.",
-        "A running server has the same document as OpenAPI at `/api/v1/openapi.json`.",
+        "Every call of the [HTTP API](../api.md), with its right, body and responses.",
+        "A running server serves the same content as OpenAPI at `/api/v1/openapi.json`.",
         "",
     ]
     lines += ["## Calls", ""]

@@ -33,11 +33,11 @@ _BOUNDS = {
     "maximum": "at most {}",
     "exclusiveMinimum": "more than {}",
     "exclusiveMaximum": "less than {}",
-    "minLength": "{} characters or more",
+    "minLength": "at least {} characters",
     "maxLength": "at most {} characters",
-    "minItems": "{} items or more",
+    "minItems": "at least {} items",
     "maxItems": "at most {} items",
-    "minProperties": "{} keys or more",
+    "minProperties": "at least {} keys",
     "maxProperties": "at most {} keys",
 }
 _PLAIN = re.compile(r"[A-Za-z_][\w ./%-]*")
@@ -130,7 +130,8 @@ def _objects(kind: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
 
 def _keys(file: str, owner: str, schema: Schema, shared: list[str]) -> Iterator[str]:
     """Yield a section for each property, except the keys common to all transports."""
-    required = dict.fromkeys(_required_when_whole(schema), "yes, in a whole document")
+    usual = "yes, unless another key makes it optional"
+    required = dict.fromkeys(_required_when_whole(schema), usual)
     required |= dict.fromkeys(schema.get("required", ()), "yes")
     own = {key: one for key, one in schema.get("properties", {}).items() if key not in shared}
     for name, inner in own.items():
@@ -210,7 +211,7 @@ def _type(file: str, schema: Any) -> str:
     if "const" in schema:
         return f"`{_yaml(schema['const'])}`"
     if not words:
-        return "one of the words below" if "enum" in schema else "anything"
+        return "one of the values below" if "enum" in schema else "anything"
     inner = schema.get("additionalProperties")
     if "object" in names and isinstance(inner, Mapping):
         words[names.index("object")] = f"mapping of names to {_type(file, inner)}"
@@ -281,7 +282,8 @@ def index() -> str:
     lines = [
         "# Keys of documents by task",
         "",
-        "Every key of the language, made from the schemas. Each page describes one family of keys.",
+        "Every key of the language, generated from the schemas.",
+        "Each page describes one family of keys.",
         "",
         "| page | keys |",
         "|---|---|",

@@ -106,7 +106,7 @@ def test_every_operation_tells_right_and_security(document: dict[str, Any]) -> N
             assert operation["description"].startswith("Right: ")
             needs = {name for one in operation["security"] for name in one}
             assert needs <= set(schemes)
-            is_open = operation["description"] == "Right: none; also without a sign-in."
+            is_open = operation["description"] == "Right: none; a sign-in is not required."
             assert is_open == (not needs)
             assert ("401" in operation["responses"]) == bool(needs)
 

@@ -148,7 +148,7 @@ def test_page_says_what_happens_when_control_is_lost(tmp_path: Path) -> None:
     assert "- held: sent every 100ms while the control is held\n" in page
     assert "## When control is lost\n\n" in page
     assert "- `set`: `level 0, side a`\n" in page
-    assert "  - The document does not say whether the robot stops by itself.\n" in page
+    assert "  - The document does not state whether the robot stops by itself.\n" in page
 
 
 def test_page_has_the_alarm_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

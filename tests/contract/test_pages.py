@@ -153,7 +153,7 @@ def test_a_bug_is_told_in_one_sentence_under_the_policy(monkeypatch: pytest.Monk
         answer = client.get("/")
     assert answer.status_code == 500
     assert "secret detail" not in answer.text
-    assert "Something broke" in answer.text
+    assert "URC had an internal error" in answer.text
     check_policy(dict(answer.headers))
 
 

@@ -58,7 +58,7 @@ async def opened(new_page: PageMaker, robot: FakeRobot, address: str) -> Page:
     page = await new_page(size="desktop")
     await page.goto(f"{address}robots/puppet/")
     await until(lambda: robot.is_open)
-    await page.locator(".alerts-note", has_text="values not known").wait_for()
+    await page.locator(".alerts-note", has_text="unknown values").wait_for()
     return page
 
 

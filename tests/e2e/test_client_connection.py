@@ -58,7 +58,7 @@ async def test_a_certificate_that_nobody_signed_is_refused(tmp_path: Path) -> No
         carted(tmp_path) as (_, file),
         served_robot(file, certificates=certificates) as address,
     ):
-        with pytest.raises(ConnectionLost, match=r"is not trusted: .*; name the file"):
+        with pytest.raises(ConnectionLost, match=r"is not trusted: .*; specify the file"):
             async with urc.client.open(address, token=KEY):
                 pytest.fail("it opened")
 

@@ -123,7 +123,7 @@ async def test_the_parser_is_tried_on_what_is_pasted(
         await page.get_by_label("Written as").select_option("hex")
         await page.get_by_label("What the robot sends").fill("42 4x")
         await page.get_by_role("button", name="Try").click()
-        await expect(tried).to_contain_text("▲ expected pairs of hex digits; word 2 is '4x'")
+        await expect(tried).to_contain_text("▲ expected pairs of hex digits; group 2 is '4x'")
         await expect(page.locator("[data-signals] tr")).to_contain_text("12 %")
 
 

@@ -104,7 +104,7 @@ async def test_a_tab_that_outlives_a_restart_says_what_to_do(
     assert key_of(address) != old
     note = page.locator("[data-note]")
     await expect(note).to_have_text(
-        "URC was started again: open the address that it printed, then this page goes on."
+        "URC was restarted: open the address that it printed; this page then continues."
     )
     await page.locator("[data-stop-button]").dispatch_event("pointerdown")
     latch = tmp_path / "latches" / "emulated" / "tello.latch.json"
@@ -129,7 +129,7 @@ async def test_the_page_at_the_door_stops_a_robot(
     await page.evaluate("address => location.assign(address)", f"{address}robots/tello/")
     await expect(page.locator("h1")).to_have_text("Open the printed address")
     await page.get_by_role("button", name="STOP").click()
-    await expect(page.get_by_role("status")).to_have_text(re.compile("confirmed it$"))
+    await expect(page.get_by_role("status")).to_have_text(re.compile("confirmed the stop$"))
     latch = tmp_path / "latches" / "emulated" / "tello.latch.json"
     await until(lambda: latch.exists() and json.loads(latch.read_text("utf-8"))["latched_by"])
     await page.evaluate("address => location.assign(address)", f"{address}robots/tello/?key={key}")

@@ -143,7 +143,7 @@ BAD = {
 CARDS = {
     "throwing": "I am broken",
     "flooding": "it floods the page with messages",
-    "leaving": "it went to another page",
+    "leaving": "it navigated to another page",
     "endless": "it stopped answering",
 }
 

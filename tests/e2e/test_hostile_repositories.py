@@ -253,7 +253,7 @@ def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> N
         (
             201,
             b'{"listed": "x", "sha256": "0"}',
-            "the server listed bytes that differ from the sent bytes",
+            "the server listed an archive that differs from the uploaded archive",
         ),
         (422, b"x" * 100_000, "more than the expected 65536 bytes"),
     ],

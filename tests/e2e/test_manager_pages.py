@@ -99,7 +99,7 @@ async def test_connection_to_a_repository(
         new_page.allow(page, lambda text: "422" in text)
         await page.goto(address)
         await expect(page.locator("main")).to_contain_text("No driver yet")
-        await page.get_by_role("link", name="Open the drivers manager").click()
+        await page.get_by_role("link", name="Open the driver manager").click()
         field = page.get_by_label("Address of a repository")
         url = shop.url if is_on else shop.gone_url
         await field.fill(url.removeprefix("http://"))
@@ -138,7 +138,7 @@ async def test_download_a_driver(
             await expect(dialog).to_contain_text(shop.gone_url)
             await dialog.get_by_role("button", name="Close").click()
             known = page.locator(f"[data-repository='{shop.gone_url}']")
-            await expect(known).to_contain_text("what it said last is used")
+            await expect(known).to_contain_text("its last index is used")
             assert installed(data) == []
             return
         await expect(dialog).to_contain_text("connects by tcp (wire): host from the settings")
@@ -200,19 +200,19 @@ async def test_add_an_interface(
         new_page.allow(page, lambda text: "422" in text)
         await page.goto(f"{address}interfaces")
         if is_on:
-            await page.get_by_label("Add by its path").fill("/interfaces/wide/")
+            await page.get_by_label("Add by path").fill("/interfaces/wide/")
             await page.get_by_role("button", name="Add", exact=True).click()
         else:
             text = f"urc: 1\nkind: interface\nname: wide\ntitle: Wide\n{DOCUMENTS['interface']}"
             file = tmp_path / "wide.yaml"
             file.write_text(text, encoding="utf-8")
-            await page.get_by_label("Or a file of this device").set_input_files(file)
+            await page.get_by_label("Or a file on this device").set_input_files(file)
             await page.get_by_role("button", name="Upload").click()
             await page.get_by_label("Accept interfaces/wide without a signature").check()
         await agree(page)
         mine = row(page, "installed", "interfaces/wide")
         await expect(mine).to_contain_text("offered on: Rover")
-        await page.get_by_label("Add by its path").fill("/nowhere/wide")
+        await page.get_by_label("Add by path").fill("/nowhere/wide")
         await page.get_by_role("button", name="Add", exact=True).click()
         dialog = page.get_by_role("dialog")
         await expect(dialog).to_contain_text("▲ /nowhere/wide")
@@ -220,7 +220,7 @@ async def test_add_an_interface(
         await page.goto(f"{address}robots/rover/settings")
         await unfold(page)
         await page.get_by_label("Interface").select_option("wide")
-        await page.get_by_role("button", name="Save without a test").click()
+        await page.get_by_role("button", name="Save without testing").click()
         await expect(page.locator("[data-said]")).to_have_text("✓ Saved and in use")
         await page.goto(f"{address}robots/rover/")
         await expect(page.locator("[data-interface-choice]")).to_have_value("wide")

@@ -32,7 +32,7 @@ async def test_what_a_package_uses_by_itself_needs_a_tick(
     async with running_managed(tmp_path) as address:
         page = await new_page(size="tablet")
         await page.goto(f"{address}interfaces")
-        await page.get_by_label("Add by its path").fill(str(ATTACKS / "drivers" / "key-user"))
+        await page.get_by_label("Add by path").fill(str(ATTACKS / "drivers" / "key-user"))
         await page.get_by_role("button", name="Add", exact=True).click()
         dialog = page.get_by_role("dialog")
         risks = dialog.locator("[data-risks] li")
@@ -59,7 +59,7 @@ async def test_an_unsigned_upload_is_refused_until_each_package_is_accepted_by_n
     async with running_managed(tmp_path) as address:
         page = await new_page(size="tablet")
         await page.goto(f"{address}interfaces")
-        await page.get_by_label("Or a file of this device").set_input_files(upload)
+        await page.get_by_label("Or a file on this device").set_input_files(upload)
         await page.get_by_role("button", name="Upload").click()
         dialog = page.get_by_role("dialog")
         await expect(dialog.get_by_text("Refused: not signed")).to_be_visible()

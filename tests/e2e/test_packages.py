@@ -107,12 +107,12 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
     assert "robots/my-puppet 1.0.0 has these permissions:" in told
     assert "connects by tcp (wire): host from the settings: {{ settings.host }}" in told
     assert "port always 6789" in told
-    assert "secret: is given what the setting key holds" in told
+    assert "secret: receives the value of the setting key" in told
     assert "commands: beep" in told
     assert "widget dial: a program in" in told
     assert person.does("list").startswith("robots/my-puppet 1.0.0  with drivers/puppet 1.0.0, ")
     person.does("repo", "search")
-    assert "what it said last is used" in person.complaints
+    assert "its last index is used" in person.complaints
     assert "`wire` | tcp" in person.does("docs", "my-puppet")
     words = ["serve", "my-puppet", "--simulate", "--port", "0"]
     dashboard = UrcProcess(words, {"URC_DATA_DIR": str(person.folder)})

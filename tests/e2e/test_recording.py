@@ -241,7 +241,7 @@ async def test_a_recording_is_played_on_the_same_page(replayed: str, new_page: P
     await expect(page.locator(".joystick-note")).to_have_text("◆ this page only watches")
     await page.get_by_role("button", name="Pause").click()
     await expect(page.get_by_role("button", name="Play")).to_be_visible()
-    place = page.get_by_role("slider", name="Place in the recording")
+    place = page.get_by_role("slider", name="Position in the recording")
     length = float(await place.get_attribute("max") or 0)
     assert length > 2
     await place.fill(str(round(length / 2, 1)))
@@ -253,7 +253,7 @@ async def test_a_recording_is_played_on_the_same_page(replayed: str, new_page: P
 
 
 async def _keyboard_moves_it(page: Page) -> None:
-    place = page.get_by_role("slider", name="Place in the recording")
+    place = page.get_by_role("slider", name="Position in the recording")
     await place.focus()
     await place.press("Home")
     await expect(page.locator("[data-tape-time]")).to_contain_text("0:00 /")

@@ -200,7 +200,7 @@ async def test_a_second_stick_of_the_same_command_is_refused(pair: Pair) -> None
     """One hand on one stick."""
     _, robot = pair
     async with robot.drive():
-        with pytest.raises(UrcError, match="'drive' has a stick already"):
+        with pytest.raises(UrcError, match="'drive' already has a stick"):
             async with robot.drive():
                 pytest.fail("it opened")
 

@@ -141,7 +141,7 @@ async def test_the_token_may_come_from_the_environment(tmp_path: Path) -> None:
         assert (await ran(*where, URC_TOKEN=KEY))[0] == 0
         code, _, err = await ran(*where, URC_TOKEN=WRONG_TOKEN)
         assert code == 1
-        assert "does not accept the token: it is unknown, removed or over" in err
+        assert "does not accept the token: it is unknown, removed or expired" in err
         assert WRONG_TOKEN not in err
 
 

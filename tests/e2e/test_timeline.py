@@ -53,7 +53,7 @@ async def test_the_dev_page_says_who_moved_the_robot_and_who_was_refused(
     address = (await process.wait_for_async(r"(http://\S+)"))[1]
     dev, first, second = [await fresh(new_page) for _ in range(3)]
     await dev.goto(f"{address}robots/rover/dev")
-    await until_text(dev, STATE, "Nothing has happened yet.")
+    await until_text(dev, STATE, "No entries yet.")
     for page in (first, second):
         await page.goto(f"{address}robots/rover/")
         await expect(page.locator(".joystick[data-phase='idle']")).to_have_count(1)

@@ -101,7 +101,7 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         assert download.suggested_filename == "authority.crt"
         file = home / "authority.crt"
         await download.save_as(file)
-        way = page.get_by_role("link", name="Open URC with HTTPS")
+        way = page.get_by_role("link", name="Open URC over HTTPS")
         assert await way.get_attribute("href") == others
         guide = page.locator("[data-guide=linux]")
         command = await guide.locator("ol code").inner_text()
@@ -123,7 +123,7 @@ async def test_a_fresh_browser_trusts_the_authority(urc_process: Start, tmp_path
         assert features["Encrypted connection"]
         assert features["Clipboard"]
         assert not features["Passkeys"]  # at an IP address
-        assert await page.locator("a", has_text="Open URC with HTTPS").count() == 0
+        assert await page.locator("a", has_text="Open URC over HTTPS").count() == 0
         cookies = [one for one in await context.cookies() if one["value"] and "urc" in one["name"]]
         assert any(one["secure"] and one["httpOnly"] for one in cookies)
 

@@ -91,11 +91,11 @@ async def test_a_passkey_is_added_and_signs_in(
     await expect(part).to_contain_text("No passkeys yet.")
     await part.get_by_label("Name of the new passkey").fill("Ann’s phone")
     await part.get_by_role("button", name="Add a passkey").click()
-    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey is added.")
+    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey was added.")
     await expect(part.get_by_label("Name of the passkey")).to_have_value("Ann’s phone")
     await expect(part.locator(".urc-row")).to_contain_text("localhost")
     await part.get_by_role("button", name="Add a passkey").click()
-    already = "This device has a passkey already."
+    already = "This device already has a passkey."
     await expect(page.locator("[data-said]")).to_contain_text(already)
     found = await session.send("WebAuthn.getCredentials", {"authenticatorId": phone})
     (kept,) = found["credentials"]
@@ -109,7 +109,7 @@ async def test_a_passkey_is_added_and_signs_in(
     await expect(part.locator(".urc-row")).to_contain_text("last use")
     await part.get_by_label("Name of the passkey").fill("Old phone")
     await part.get_by_label("Name of the passkey").press("Enter")
-    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey has a new name.")
+    await expect(page.locator("[data-said]")).to_have_text("✓ The passkey was renamed.")
     await part.get_by_role("button", name="Remove Old phone").click()
     await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
     await expect(part).to_contain_text("No passkeys yet.")
@@ -159,7 +159,7 @@ async def test_a_copied_passkey_is_refused(
     copy = {"authenticatorId": phone, "credential": found["credentials"][0]}
     await session.send("WebAuthn.addCredential", copy)
     refused = await call(page, "signInWithPasskey()")
-    assert "its counter went back" in str(refused)
+    assert "its counter did not increase" in str(refused)
 
 
 async def test_an_address_of_numbers_says_why_it_has_no_passkeys(
@@ -169,8 +169,8 @@ async def test_an_address_of_numbers_says_why_it_has_no_passkeys(
     page = await new_page()
     new_page.allow(page, is_refused)
     await page.goto(address)
-    assert "Open this page by a host name." in str(await call(page, "obstacle()"))
-    assert "Open this page by a host name." in str(await call(page, "signInWithPasskey()"))
+    assert "Open this page by its host name." in str(await call(page, "obstacle()"))
+    assert "Open this page by its host name." in str(await call(page, "signInWithPasskey()"))
 
 
 @contextmanager

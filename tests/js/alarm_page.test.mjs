@@ -97,7 +97,7 @@ test("the list has every alarm, its cause and its actions, and hidden ones apart
   assert.deepEqual(list.children.map((item) => item.getAttribute("data-alarm")), ["s0", "s2"]);
   const [first, second] = list.children;
   assert.match(first?.textContent ?? "", /Signal 0: High, 9→ Clean it\.Dust\.not acknowledged · high priority · since .* · number 0 · 4 times/);
-  assert.match(second?.textContent ?? "", /value unknown: the alarm stays/);
+  assert.match(second?.textContent ?? "", /value unknown: the alarm stays active/);
   const hidden = /** @type {FakeElement} */ (body.querySelector("[data-alarm-hidden]"));
   assert.match(hidden.textContent, /Signal 1.*shelved by Ada, 1 min left/);
   first?.querySelector("[data-key=see-s0]")?.fire("click");

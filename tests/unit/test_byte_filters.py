@@ -50,7 +50,7 @@ def test_filter_gives(source: str, expected: object) -> None:
 @pytest.mark.parametrize("name", BYTE_FILTERS)
 def test_bytes_are_refused_in_text(name: str) -> None:
     """One line at load, and another filter behind it may make text of them."""
-    with pytest.raises(ExpressionError, match=f"'{name}' gives bytes, which only") as refused:
+    with pytest.raises(ExpressionError, match=f"'{name}' returns bytes, which only") as refused:
         compile_template(f"GO {{{{ x | {name} }}}}")
     assert refused.value.offset == 10
     compile_template(f"GO {{{{ x | {name} | md5 }}}}")

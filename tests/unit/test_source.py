@@ -264,7 +264,7 @@ def test_million_lines_are_refused_by_size(tmp_path: Path) -> None:
     file = tmp_path / "long.yaml"
     file.write_bytes(b"a: 1\n" * 1_000_000)
     problem = refused_file(file)
-    assert (problem.code, problem.message) == ("too-large", "a document has at most 1024 KiB")
+    assert (problem.code, problem.message) == ("too-large", "this document is larger than 1024 KiB")
 
 
 @pytest.mark.parametrize(
@@ -311,11 +311,11 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         ("a: [1, 2\n", "open-bracket", (1, 4),
          "close it with ']'; a value with special characters needs quotes"),
         ('a: "\\d"\n', "bad-escape", (1, 5),
-         "use single quotes, in which a backslash is plain text and a quote is written"
-         " twice: ''; in double quotes, write a backslash as \\\\"),
+         "use single quotes, where a backslash is plain text and '' is a quote; in double quotes,"
+         " write a backslash as \\\\"),
         ('a: "\\xZZ"\n', "bad-escape", (1, 5),
-         "use single quotes, in which a backslash is plain text and a quote is written"
-         " twice: ''; in double quotes, write a backslash as \\\\"),
+         "use single quotes, where a backslash is plain text and '' is a quote; in double quotes,"
+         " write a backslash as \\\\"),
     ],
 )  # fmt: skip
 def test_traps_of_yaml_are_told_with_their_remedy(

@@ -120,7 +120,7 @@ def change_grants(
     with store.transaction():
         found = store.directory().principals.get(principal)
         if found is None:
-            raise AccessError("it was removed already")
+            raise AccessError("it was already removed")
         grants = tuple(dict.fromkeys(change(found.grants)))
         store.set_grants(principal, grants)
     return grants
@@ -150,7 +150,7 @@ def invite_person(
         if person is None and not grants:
             raise AccessError(f"no person has the name {name!r}; a new person needs a role")
         if person is not None and grants:
-            raise AccessError(f"{person.name!r} exists already; change the roles of this person")
+            raise AccessError(f"{person.name!r} already exists; change the roles of this person")
         if person is None:
             person = store.add("person", name, grants, now=now)
         base.execute("DELETE FROM invitations WHERE kind = 'person' AND owner = ?", (person.id,))
@@ -205,7 +205,7 @@ def add_token(
     if not grants:
         raise AccessError("a token needs a role")
     if ends_at is not None and ends_at <= now:
-        raise AccessError("the end of the token is past")
+        raise AccessError("the token's end is in the past")
     with store.transaction():
         program = store.add("program", name, grants, now=now, commands=commands, ends_at=ends_at)
         _, token = store.open_sign_in(program.id, "token", now=now, ends_at=ends_at)

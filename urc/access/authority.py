@@ -167,9 +167,9 @@ class CertificateAuthority:
             self.file.with_suffix(".key").read_bytes(), password=None
         )
         if not isinstance(key, ec.EllipticCurvePrivateKey):
-            raise ValueError("the key is of another kind")
+            raise ValueError("expected an elliptic-curve key")
         if key.public_key() != self._root.public_key():
-            raise ValueError("key and certificate do not belong together")
+            raise ValueError("the key does not match the certificate")
         self._key = key
 
     def _make(self, more: Sequence[x509.GeneralName]) -> None:

@@ -62,7 +62,7 @@ def parse_grant(text: str) -> Grant:
     if separator and scope in ("", _TAG):
         raise AccessError(f"expected a robot or #tag after @, found {text!r}")
     if role == "administer" and scope not in ("", ALL):
-        raise AccessError(f"administer is for all robots: write 'administer', found {text!r}")
+        raise AccessError(f"administer applies to all robots: write 'administer', found {text!r}")
     return Grant(role, scope or ALL)
 
 

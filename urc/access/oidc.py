@@ -124,7 +124,7 @@ class OidcSignIn:
         if flow is None or not compare_digest(flow.binding, digest_of(binding)):
             raise AccessError(_LATE)
         if answer.get("iss", self.options.issuer) != self.options.issuer:
-            raise AccessError("the browser came back from another provider")  # RFC 9207
+            raise AccessError("the browser returned from a different provider")  # RFC 9207
         code, error = answer.get("code"), answer.get("error")
         if error or not code:
             reason = error if error and error.isidentifier() and len(error) <= 40 else "no code"

@@ -128,7 +128,7 @@ def read_oidc_options(file: str) -> OidcOptions:
         isinstance(each, str) and each.isascii() and each.isprintable() and " " not in each
         for each in scopes
     ):
-        raise options.fault(("scopes",), f"expected a list of scopes with {_OPENID!r}")
+        raise options.fault(("scopes",), f"expected a list of scopes that contains {_OPENID!r}")
     authority = options.text("authority_file", "")
     if authority and not (options.folder / authority).is_file():
         raise options.fault(("authority_file",), f"there is no file {options.folder / authority}")

@@ -80,7 +80,7 @@ def _check_times(claims: Mapping[str, Any], now: float) -> None:
 def _time(claims: Mapping[str, Any], name: str) -> float:
     found = claims.get(name)
     if isinstance(found, bool) or not isinstance(found, int | float):
-        raise AccessError(f"the provider's token has no time {name!r}")
+        raise AccessError(f"the provider's token has no valid time {name!r}")
     return found
 
 
@@ -108,7 +108,7 @@ def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 raise AccessError("the signature of the provider's token is wrong") from None
         except (JoseError, ValueError, TypeError, KeyError):
             continue  # a key for another algorithm
-    raise UnknownKey("the provider's token has an unknown key")
+    raise UnknownKey("the provider's token is signed with an unknown key")
 
 
 def _key(data: Mapping[str, Any]) -> Any:

@@ -110,7 +110,7 @@ class OptionsFile:
             raise self.fault((key,), f"{file} cannot be read: {error.strerror}") from None
         if os.name == "posix" and mode & _READABLE_BY_OTHERS:
             raise self.fault(
-                (key,), f"all users of this machine may use {file}; run: chmod o= {file}"
+                (key,), f"all users of this machine can access {file}; run: chmod o= {file}"
             )
         secret = content.decode("utf-8", "replace").strip()
         if not shortest <= len(secret) <= _LONGEST_SECRET:

@@ -23,7 +23,7 @@ __all__ = [
     "pair",
 ]
 
-UNKNOWN_CODE: Final = "this code is unknown, was used already, or is too old"
+UNKNOWN_CODE: Final = "this code is unknown, already used, or expired"
 
 
 class Origin(NamedTuple):

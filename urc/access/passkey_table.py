@@ -72,7 +72,7 @@ class PasskeyTable:
                 passkey,
             )
             if added.rowcount == 0:
-                raise AccessError("this passkey is registered already")
+                raise AccessError("this passkey is already registered")
         return passkey
 
     def find(self, passkey: str) -> Passkey | None:

@@ -35,7 +35,7 @@ _LOCAL: Final = "localhost"
 _DEFAULT_PORTS: Final = {"http": 80, "https": 443}
 _LONGEST_RESPONSE: Final = 65536
 _REFUSED: Final = "the passkey was refused: sign in again, or in another way"
-_LATE: Final = "the sign-in took too long, or was answered already: try again"
+_LATE: Final = "the request took too long, or is already complete: try again"
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +72,8 @@ def relying_party(host: str, port: int | None) -> RelyingParty:
         pass
     else:
         raise AccessError(
-            f"browsers offer no passkeys on the address {name}: open this page by a host name"
+            f"browsers do not offer passkeys for the address {name}:"
+            " open this page by its host name"
         )
     schemes = ("https", "http") if name == _LOCAL or name.endswith(f".{_LOCAL}") else ("https",)
     return RelyingParty(name, tuple(_origin(scheme, name, port) for scheme in schemes))
@@ -219,10 +220,12 @@ class Passkeys:
             credential_current_sign_count=0,
         )
         if passkey.counter and proof.new_sign_count <= passkey.counter:
-            log.warning("the counter of the passkey %r went back: it may be a copy", passkey.name)
+            log.warning(
+                "the counter of the passkey %r did not increase: it may be a copy", passkey.name
+            )
             raise AccessError(
-                "the passkey may have been copied: its counter went back. Sign in in another way,"
-                " and replace the passkey"
+                "the passkey may have been copied: its counter did not increase. Use another way to"
+                " sign in, and replace the passkey"
             )
         self.table.used(passkey.id, proof.new_sign_count, now)
         return passkey._replace(counter=proof.new_sign_count, used_at=now)

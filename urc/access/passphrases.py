@@ -58,7 +58,7 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
     if length > LONGEST:
         raise AccessError(f"the passphrase has {length} characters; at most {LONGEST} are allowed")
     if not passphrase.isprintable():
-        raise AccessError("the passphrase has characters that cannot be shown")
+        raise AccessError("the passphrase contains unprintable characters")
     if len(set(passphrase)) < _FEWEST_DIFFERENT:
         raise AccessError(f"the passphrase needs {_FEWEST_DIFFERENT} different characters")
     if name and passphrase.casefold() == name.casefold():

@@ -82,7 +82,7 @@ def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) ->
         else:
             found.append((proxy, users[0].decode("utf-8", "replace").strip() if users else ""))
     if len(found) > 1:
-        return ProxiedRequest(kept, fault="two proxies have proven themselves in one request")
+        return ProxiedRequest(kept, fault="one request contains the secrets of several proxies")
     if not found:
         return ProxiedRequest(kept, fault=fault)
     return ProxiedRequest(kept, *found[0], fault)
@@ -97,7 +97,7 @@ def read_proxy_options(file: str) -> TrustedProxy:
     options = OptionsFile(file, KEYS)
     user, secret = (_header(options, key) for key in ("user_header", "secret_header"))
     if user == secret:
-        raise options.fault(("secret_header",), "expected another header than user_header")
+        raise options.fault(("secret_header",), "expected a header other than user_header")
     options.text("secret_file")
     return TrustedProxy(
         options.text("name"),
@@ -112,7 +112,7 @@ def _header(options: OptionsFile, key: str) -> bytes:
     name = options.text(key)
     if not _HEADER.fullmatch(name) or _TAKEN.fullmatch(name):
         raise options.fault(
-            (key,), f"expected a header of its own such as X-Forwarded-User, found {name!r}"
+            (key,), f"expected a dedicated header such as X-Forwarded-User, found {name!r}"
         )
     return name.lower().encode()
 

@@ -200,7 +200,7 @@ class AccessStore:
             try:
                 self._insert("principals", row)
             except sqlite3.IntegrityError:
-                raise AccessError(f"a {kind} has the name {principal.name!r} already") from None
+                raise AccessError(f"a {kind} already has the name {principal.name!r}") from None
         return principal
 
     def rename(self, principal: str, name: str) -> None:
@@ -332,7 +332,7 @@ class AccessStore:
             )
             (count,) = self._base.execute("SELECT count(*) FROM invitations").fetchone()
             if count >= MOST_INVITATIONS:
-                raise AccessError(f"{count} codes are valid; wait until some have ended")
+                raise AccessError(f"{count} codes are valid; wait until some have expired")
             self._base.execute(
                 "INSERT INTO invitations VALUES (?, ?, ?, ?, ?, ?)",
                 (
@@ -421,7 +421,7 @@ class AccessStore:
     def _update(self, statement: str, *values: object) -> None:
         with self._change():
             if self._base.execute(statement, values).rowcount == 0:
-                raise AccessError("it was removed already")
+                raise AccessError("it was already removed")
 
 
 def parse_name(name: str) -> str:
@@ -436,7 +436,7 @@ def parse_name(name: str) -> str:
     if len(name) > LONGEST_NAME:
         raise AccessError(f"the name has {len(name)} characters; expected at most {LONGEST_NAME}")
     if not name.isprintable():
-        raise AccessError("the name has characters that cannot be shown")
+        raise AccessError("the name contains unprintable characters")
     return name
 
 

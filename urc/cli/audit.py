@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     action.add_argument(
         "--export",
         metavar="FILE",
-        help="write all entries as JSON lines that can be checked later; - prints them",
+        help="export all entries as JSON lines for a later --check; '-' prints them",
     )
     action.add_argument(
         "--check",

@@ -34,13 +34,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     data, file = arguments.data or data_folder(), arguments.file
     if file.exists() and not arguments.replace:
-        raise UrcError(f"{file} exists already; --replace replaces the file")
+        raise UrcError(f"{file} already exists; --replace replaces the file")
     if not parts_in(data)[0]:
         raise UrcError(f"{data} has nothing to back up; select another folder with --data-dir")
     written, unknown = write_backup(data, file, BackupManifest(1, __version__, time.time()))
     audit_access(data, "backup", file=file.name)
     size = max(1, file.stat().st_size >> 10)
-    print(f"{file}: {len(written)} files, {size} KiB; keep it like a key, because it contains keys")
+    print(f"{file}: {len(written)} files, {size} KiB; keep it secret, because it contains keys")
     if unknown:
         more = f" and {len(unknown) - _MOST_NAMED} more" if len(unknown) > _MOST_NAMED else ""
         complain(printable(f"not in the backup: {', '.join(unknown[:_MOST_NAMED])}{more}"))

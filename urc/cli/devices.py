@@ -108,12 +108,12 @@ def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
     words_of(arguments, "devices")
     address = server_address(store.file.parent, arguments.address)
     if arguments.owner and arguments.roles:
-        raise Misuse("a device has either the roles of its --owner, or roles of its own by --role")
+        raise Misuse("use either --owner or --role: with --owner, a device has its owner's roles")
     owner = named(store, "person", arguments.owner) if arguments.owner else None
     roles = () if owner else roles_in(arguments.roles or [_USUAL_ROLE])
     name = parse_name(arguments.name) if arguments.name else ""
     if name and principal_named(store.directory(), "device", name):
-        raise UrcError(f"a device has the name {name!r} already")
+        raise UrcError(f"a device already has the name {name!r}")
     invite_device(store, address, roles, name=name, owner=owner)
     return 0
 

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     parser.add_argument(
         "--for", dest="seconds", type=duration, default=DEFAULT_S, metavar="TIME",
-        help="duration of listening for announcements (default: 3s)",
+        help="time to listen for announcements (default: 3s)",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print one JSON line per result")
 

@@ -43,7 +43,7 @@ EXTRAS = {
 }
 """For each optional package, the extra that installs it and its purpose."""
 OPTIONAL = {
-    "google-re2": "patterns without provably linear run time; refused without this package",
+    "google-re2": "patterns without provably linear run time; without it, URC refuses them",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
 }
 FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
@@ -156,7 +156,7 @@ def _authority(data: Path) -> str:
     try:
         root = x509.load_pem_x509_certificate(file.read_bytes())
     except FileNotFoundError:
-        return "not needed yet: the first server for other machines makes it"
+        return "not needed yet: URC creates it for the first server that other machines can reach"
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
         raise UrcError(f"{file} cannot be used: {reason}") from error

@@ -91,11 +91,7 @@ def _is_ours(handle: int) -> bool:
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
     """Declare the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
-    which = (
-        " of emulated robots: FAULT affects all robots, ROBOT:FAULT a single robot;"
-        if has_names
-        else ","
-    )
+    which = " for all emulated robots, or ROBOT:FAULT for a single robot," if has_names else ","
     name = "tello:" if has_names else ""
     parser.add_argument(
         "--fault",

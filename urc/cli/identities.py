@@ -71,7 +71,7 @@ def add_format(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("text", "json"),
         default="text",
-        help="list: a table, or one JSON line for each entry (default: text)",
+        help="list: 'text' prints a table, 'json' one JSON line for each entry (default: text)",
     )
 
 

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--allow-more",
         action="store_true",
-        help="with --yes: also accept new permissions compared with another installed version",
+        help="with --yes: also accept permissions that the installed version does not have",
     )
     add_risks(parser)
     add_waivers(parser)

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         type=Path,
         help="parent folder of the new folder"
-        " (default: 'widgets' in the current folder, next to the robots with the widget)",
+        " (default: 'widgets' in the current folder, next to the robots that use the widget)",
     )
 
 

@@ -186,7 +186,7 @@ def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
 def is_agreed(question: str) -> bool:
     """Ask the user a yes-or-no question; raise `Misuse` if there is no terminal."""
     if not sys.stdin.isatty():
-        raise Misuse("no terminal is available for the question; use --yes to confirm in advance")
+        raise Misuse("cannot ask without a terminal; use --yes to confirm in advance")
     try:
         return input(f"{question} Type yes: ").strip().lower() == "yes"
     except EOFError:

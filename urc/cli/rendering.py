@@ -21,6 +21,6 @@ def warn_without_rendering(profiles: Iterable[Profile]) -> None:
     blind = [one.name for one in profiles if one.world and rendered_signals(one.world)]
     if blind:
         complain(
-            f"urc: no camera and no laser scanner of {', '.join(blind)} works without numpy and"
-            f" Pillow; to install both: {install_command('demo')}"
+            f"urc: the cameras and laser scanners of {', '.join(blind)} require numpy and Pillow;"
+            f" to install both: {install_command('demo')}"
         )

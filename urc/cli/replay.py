@@ -23,7 +23,7 @@ EXAMPLE = "urc replay puppet.mcap --speed 2"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: recording, playback options and address."""
-    parser.add_argument("recording", metavar="FILE", type=Path, help="a recording of URC")
+    parser.add_argument("recording", metavar="FILE", type=Path, help="recording to replay")
     parser.add_argument(
         "--profile",
         metavar="PROFILE",

@@ -68,7 +68,7 @@ def _ended(new: Path, people_only: bool) -> list[str]:
     ]
     if devices or tokens or people:
         lines.append(
-            "changes after the backup are undone: remove people, devices and tokens that were"
-            " removed since ('urc people list', 'urc devices list', 'urc tokens list')"
+            "people, devices and tokens that were removed after the backup are valid again:"
+            " remove them ('urc people list', 'urc devices list', 'urc tokens list')"
         )
     return lines

@@ -8,7 +8,7 @@ EXAMPLE = "urc search battery --kind widget"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: search words and output format."""
     parser.add_argument(
-        "words", metavar="WORD", nargs="*", help="words that a package must contain"
+        "words", metavar="WORD", nargs="*", help="words in the name, kind or summary of a package"
     )
     parser.add_argument(
         "--kind",

@@ -107,7 +107,7 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
             hint = what_it_has(name, command.arguments)
             raise Misuse(f"{command.name} has no argument {name!r}; {hint}")
         if name in values:
-            raise Misuse(f"{name} is given twice")
+            raise Misuse(f"{name} appears twice")
         if argument.type == "array":
             values[name] = _elements(argument, text)
         else:

@@ -141,7 +141,7 @@ def _add_sign_in(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--oidc",
         metavar="FILE",
-        help="file with the OpenID Connect provider whose accounts sign in: see docs/sign-in.md",
+        help="file that describes the OpenID Connect provider for sign-ins: see docs/sign-in.md",
     )
     parser.add_argument(
         "--trust-proxy",
@@ -149,7 +149,8 @@ def _add_sign_in(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="file with a proxy that signs people in, and names them in a header",
+        help="file that describes a trusted proxy, which signs people in and sends their names"
+        " in a header",
     )
     parser.add_argument(
         "--without-sign-in",
@@ -179,7 +180,7 @@ def _add_alarms(parser: argparse.ArgumentParser) -> None:
         "--monitor-alarms",
         dest="monitors",
         action="store_true",
-        help="keep all robots with alarms connected, so that alarms are judged with no page open",
+        help="keep all robots with alarms connected, to evaluate alarms even if no page is open",
     )
     parser.add_argument(
         "--notify-alarms",

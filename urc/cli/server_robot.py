@@ -37,7 +37,7 @@ def add_server(parser: argparse.ArgumentParser) -> None:
         "--authority",
         metavar="FILE",
         type=Path,
-        help="PEM file with the local authority of the server (default: trust of this system)",
+        help="PEM file with the local authority of the server (default: this system's trust store)",
     )
     parser.add_argument(
         "--allow-unencrypted",

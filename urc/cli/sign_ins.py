@@ -28,7 +28,7 @@ _FEWEST_DIGITS = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: action and selection."""
-    add_actions(parser, _ACTIONS, "list; end ID…: end sign-ins by id, or by the start of the id")
+    add_actions(parser, _ACTIONS, "list; end ID…: end sign-ins by id, or by the id's first digits")
     parser.add_argument(
         "--of",
         metavar="NAME",
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all",
         action="store_true",
-        help="end: all sign-ins of people and guests; paired devices and tokens stay",
+        help="end: all sign-ins of people and guests; paired devices and tokens remain valid",
     )
     add_format(parser)
 

@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=_commands,
         default=[],
-        help="add: the only commands of the program, such as goto,dock (default: all of its role)",
+        help="add: the only commands that the program may run, such as goto,dock"
+        " (default: all commands of its role)",
     )
     parser.add_argument(
         "--ends",
@@ -123,7 +124,7 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
     print(token)
     complain(
         f"the token of {program.name} ({scope}) ends: {local_time(end)};"
-        " keep it now, because URC never shows it again"
+        " store it now, because URC never shows it again"
     )
     return 0
 

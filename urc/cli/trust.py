@@ -29,9 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         help="ssh transport, required if the profile has several",
     )
-    parser.add_argument(
-        "--yes", metavar="SHA256:…", help="trust this fingerprint without a question"
-    )
+    parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint without asking")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -123,7 +121,7 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
 
 def _is_confirmed() -> bool:
     if not sys.stdin.isatty():
-        raise Misuse("no terminal is available for the question; use --yes SHA256:… to trust a key")
+        raise Misuse("cannot ask without a terminal; use --yes SHA256:… to trust a key")
     try:
         return input("Is this the key of the robot? Type yes: ").strip().lower() == "yes"
     except EOFError:

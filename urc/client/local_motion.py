@@ -165,7 +165,7 @@ class LocalMotion(ProgramControls):
             while not self.controller.rests(command):
                 if self._clock.now() >= ends_s:
                     raise MotionEnded(
-                        f"the connection accepted no stop for {_STILL_S:g} s; the guard continues"
+                        f"the connection accepted no stop for {_STILL_S:g} s; the guard retries"
                     )
                 await asyncio.sleep(_LOOK_S)
         finally:
@@ -197,8 +197,8 @@ class LocalMotion(ProgramControls):
 
     def _failed(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (fault := task.exception()) is not None:
-            log.error("a task of the controls failed; motion ends", exc_info=fault)
-            self.end_all("a task of the controls failed")
+            log.error("a motion task failed; motion ends", exc_info=fault)
+            self.end_all("a motion task failed")
 
 
 def _unread(entry: AuditEntry) -> None:

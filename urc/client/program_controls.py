@@ -24,7 +24,7 @@ STOP_REASONS: Final[Mapping[Reason, str]] = {
     "revoked": "the connection to the robot was cut",
 }
 """Text that explains why a motion ended, by the reason that the guard reports."""
-_LEFT: Final = "the context of drive has ended"
+_LEFT: Final = "the drive context has ended"
 
 
 def only_control(controls: tuple[str, ...], command: str) -> str:
@@ -80,7 +80,7 @@ class ProgramControls(ABC):
         """Return the context of `urc.client.robot.RobotInterface.drive`."""
         name = only_control(self.controls, command)
         if name in self.sticks:
-            raise UrcError(f"{name!r} has a stick already; leave its context first")
+            raise UrcError(f"{name!r} already has a stick; exit its context first")
         stick = self.sticks[name] = Stick(name, checked_validity(valid_s))
         sampling: asyncio.Task[None] | None = None
         try:

@@ -328,7 +328,7 @@ class RemoteRobot(HubReadings):
         self._session = hello.session
         self.alarms.clear()
         if self._ready.is_set():
-            self._note("info", "the connection is back")
+            self._note("info", "the connection was restored")
         else:
             self.hub = Hub(signals)
             self._order = tuple(signals.values())

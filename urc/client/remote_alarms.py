@@ -89,4 +89,4 @@ class RemoteAlarms:
         try:
             return tuple(str(one) for one in answer["signals"])
         except (KeyError, TypeError):
-            raise UrcError("the server sent an unknown answer about alarms") from None
+            raise UrcError("the server sent an invalid response about alarms") from None

@@ -113,7 +113,7 @@ class RemoteMotion(ProgramControls):
             if not _is_ours(lease):
                 stick.end(_taken(lease))
             elif lease.epoch != self._epochs[command]:
-                stick.end("the controls were taken again")
+                stick.end("a newer lease replaced this stick's lease")
 
     def _end(self, command: str, reason: str) -> None:
         for name, stick in self.sticks.items():

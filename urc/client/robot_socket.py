@@ -183,12 +183,12 @@ class RobotSocket:
         if isinstance(error, ssl.SSLCertVerificationError):
             return ConnectionLost(
                 f"the certificate of {where} is not trusted: {error.verify_message};"
-                " name the file of the server's authority"
+                " specify the file of the server's authority"
             )
         if isinstance(error, TimeoutError):
             return ConnectionLost(f"{where} did not answer within {self._timeout_s:g} s")
         if isinstance(error, InvalidHandshake):
-            return ConnectionLost(f"{where} is not a server of URC: {printable(str(error))}")
+            return ConnectionLost(f"{where} is not a URC server: {printable(str(error))}")
         why = getattr(error, "strerror", None) or error
         return ConnectionLost(f"cannot reach {where}: {printable(str(why))}")
 
@@ -197,7 +197,7 @@ class RobotSocket:
         if code == CLOSE_NOT_LET_IN:
             # The server's own text is for people with a browser.
             return AccessDenied(
-                f"{self.address.url} does not accept the token: it is unknown, removed or over"
+                f"{self.address.url} does not accept the token: it is unknown, removed or expired"
             )
         fault = ConnectionLost(self._final or reason or "the server closed the connection")
         fault.is_final = bool(self._final) or code in _FOR_GOOD

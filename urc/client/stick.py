@@ -153,7 +153,7 @@ async def sample_stick(
         at_s = now()
         held_up_s, sampled_s = at_s - sampled_s, at_s
         if is_moving and held_up_s > HELD_UP_S:
-            stick.end(f"this program was held up for {held_up_s * 1000:.0f} ms")
+            stick.end(f"this program was blocked for {held_up_s * 1000:.0f} ms")
             break
         given = stick.sample()
         if given is None:

@@ -241,7 +241,7 @@ class SyncRobot:
         """The robot's alarms; raise `UrcError` for a robot without a server."""
         found = getattr(self._robot, "alarms", None)
         if not isinstance(found, RemoteAlarms):
-            raise UrcError("alarms are listed by a server: use urc.client.sync.open")
+            raise UrcError("only a server lists alarms: use urc.client.sync.open")
         return SyncAlarms(found, self._thread)
 
     def _here(self, read: Callable[[], _Result]) -> _Result:

@@ -73,6 +73,6 @@ def refuse_moving(
         problems.error(
             part,
             "wrong-command",
-            f"{command.name!r} starts autonomous motion, and must not run automatically",
+            f"{command.name!r} starts autonomous motion, so it must not run automatically",
             hint="run a command without motion; only an operator may start autonomous motion",
         )

@@ -37,7 +37,7 @@ def link_role(problems: Problems, part: Node, command: Command) -> None:
         problems.error(
             part,
             "role-too-low",
-            f"a command of this sequence needs the role {command.role!r}",
+            f"a command in this sequence needs the role {command.role!r}",
             at="role",
             hint=f"write role: {command.role}, or remove 'role'",
         )

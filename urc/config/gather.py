@@ -106,7 +106,7 @@ def _gather_robot(sources: Sources, library: Library) -> None:
             "missing-key",
             "a robot needs 'driver' or 'transports'",
             key=True,
-            hint="name the document of a driver, or declare the transports of the robot",
+            hint="name a driver document, or declare the robot's transports",
         )
     sources.add(root)
     for name, inner in root.named("interfaces").items():

@@ -73,7 +73,7 @@ def _rule(code: str, summary: str) -> dict[str, object]:
     rule: dict[str, object] = {"id": code}
     if summary:
         rule["shortDescription"] = {"text": summary}
-    rule["help"] = {"text": f"'urc explain {code}' explains this problem."}
+    rule["help"] = {"text": f"Run 'urc explain {code}' for an explanation."}
     return rule
 
 

@@ -59,7 +59,7 @@ def resolve(path: str, registry: WidgetFolder, profile: Profile | None = None) -
     made = _default_look(sources, profile)
     if made:
         told = " and ".join(f"'{key}'" for key in made)
-        lines.append(f"# URC made {told}: the document declares no interface.")
+        lines.append(f"# URC generated {told}: the document declares no interface.")
     for key, node in (*_sections(sources, registry), *made.items()):
         lines += _entry(key, node, 0)
     return ResolvedProfile("\n".join(lines) + "\n", tuple(problems))

@@ -58,15 +58,15 @@ class Freshness:
             of: the control. Sequence numbers are checked separately for each control.
         """
         if given.epoch != epoch:
-            return f"the input belongs to lease {given.epoch}, but the present lease is {epoch}"
+            return f"the input belongs to lease {given.epoch}, but the current lease is {epoch}"
         if given.number <= self._newest.get(of, -1):
             return "the input is not newer than the last one"
         back = self._number - given.echo
         if not 0 <= back < len(self._issued):
-            return "the input echoes no beat of this server"
+            return "the input does not echo a beat of this server"
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
-            return f"Link too slow: your input came {(now - issued_at) * 1000:.0f} ms late"
+            return f"Link too slow: your input arrived {(now - issued_at) * 1000:.0f} ms late"
         self._newest[of] = given.number
         return ""
 

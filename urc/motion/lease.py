@@ -160,7 +160,7 @@ class Lease:
         if not includes(client.role, "drive"):
             return LeaseRefused("viewers cannot drive")
         if state.asked_by is not None and state.asked_by.id != client.id:
-            return LeaseRefused(f"{_called(state.asked_by)} asks for the controls already")
+            return LeaseRefused(f"{_called(state.asked_by)} has already asked for control")
         for_s = min(max(for_s, SHORTEST_REQUEST_S), LONGEST_REQUEST_S)
         self.state = state._replace(asked_by=client, asked_until=now + for_s)
         return LeaseChanged(self.state, must_stop=False)
@@ -169,7 +169,7 @@ class Lease:
         """Hand over or keep the lease, according to the holder's answer."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
-            return LeaseRefused("No screen asks you for control")
+            return LeaseRefused("No screen is asking you for control")
         if is_granted:
             return self._grant(state.asked_by, now)
         self.state = state._replace(asked_by=None, asked_until=0.0)
@@ -207,7 +207,7 @@ class Lease:
         A reset does not start motion.
         """
         if not includes(client.role, "drive"):
-            return LeaseRefused("viewers can stop the robot, and cannot reset it")
+            return LeaseRefused("viewers can stop the robot, but cannot reset it")
         if not self.state.latched_by:
             return LeaseRefused("nothing is stopped")
         self.state = self._next()

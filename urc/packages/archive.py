@@ -64,9 +64,9 @@ def name_fault(path: str) -> str:
         return f"{path!r} is an absolute path"
     parts = path.split("/")
     if ".." in parts or ".." in path.split("\\"):
-        return f"{path!r} leads out of the package"
+        return f"{path!r} points outside the package"
     if len(path) > _LONGEST or len(parts) > _DEEPEST:
-        return f"{path[:_LONGEST]!r} is too long or too deep: {_DEEPEST} levels at most"
+        return f"{path[:_LONGEST]!r} is too long or too deep: expected at most {_DEEPEST} levels"
     for part in parts:
         if not _PART.fullmatch(part) or part.endswith(".") or _RESERVED.fullmatch(part):
             return (
@@ -99,7 +99,7 @@ def _folder_fault(seen: dict[str, str]) -> str:
             if other != folder:
                 return f"{folder!r} and {other!r} differ only in case"
             if folder.casefold() in seen:
-                return f"{folder!r} is a file and a folder"
+                return f"{folder!r} is both a file and a folder"
     return ""
 
 

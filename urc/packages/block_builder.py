@@ -90,7 +90,7 @@ def _index(folder: Path) -> Index:
 def _signer(index_signer: IndexSigner | None) -> IndexSigner:
     if index_signer is None:
         raise PackageError(
-            "clients believe only a signed list of blocked packages;"
+            "clients accept only a signed list of blocked packages;"
             " create a key with 'urc repo key new NAME'"
         )
     return index_signer

@@ -112,7 +112,7 @@ class BlockStore:
                 elif one.listed == listed and one.number == number:
                     return
             if len(others) >= _LISTS_MOST:
-                raise PackageError(f"{place}: at most {_LISTS_MOST} block lists can be known")
+                raise PackageError(f"{place}: at most {_LISTS_MOST} block lists can be stored")
             self._write([*others, new])
 
     def forget(self, key: str) -> None:

@@ -136,9 +136,7 @@ async def _exchange(
         if method == "GET" and status != 200:
             return HttpResponse(status if status == 304 else 404, "", b"")
         if response.headers.get("content-encoding", "identity") != "identity":
-            raise PackageError(
-                f"{url}: the server compressed its response without a request for compression"
-            )
+            raise PackageError(f"{url}: the server compressed its response without being asked")
         content = bytearray()
         async for piece in response.aiter_raw():
             content += piece

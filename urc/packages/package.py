@@ -68,7 +68,7 @@ def pack_folder(folder: Path) -> Package:
 def _files(folder: Path, below: str = "", depth: int = 0) -> Iterator[tuple[str, str]]:
     """Yield the relative and the absolute path of every file in a folder."""
     if depth > 8:
-        raise PackageError(f"{folder}: folders are nested too deep")
+        raise PackageError(f"{folder}: folders are nested too deeply")
     with os.scandir(folder) as entries:
         found = sorted(entries, key=lambda entry: entry.name)
     for entry in found:

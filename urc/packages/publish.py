@@ -81,7 +81,7 @@ def publish(
             ) from None
         if said.sha256 != package.digest:
             raise PackageError(
-                f"{address}: the server listed bytes that differ from the sent bytes"
+                f"{address}: the server listed an archive that differs from the uploaded archive"
             )
         return msgspec.structs.replace(said, is_new=answer.status == 201)
     raise PackageError(f"{address}: {_reason(answer.status, answer.body)}")

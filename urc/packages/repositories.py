@@ -96,7 +96,7 @@ class Repository:
             if kept is None:
                 raise
             self._trust.check(kept[1].said)
-            self._complain(f"{error}; what it said last is used")
+            self._complain(f"{error}; its last index is used")
             return kept[0].packages
 
     def refresh(self) -> Index:

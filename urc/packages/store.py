@@ -367,8 +367,8 @@ def _not_installed(required: PackageRequirement, locks: tuple[Lock, ...]) -> str
     ]
     if needed:
         return f"{required} was installed only as a dependency: {'; '.join(needed)}"
-    names = ", ".join(map(str, locks))
-    return f"{required} is not installed" + (f"; there is {names}" if names else "; nothing is")
+    names = ", ".join(map(str, locks)) or "nothing"
+    return f"{required} is not installed; installed: {names}"
 
 
 def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:

@@ -196,7 +196,7 @@ class MotionEncoder:
         if not (line.is_open and line.is_ready):
             raise MotionUnavailable("the robot is not connected")
         if line.is_silent:
-            raise MotionUnavailable(f"the robot has said nothing for {line.spec.stale_after_s:g} s")
+            raise MotionUnavailable(f"the robot has sent nothing for {line.spec.stale_after_s:g} s")
         if way.is_guarded:
             refused = why_refused(way.command, self._known, values, confirmed_by, now)
             if refused is not None:

@@ -82,7 +82,7 @@ class AlarmStore:
             for robot, record in load_records(self.file):
                 known.setdefault(robot, {})[record.signal] = record
         except OSError as error:
-            log.warning("the alarms of the last run are forgotten: %s", error)
+            log.warning("the alarms of the last run are lost: %s", error)
         return known
 
     def save(
@@ -195,7 +195,7 @@ class AlarmStore:
 
     def _report(self, fault: str) -> None:
         if fault and not self.fault:  # only the first of several failures
-            log.warning("alarms cannot be stored: %s; a restart would forget them", fault)
+            log.warning("alarms cannot be stored: %s; a restart would lose them", fault)
         elif self.fault and not fault:
             log.warning("alarms can be stored again")
         self.fault = fault

@@ -119,7 +119,7 @@ def _create(base: sqlite3.Connection) -> None:
             for statement in _CREATE:
                 base.execute(statement)
         elif version > _VERSION:
-            raise sqlite3.OperationalError("a newer version of URC made this file")
+            raise sqlite3.OperationalError("a newer version of URC created this file")
         base.execute("COMMIT")
     except sqlite3.Error:
         with suppress(sqlite3.Error):

@@ -117,7 +117,7 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
         try:
             row, before = _parsed(line)
         except ValueError as error:
-            return ExportCheck(count, f"line {number} is no entry: {error}", gap, last, chain)
+            return ExportCheck(count, f"line {number} is not an entry: {error}", gap, last, chain)
         if count and row.id <= last:
             fault = f"line {number}: entry {row.id} does not follow from entry {last}"
         elif count and row.id == last + 1 and before != chain:

@@ -221,13 +221,13 @@ class BackupReader:
         except (OSError, *_DAMAGE) as error:
             raise BackupError(f"{name}: the archive is damaged: {error}") from None
         if not entries or entries[0].filename != MANIFEST:
-            raise BackupError(f"{name}: this is not a backup of URC")
+            raise BackupError(f"{name}: this is not a URC backup")
         self.manifest = self._manifest(entries[0])
         self.files = [self._checked(entry) for entry in entries[1:]]
         """All files of the archive."""
         paths = [one.path for one in self.files]
         if len(set(map(str.casefold, paths))) != len(paths):
-            raise BackupError(f"{name}: a file is present twice")
+            raise BackupError(f"{name}: a file occurs twice")
         if sum(one.size for one in self.files) > MOST_BYTES:
             raise BackupError(f"{name}: expected at most {MOST_BYTES} bytes in all files")
 
@@ -262,7 +262,7 @@ class BackupReader:
                 break
             target.write(block)
         if left:
-            raise BackupError(f"{self._name}: {one.path!r} has another size than declared")
+            raise BackupError(f"{self._name}: {one.path!r} has a different size than declared")
 
     def _manifest(self, entry: zipfile.ZipInfo) -> BackupManifest:
         try:
@@ -272,7 +272,7 @@ class BackupReader:
         except (msgspec.DecodeError, OSError, *_DAMAGE):
             raise BackupError(f"{self._name}: the description of the backup is damaged") from None
         if manifest.format != 1:
-            raise BackupError(f"{self._name}: a newer version of URC made this backup")
+            raise BackupError(f"{self._name}: a newer version of URC created this backup")
         return manifest
 
     def _checked(self, entry: zipfile.ZipInfo) -> BackupFile:
@@ -282,7 +282,7 @@ class BackupReader:
         if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
             raise BackupError(f"{self._name}: {path!r} is not an ordinary file")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise BackupError(f"{self._name}: {path!r} is compressed in an unknown way")
+            raise BackupError(f"{self._name}: {path!r} uses an unknown compression method")
         # Only files of packages may be readable to others: a changed mode must not expose a key.
         allowed = _READABLE if path.startswith("packages/") else _PRIVATE
         return BackupFile(path, entry.file_size, mode & allowed | _PRIVATE)
@@ -309,7 +309,7 @@ def _check_end(opened: IO[bytes], name: str) -> None:
     opened.seek(max(0, size - _END_BYTES))
     end = opened.read(_END_BYTES)
     if len(end) < _END_BYTES or not end.startswith(b"PK\x05\x06"):
-        raise BackupError(f"{name}: this is not a backup of URC, or its end is missing")
+        raise BackupError(f"{name}: this is not a URC backup, or its end is missing")
     count, directory = struct.unpack("<HI", end[10:16])
     if count > MOST_FILES or directory > MOST_FILES * _ENTRY_BYTES:
         raise BackupError(f"{name}: the archive has too many files")

@@ -51,7 +51,7 @@ CAUSES: Final = (
     _CauseRow(
         "permission",
         ("permission denied", "access is denied"),
-        "the user of URC may not open the device: add the user to the device's group",
+        "URC's user is not allowed to open the device: add the user to the device's group",
         "serial",
     ),
     _CauseRow(

@@ -126,7 +126,7 @@ class ContactStore:
         except FileNotFoundError:
             return
         except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            log.warning("%s cannot be read (%s): the menu has a new order", file, error)
+            log.warning("%s cannot be read (%s): the order of the menu is reset", file, error)
             return
         newest = sorted(
             ((name, ContactTimes(*times)) for name, times in stored.robots.items()),

@@ -50,12 +50,12 @@ def check_target(data: Path, *, replaces: bool) -> None:
     for file, server in servers(data).items():
         raise BackupError(
             f"a server is running at {server.address} (process {server.pid});"
-            f" end it first, or delete {file} if it is not a server"
+            f" stop the server first, or delete {file} if that process is not a server"
         )
     parts, _ = parts_in(data)
     if parts and not replaces:
         raise BackupError(
-            f"{data} has data already, such as {parts[0]};"
+            f"{data} already contains data, such as {parts[0]};"
             " make a backup of it, then add --replace to replace the data"
         )
 

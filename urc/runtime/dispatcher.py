@@ -320,7 +320,7 @@ class Dispatcher:
         if self._waiting.is_full:
             text = f"{MAX_WAITING} commands are already waiting; the new command was dropped"
         else:
-            text = "the robot accepts no more bytes at the moment; the command was dropped"
+            text = "the robot currently accepts no more bytes; the command was dropped"
         return Failed(request.id, request.command, "queue-full", text)
 
     def _run(self, step: Callable[[float], Sequence[Event]]) -> None:

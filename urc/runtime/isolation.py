@@ -55,7 +55,7 @@ def look_apart(
         said = json.loads(done.stdout)
     except ValueError:
         raise UrcError(
-            f"{document.name}: its preview needs more than {PROCESSOR_S} s of processor time and"
+            f"{document.name}: its preview needs more than {PROCESSOR_S} s of processor time or"
             f" {MEMORY_BYTES >> 20} MiB of memory"
         ) from None
     if "problems" in said:

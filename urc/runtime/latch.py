@@ -20,7 +20,7 @@ RETRY_S = 5.0
 _MOST_BYTES = 4096
 _LONGEST_NAME = 200
 _BEFORE = ", before a restart"
-_UNREADABLE = "URC, whose record of the last stop cannot be read"
+_UNREADABLE = "URC, because the record of the last stop cannot be read"
 
 log = logging.getLogger(__name__)
 

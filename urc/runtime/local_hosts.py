@@ -47,8 +47,8 @@ def check_hosts(profile: Profile) -> None:
         host = _fixed(spec.options)
         if host:
             raise UrcError(
-                f"{profile.file}: the transport {spec.name} has the fixed host {host}, this machine"
-                " itself: a package may use it only through a setting"
+                f"{profile.file}: the transport {spec.name} has the fixed host {host}, which is"
+                " this machine: a package may use this machine only through a setting"
             )
 
 

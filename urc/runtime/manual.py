@@ -272,7 +272,7 @@ def _releases(driver: Driver) -> Iterator[str]:
 def _by_itself(watchdog_s: float | None) -> str:
     """Describe what the robot itself does if no more frames arrive, not even for a release."""
     if watchdog_s is None:
-        return "The document does not say whether the robot stops by itself."
+        return "The document does not state whether the robot stops by itself."
     if math.isinf(watchdog_s):
         return "The robot does not stop by itself: the last command continues."
     return f"Without further commands, the robot stops by itself: {shown_duration(watchdog_s)}."

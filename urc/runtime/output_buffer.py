@@ -127,7 +127,7 @@ class OutputBuffer:
         size = size_of(data)
         if self._bytes + size > MAX_QUEUED_BYTES:
             dropped = self._bytes + size
-            self._give_up(f"the robot accepts no more bytes; {dropped} queued ones were dropped")
+            self._give_up(f"the robot accepts no more bytes; {dropped} queued bytes were dropped")
             return
         self._waiting.append(item)
         self._bytes += size

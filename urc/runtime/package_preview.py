@@ -48,7 +48,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     lines = _of_profile(checked.profile) if checked.profile else []
     return [
         *lines,
-        *(phrase("has the browser show the page {url}", url=url) for url in checked.pages),
+        *(phrase("makes the browser show the page {url}", url=url) for url in checked.pages),
         *(
             phrase(
                 "widget {name}: a program in a frame of its own; it sees and gives what its cell is"
@@ -57,7 +57,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
             )
             for name in widgets
         ),
-    ] or [phrase("nothing: it is a layout, with no connection of its own")]
+    ] or [phrase("nothing: it is only a layout, without connections")]
 
 
 def _check_inside(checked: CheckResult, folder: Path) -> None:
@@ -74,10 +74,10 @@ def _of_profile(profile: Profile) -> list[str]:
     lines: list[str] = [_of_transport(spec, profile) for spec in profile.driver.transports.values()]
     for setting in profile.settings.values():
         if setting.type == "path":
-            lines.append(phrase("file: the one that the setting {name} names", name=setting.name))
+            lines.append(phrase("file: the path in the setting {name}", name=setting.name))
         if setting.is_secret:
             lines.append(
-                phrase("secret: is given what the setting {name} holds", name=setting.name)
+                phrase("secret: receives the value of the setting {name}", name=setting.name)
             )
     commands = profile.driver.commands
     moving = sorted(name for name, command in commands.items() if command.hold or command.moves)
@@ -127,7 +127,7 @@ def _told(value: Any, profile: Profile) -> str:
 
 _FILES: Final = {
     "key": phrase("a key file"),
-    "known_hosts": phrase("a file of known hosts"),
+    "known_hosts": phrase("a known-hosts file"),
     "ca": phrase("a file of certificates"),
     "cert": phrase("a certificate file"),
 }

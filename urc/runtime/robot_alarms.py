@@ -41,7 +41,7 @@ CONNECTION: Final = Signal(
             (
                 "lost",
                 AlarmAttributes(
-                    cause="The robot is switched off or out of reach, so no value is known.",
+                    cause="The robot is switched off or out of reach, so its values are unknown.",
                     action="Check the power and the network of the robot.",
                 ),
             ),

@@ -95,7 +95,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
             values are not shown in the message.
     """
     if len(text) > _LONGEST:
-        raise UrcError(f"is {len(text)} characters long; {_LONGEST} are allowed")
+        raise UrcError(f"is {len(text)} characters long; at most {_LONGEST} are allowed")
     if not setting.is_required and not text.strip():
         return setting.empty
     found = "that" if setting.is_secret else repr(text)
@@ -150,7 +150,7 @@ def _filled(option: object, settings: Mapping[str, Value]) -> object:
 def _text(text: str, found: str) -> str:
     # The environment and the command line may contain undecodable bytes; no robot accepts them.
     if any("\ud800" <= character <= "\udfff" for character in text):
-        raise UrcError(f"{found} is not text in UTF-8")
+        raise UrcError(f"{found} is not valid UTF-8 text")
     return text
 
 

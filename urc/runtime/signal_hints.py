@@ -82,9 +82,9 @@ class SignalHints:
         text = _shown(rest, spec.encoding)
         if framing.type == "delimiter":
             end = framing.options.get("rx")
-            return f"{text} waits for the delimiter {end!r} (write it in double quotes)"
+            return f"{text} waits for the delimiter {end!r} (write the delimiter in double quotes)"
         what = _WAITED_FOR.get(framing.type, "for the end of the frame")
-        passes = " (write wait: after it)" if framing.type == "idle" and self._in_steps else ""
+        passes = " (add 'wait' to the step)" if framing.type == "idle" and self._in_steps else ""
         return f"{text} waits {what}{passes}"
 
     def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:

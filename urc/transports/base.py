@@ -93,7 +93,7 @@ def bytes_of(data: Payload) -> bytes:
     """Return `data` for a connection that carries bytes; raise `TransportError` for an envelope."""
     if isinstance(data, bytes):
         return data
-    raise TransportError(f"a transport of bytes cannot carry a message ({data.verb})")
+    raise TransportError(f"a byte transport cannot carry a message ({data.verb})")
 
 
 class ByteStream(Protocol):

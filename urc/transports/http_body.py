@@ -73,7 +73,7 @@ def complaint(response: httpx2.Response, body: bytes) -> str:
     """Return the error message for a response, or "" on success."""
     target = response.headers.get("location")
     if 300 <= response.status_code < 400 and target is not None:
-        return f"robot redirected to {one_line(target)}; redirects are not followed"
+        return f"the robot redirected to {one_line(target)}; redirects are not followed"
     if response.status_code < 400:
         return ""
     status = one_line(f"{response.status_code} {response.reason_phrase}")

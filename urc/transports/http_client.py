@@ -239,7 +239,7 @@ certificates."""
 
 
 def _short(fault: Exception) -> str:
-    return one_line(str(fault) or "no reason is known").rstrip(".")
+    return one_line(str(fault) or "the reason is unknown").rstrip(".")
 
 
 def _auth(credentials: Credentials | None) -> httpx2.Auth | None:

@@ -40,7 +40,7 @@ def boundary_of(content_type: str) -> bytes:
     named = header.get_param("boundary", "")
     core = (named if isinstance(named, str) else "").strip().lstrip("-")
     if not core:
-        raise MultipartFault("the Content-Type names no boundary")
+        raise MultipartFault("the Content-Type has no boundary")
     if len(core) > MAX_BOUNDARY or not core.isascii():
         raise MultipartFault(
             f"the boundary has more than {MAX_BOUNDARY} characters, or invalid ones"
@@ -138,7 +138,7 @@ class MultipartParser:
         found = self._strict.search(self._buffer, self._from)
         end = found.start() if found else len(self._buffer) - self._keep
         if end > self._most:
-            raise MultipartFault(f"a part without an end within {self._most} bytes")
+            raise MultipartFault(f"a part has no end within {self._most} bytes")
         if found is None:
             self._from = max(0, end)
             return False

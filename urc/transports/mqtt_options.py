@@ -65,7 +65,7 @@ def read_options(setup: TransportSetup) -> MqttOptions:
     username = _options.text("mqtt", given, "username")
     password = _options.text("mqtt", given, "password")
     if password and not username:
-        raise TransportError("mqtt was given a password but no username")
+        raise TransportError("mqtt has a password but no username")
     version = str(given.get("version", 5))
     if version not in ("5", "3.1.1"):
         raise TransportError(f"mqtt needs 5 or 3.1.1 as version, not {version!r}")

@@ -126,7 +126,7 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
     if value is None:
         return ()
     if not isinstance(value, Mapping):
-        raise TransportError("ssh: environment is a list of NAME: value")
+        raise TransportError("ssh: environment must contain entries of the form NAME: value")
     pairs = []
     for name, text in value.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):

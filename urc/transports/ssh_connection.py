@@ -63,7 +63,7 @@ class SshConnection:
                 **options,
             ),
             SshChannel(self._wire, what),
-            f"{self._address.text} does not start {what}",
+            f"{self._address.text} could not start {what}",
         )  # fmt: skip
 
     async def forwarded(self, host: str, port: int) -> SshChannel:
@@ -144,7 +144,7 @@ class SshConnection:
             why = self._wire.fault or one_line(refused.reason.lower()).removeprefix(
                 "connect failed: "
             )
-            raise ConnectFailed(f"{failure} ({why or 'no reason is given'})") from refused
+            raise ConnectFailed(f"{failure} ({why or 'no reason was given'})") from refused
         except (asyncssh.Error, OSError) as fault:
             raise ConnectFailed(
                 f"{failure} ({self._wire.fault or one_line(str(fault).lower())})"

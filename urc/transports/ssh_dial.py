@@ -168,7 +168,7 @@ def _explain(target: SshTarget, client: _SshClient, fault: Exception) -> str:
                 if is_shown
             ]  # fmt: skip
             text = " and ".join(shown) or "no password and no key"
-            return f"{place} does not let {login.username!r} in (tried: {text})"
+            return f"{place} rejects the login of {login.username!r} (tried: {text})"
         case asyncssh.HostKeyNotVerifiable():
             return f"the host key of {place} is not trusted ({_first(fault.reason)})"
         case asyncssh.KeyExchangeFailed():

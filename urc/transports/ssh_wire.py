@@ -29,7 +29,7 @@ def why_lost(exc: Exception | None) -> str:
     """Return a one-line message about why a connection ended, as in other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
-            return "the connection broke (the robot does not answer any more)"
+            return "the connection broke (the robot no longer answers)"
         return HUNG_UP
     if isinstance(exc, asyncssh.DisconnectError):
         return f"{HUNG_UP} ({one_line(exc.reason.lower())})"

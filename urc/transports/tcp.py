@@ -327,6 +327,6 @@ def from_setup(setup: TransportSetup) -> Transport:
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")
     if who == "host" and not only:
-        raise TransportError("tcp needs the permitted robot as host with from: host")
+        raise TransportError("tcp needs the address of the permitted robot as host with from: host")
     tls = Tls.of("tcp", options.get("tls"), is_server=True)
     return TcpListener(bind, port, only=only if who == "host" else "", tls=tls)

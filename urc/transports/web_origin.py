@@ -72,7 +72,7 @@ class OptionReader:
         if found is None:
             return default
         if not isinstance(found, str):
-            raise TransportError(f"{self.kind} needs a text as {name}, not {found!r}")
+            raise TransportError(f"{self.kind} needs text as {name}, not {found!r}")
         return found.strip()
 
     def choice(self, name: str, choices: tuple[str, ...], default: str) -> str:
@@ -171,7 +171,7 @@ class OptionReader:
         if place.is_secure:
             return Tls.of(self.kind, option or True)
         if option:
-            raise TransportError(f"{self.kind} has tls options, but its url is without TLS")
+            raise TransportError(f"{self.kind} has tls options, but its url does not use TLS")
         return None
 
 

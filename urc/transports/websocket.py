@@ -268,14 +268,14 @@ def _refusal(fault: Exception, where: str) -> str:
         response = fault.response
         target = response.headers.get("Location")
         if 300 <= response.status_code < 400 and target is not None:
-            return f"robot redirected to {one_line(target)}; redirects are not followed"
+            return f"the robot redirected to {one_line(target)}; redirects are not followed"
         status = one_line(f"{response.status_code} {response.reason_phrase}")
         return f"{where} answered {status} instead of a WebSocket"
     if isinstance(fault, NegotiationError):
         return f"{where} requires a feature that was not offered ({one_line(str(fault))})"
     if isinstance(fault, InvalidMessage | EOFError | ConnectionError):
         return f"the server on {where} does not speak HTTP, or closed the connection"
-    return f"the server on {where} is not a WebSocket ({one_line(str(fault))})"
+    return f"the server on {where} is not a WebSocket server ({one_line(str(fault))})"
 
 
 def _end(ended: ConnectionClosed) -> str:

@@ -30,13 +30,13 @@ _SCHEMES: Final = {
         "type": "apiKey",
         "in": "cookie",
         "name": "urc-sign-in",
-        "description": "The sign-in of a browser; the cookie's name has an identifier at its end."
+        "description": "The sign-in of a browser; the cookie's name ends with an identifier."
         " A request that changes something also needs the Origin header of this server.",
     },
 }
 _ABOUT: Final = (
     "Programs send `Authorization: Bearer TOKEN` with each request. Times are in seconds. The"
-    " WebSocket `/ws` is the other stream of a robot, and the better way for motion."
+    " WebSocket `/ws` also streams a robot's values, and is better for motion."
 )
 _ALL: Final = (413, 429, 503)
 """Failures of every call: an oversized request, or too many requests or connections."""
@@ -102,7 +102,7 @@ def _operation(call: Call) -> dict[str, Any]:
 
 def _right(right: Right) -> str:
     if right.role is None:
-        return "none; also without a sign-in"
+        return "none; a sign-in is not required"
     if right.is_local:
         return "the start key"
     where = {"robot": "at this robot", "server": "for all robots", "anywhere": "at any robot"}

@@ -523,7 +523,7 @@ async def _told(request: Request, error: Exception) -> Response:
 
 
 async def _broken(request: Request, _: Exception) -> Response:
-    text = words.t("Something broke inside URC. The server's log says what.")
+    text = words.t("URC had an internal error. The server's log has the details.")
     if request.url.path.startswith(API):
         return told(500, text)
     return HTMLResponse(error_page(request.state.nonce, 500, text), 500, headers=_PAGE)

@@ -83,7 +83,7 @@ class BrowserClient:
         elif self._service.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
         elif not self._service.has_room_for(self._peer):
-            await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
+            await self._refuse(wire.CLOSE_FULL, "too many of your screens watch this robot")
         else:
             with self._service.visit(self._peer.who):
                 await self._visit()

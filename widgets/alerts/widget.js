@@ -80,7 +80,7 @@ export default {
     function unknown() {
       const count = watched.limited - watched.known;
       if (!isUp) return t("no connection to URC");
-      return count > 0 ? t("values not known now: {count} of {all}", { count, all: watched.limited }) : "";
+      return count > 0 ? t("unknown values: {count} of {all}", { count, all: watched.limited }) : "";
     }
 
     /** @param {string} name */

@@ -62,7 +62,7 @@ export class Mapping {
       this.buttons.push(learn);
     }
     const forget = () => this.view && this.ctx.pads.setMap(this.view.id, null);
-    this.list.append(button(LEARN, t("As the browser says"), forget, { signal }));
+    this.list.append(button(LEARN, t("As reported by the browser"), forget, { signal }));
   }
 
   /** @param {Part} one */

@@ -77,7 +77,7 @@ class TestView {
 
   /** @param {PadView | null} view */
   draw(view) {
-    const none = this.t("press a button of the gamepad");
+    const none = this.t("press a button on the gamepad");
     write(this.device, view ? this.named(view) : `— ${none}`);
     const { axes = [], buttons = [] } = view ?? {};
     this.fill(this.axes, axes.length, "gamepad-axis");

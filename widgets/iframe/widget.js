@@ -75,7 +75,7 @@ class Shown {
   }
 
   silent() {
-    return `◆ ${this.t("the page does not answer, or does not let itself be shown in another")}`;
+    return `◆ ${this.t("the page does not respond, or does not allow other pages to show it")}`;
   }
 
   /** @param {HTMLIFrameElement} frame */
@@ -105,7 +105,7 @@ class Shown {
   tell() {
     const isInside = this.isInside();
     attribute(this.root, "data-inside", isInside ? "yes" : null);
-    const keys = isInside ? `▲ ${this.t("keys go to this page, Space as well: STOP is on the screen")}` : "";
+    const keys = isInside ? `▲ ${this.t("this page receives all keys, including Space: use STOP on the screen")}` : "";
     write(this.note, [this.fault, keys].filter(Boolean).join(" · "));
   }
 

@@ -72,5 +72,5 @@ function still({ options, t }, root, place, words, fail) {
     if (root.dataset["state"] === "none") root.dataset["state"] = "live";
   });
   if (source) image.src = source;
-  else fail(t("◆ the options name no picture"));
+  else fail(t("◆ the options contain no picture"));
 }

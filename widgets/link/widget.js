@@ -84,7 +84,7 @@ export default {
       /** @type {[string, string][]} */
       const rows = [
         [t("round trip"), tripMs === null ? DASH : `${figure(tripMs)} ms`],
-        [t("middle / 95 %"), trips.share(0.5) === null ? DASH : `${figure(trips.share(0.5))} / ${figure(trips.share(0.95))} ms`],
+        [t("median / 95 %"), trips.share(0.5) === null ? DASH : `${figure(trips.share(0.5))} / ${figure(trips.share(0.95))} ms`],
         [t("late"), late === null ? DASH : `${Math.round(100 * late)} %`],
         [t("messages"), Number.isFinite(rate.messages) ? `${Math.round(rate.messages)} /s` : DASH],
         [t("data"), Number.isFinite(rate.bytes) ? `${(rate.bytes / 1000).toFixed(1)} kB/s` : DASH],

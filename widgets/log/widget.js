@@ -39,9 +39,9 @@ export default {
       const last = held?.at(-1)?.number ?? -1;
       const waiting = held ? lines.filter(({ number }) => number > last).length : newer;
       const words = [
-        held ? t("◆ held still; {count} newer", { count: waiting }) : "",
-        missing > 0 ? t("{count} lines were lost on the way", { count: missing }) : "",
-        wanted.length === 0 ? `— ${lines.length > 0 ? t("no line fits") : t("no line yet")}` : "",
+        held ? t("◆ paused; {count} newer", { count: waiting }) : "",
+        missing > 0 ? t("{count} lines were lost", { count: missing }) : "",
+        wanted.length === 0 ? `— ${lines.length > 0 ? t("no line matches") : t("no line yet")}` : "",
       ];
       write(note, words.filter(Boolean).join(" · "));
       attribute(pause, "aria-pressed", String(held !== null));

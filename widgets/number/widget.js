@@ -46,7 +46,7 @@ export default {
       if (why === "low") return t("◆ not below {limit}", { limit: setpoint.text(bounds.min) });
       if (why === "high") return t("◆ not above {limit}", { limit: setpoint.text(bounds.max) });
       if (why === "whole") return t("◆ a whole number is expected");
-      return why === "empty" ? t("◆ type a number") : t("◆ this is no number");
+      return why === "empty" ? t("◆ type a number") : t("◆ this is not a number");
     }
 
     /**

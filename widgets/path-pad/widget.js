@@ -221,7 +221,7 @@ class PathPad {
     write(this.value, isDrawn ? t("{count} points · {length} {unit}", words) : "—");
     attribute(this.go, "disabled", points.length > 1 && !this.isBusy && !reason ? null : "");
     for (const button of [this.undo, this.clear]) attribute(button, "disabled", isDrawn && !this.isBusy ? null : "");
-    const hint = isDrawn ? t("look at it, then send it or cancel") : t("draw a path, or tap its points");
+    const hint = isDrawn ? t("check the path, then send or cancel it") : t("draw a path, or tap its points");
     write(this.note, reason ? `◆ ${reason}` : outcome || hint);
   }
 

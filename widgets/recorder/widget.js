@@ -75,7 +75,7 @@ class Recorder {
     if (this.isOn) write(this.clock, span((performance.now() - this.begunMs) / 1000));
     this.keep.disabled = count === 0;
     const { lost } = this.recording;
-    const loss = lost > 0 ? t("▲ {count} lost on the way", { count: lost }) : "";
+    const loss = lost > 0 ? t("▲ {count} lost", { count: lost }) : "";
     write(this.note, [this.words(count, isFull), loss].filter(Boolean).join(" · "));
   }
 
@@ -87,7 +87,7 @@ class Recorder {
     const { t } = this.ctx;
     if (isFull) return t("◆ full: {count} rows", { count });
     if (this.isOn) return t("● recording: {count} rows", { count });
-    if (count > 0) return t("{count} rows, not saved by itself", { count });
+    if (count > 0) return t("{count} rows, not saved automatically", { count });
     return worst(this.readings).state === "none" ? `— ${t("no value yet")}` : t("nothing recorded");
   }
 }

@@ -87,7 +87,7 @@ class Scene {
     } catch {
       // The text below still describes the pose.
       this.stage = null;
-      this.fault = t("this browser draws no WebGL");
+      this.fault = t("this browser does not support WebGL");
       return;
     }
     this.stage.canvas.className = "scene3d-picture";
@@ -248,7 +248,7 @@ class Scene {
     write(this.text, isShown && (said || bent) ? said : DASH);
     write(this.joints, isShown ? bent : "");
     const count = model?.missing.length ?? 0;
-    const missing = count > 0 ? ["◆", t("shapes that are missing: {count}", { count })].join(" ") : "";
+    const missing = count > 0 ? ["◆", t("missing shapes: {count}", { count })].join(" ") : "";
     const note = worst ? noteOf(worst, t) : "";
     write(this.note, [this.fault ? `▲ ${this.fault}` : "", missing, note].filter(Boolean).join(" · "));
   }

@@ -89,7 +89,7 @@ class Table {
     const first = this.body.children[0];
     if (rows.length > 0 || !first) return;
     attribute(first, "data-level", "unknown");
-    const texts = [this.rows.length === 0 ? "—" : "", this.rows.length === 0 ? "" : t("no row fits the filter"), ""];
+    const texts = [this.rows.length === 0 ? "—" : "", this.rows.length === 0 ? "" : t("no row matches the filter"), ""];
     [...first.children].forEach((cell, place) => (place ? write : writeLevel)(cell, texts[place] ?? ""));
   }
 }

@@ -79,9 +79,9 @@ export default {
         const pairs = pairsOf(text);
         if ("value" in pairs) return pairs.value;
         const words = {
-          empty: t("◆ type bytes, as 06 05 FF"),
-          odd: t("◆ a digit is missing: bytes are pairs"),
-          letters: t("◆ only 0 to 9 and A to F are bytes"),
+          empty: t("◆ type bytes, such as 06 05 FF"),
+          odd: t("◆ a digit is missing: each byte has two digits"),
+          letters: t("◆ bytes contain only 0 to 9 and A to F"),
           long: t("◆ too many bytes"),
         };
         fault = words[pairs.fault];
@@ -102,7 +102,7 @@ export default {
       last = lines.at(-1);
     });
     each("line", ({ value }, missed) => {
-      if (missed > 0) screen.write(t("… lines left out: {count}", { count: missed }));
+      if (missed > 0) screen.write(t("… lines omitted: {count}", { count: missed }));
       if (value !== null) heard(String(value));
     });
     return {

@@ -64,7 +64,7 @@ export default {
      * @param {boolean} isTyping whether an empty field is valid for now
      */
     function faultOf(value, isTyping = false) {
-      if (value === "" && !isTyping) return t("◆ type a text");
+      if (value === "" && !isTyping) return t("◆ type some text");
       if (!argument?.allowsControl && /\p{Cc}/u.test(value)) return t("◆ control characters are not allowed");
       const choices = argument?.choices ?? [];
       const isOne = choices.length === 0 || choices.some((choice) => String(choice) === value);

@@ -57,7 +57,7 @@ class Sensor {
   /** Return the reason why there is no sensor, or "". */
   missing() {
     if (!isSecureContext) {
-      return this.t("Browsers give the tilt sensor to HTTPS pages only: drag on the pad instead.");
+      return this.t("Browsers offer the tilt sensor only to HTTPS pages: drag on the pad instead.");
     }
     return typeof DeviceOrientationEvent === "undefined"
       ? this.t("This browser has no tilt sensor: drag on the pad instead.")
@@ -75,7 +75,7 @@ class Sensor {
         /** @type {unknown} */ (DeviceOrientationEvent)
       );
       if (asks.requestPermission && (await asks.requestPermission()) !== "granted") {
-        this.fault(this.t("The tilt sensor was refused: drag on the pad instead."));
+        this.fault(this.t("Access to the tilt sensor was refused: drag on the pad instead."));
         return;
       }
     } catch (error) {

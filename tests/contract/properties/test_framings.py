@@ -152,7 +152,7 @@ def test_wrong_checksum_says_what_would_be_right() -> None:
     """The profile author sees both numbers."""
     [fault] = framing(NMEA).decoder().feed(GGA + b"48\r\n")
     assert fault == FrameFault(
-        "bad-checksum", "the frame carries the checksum '48', expected '47'; dropped"
+        "bad-checksum", "the frame has the checksum '48', expected '47'; dropped"
     )
 
 
@@ -194,18 +194,19 @@ REFUSED = [
      "b'a>b' contains b'>', a marker of the framing"),
     ("{ type: brackets, open: '~', close: '~' }", b"",
      "an empty frame cannot be sent between two equal markers"),
-    ("{ type: json }", b'{"a": 1', "b'{\"a\": 1' is not one JSON object or array"),
-    ("{ type: json }", b"{}{}", "b'{}{}' is not one JSON object or array"),
-    ("{ type: xml }", b"<a/><b/>", "b'<a/><b/>' is not one XML element"),
-    ("{ type: xml }", b"<a></b>", "b'<a></b>' is not one XML element"),
-    ("{ type: xml }", b"go", "b'go' is not one XML element"),
+    ("{ type: json }", b'{"a": 1', "b'{\"a\": 1' is not a single JSON object or array"),
+    ("{ type: json }", b"{}{}", "b'{}{}' is not a single JSON object or array"),
+    ("{ type: xml }", b"<a/><b/>", "b'<a/><b/>' is not a single XML element"),
+    ("{ type: xml }", b"<a></b>", "b'<a></b>' is not a single XML element"),
+    ("{ type: xml }", b"go", "b'go' is not a single XML element"),
     ("{ type: regex, pattern: '[a-z]+;' }", b"ab;c;",
      "b'ab;c;' does not match the pattern of the framing"),
-    ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n': this makes"
-     " two frames"),
+    ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n': this"
+     " would make two frames"),
     ("{ type: switch, cases: [{ first: 1, framing: { type: fixed, size: 2 } }] }", b"\x02\x03",
      "no case of the framing matches b'\\x02\\x03'"),
-    (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n': this makes two frames"),
+    (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n': this would make"
+     " two frames"),
     ("{ type: datagram, checksum: { algorithm: sum8, from_hex: true } }", b"xy",
      "the checksum needs hex digits, found other bytes"),
 ]  # fmt: skip

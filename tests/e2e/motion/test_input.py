@@ -100,7 +100,7 @@ async def test_a_new_gesture_moves_again_after_each_of_them(new_page: PageMaker)
             await robot.until_moving()
             await fire(page, "window.dispatchEvent(new Event('blur'))")
             await robot.until_stopped()
-            assert "the window lost the focus" in (
+            assert "the window lost focus" in (
                 await text_of(page, "[data-cell='0'] .joystick-note").text_content() or ""
             )
             await page.mouse.up()

@@ -100,7 +100,7 @@ def test_program_that_says_nothing_is_told_with_what_it_said() -> None:
     """A wait has an end, and its failure shows the program's last lines."""
     with (
         Program([sys.executable, "-c", "print('hm')"]) as program,
-        pytest.raises(AssertionError, match="a line with 'ready': not within 60 s; it said:\nhm"),
+        pytest.raises(AssertionError, match="a line with 'ready': not within 60 s; output:\nhm"),
     ):
         program.wait_for("ready", 60)  # it has ended long before
 

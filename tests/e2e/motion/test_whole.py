@@ -205,7 +205,7 @@ async def test_a_stop_by_request_reaches_a_robot_that_nobody_looks_at(
             said = await page.evaluate(
                 "fetch('/api/v1/robots/rover/stop', { method: 'POST' }).then((said) => said.json())"
             )
-            assert said["latched"] == "a screen of this machine"
+            assert said["latched"] == "a screen on this machine"
         await until(lambda: bool(robot.lines))  # "confirmed": its line has taken it
         assert set(robot.lines) == {STOPPED}
         new_page.allow(page, lambda text: "404" in text)

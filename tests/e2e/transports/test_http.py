@@ -104,7 +104,10 @@ async def test_method_query_headers_and_body_arrive(web: Server) -> None:
     [
         ("/missing", "404 Not Found"),
         ("/busy.cgi", "503 Service Unavailable: the arm is moving"),
-        ("/moved", "robot redirected to http://127.0.0.1:1/elsewhere; redirects are not followed"),
+        (
+            "/moved",
+            "the robot redirected to http://127.0.0.1:1/elsewhere; redirects are not followed",
+        ),
         ("/basic/state.json", "401 Unauthorized"),
         ("/a\nb", "GET '/a\\nb' is not a valid request"),
         ("/flood.cgi", "the response is longer than 100000 bytes"),

@@ -286,7 +286,7 @@ async def test_profile_drives_the_emulated_robot_through_the_broker(tmp_path: Pa
     [
         ({"host": ""}, "mqtt needs a host name or address as host, not ''"),
         ({"version": 4}, "mqtt needs 5 or 3.1.1 as version, not '4'"),
-        ({"password": "x"}, "mqtt was given a password but no username"),
+        ({"password": "x"}, "mqtt has a password but no username"),
         ({"will": {"topic": "a/#"}}, "without wildcards for its will, not 'a/#'"),
         ({"will": {"topic": "a", "qos": 3}}, "mqtt needs 0, 1 or 2 as qos, not 3"),
     ],

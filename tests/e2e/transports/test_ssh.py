@@ -143,7 +143,7 @@ async def test_frozen_server_is_noticed(sshd: Sshd, mode: str) -> None:
         await line.open(OPEN_S)
         sshd.stop()
         said = await end_of(line, GONE_WITHIN_S)
-        assert said == "the connection broke (the robot does not answer any more)"
+        assert said == "the connection broke (the robot no longer answers)"
         await line.close()
         with pytest.raises(ConnectFailed) as told:
             await line.open(0.5)

@@ -24,7 +24,7 @@ async def test_wrong_password_is_told_without_repeating_it(sshd: Sshd) -> None:
     """Nor is anything left of the attempt."""
     async with nothing_left():
         said = await refusal(line_to(sshd, password=WRONG))
-    assert said == f"127.0.0.1:{sshd.port} does not let 'robot' in (tried: password)"
+    assert said == f"127.0.0.1:{sshd.port} rejects the login of 'robot' (tried: password)"
 
 
 async def test_key_logs_in_as_a_file_and_as_text(sshd: Sshd, tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ async def test_key_that_the_server_does_not_know_is_refused(sshd: Sshd, tmp_path
     """Only what was shown is told."""
     key = new_key(tmp_path / "key")
     said = await refusal(line_to(sshd, password=None, key=str(key)))
-    assert said == f"127.0.0.1:{sshd.port} does not let 'robot' in (tried: key)"
+    assert said == f"127.0.0.1:{sshd.port} rejects the login of 'robot' (tried: key)"
 
 
 async def test_locked_key_needs_its_passphrase(sshd: Sshd, tmp_path: Path) -> None:

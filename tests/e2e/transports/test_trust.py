@@ -105,7 +105,7 @@ async def test_script_must_name_the_fingerprint(controller: Desk, tmp_path: Path
     """Whatever the server shows is not good enough."""
     code, said = await controller.trusts()
     assert code == 2
-    assert "no terminal is available for the question; use --yes SHA256:… to trust a key" in said
+    assert "cannot ask without a terminal; use --yes SHA256:… to trust a key" in said
     other = fingerprint_of(new_key(tmp_path / "other"))
     code, said = await controller.trusts("--yes", other)
     assert code == 1

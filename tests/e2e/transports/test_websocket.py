@@ -146,7 +146,7 @@ async def test_server_that_is_no_websocket(tmp_path_factory: pytest.TempPathFact
             async with line(web.port, url=f"ws://{place}/moved"):
                 pass
         target = "http://127.0.0.1:1/elsewhere"
-        assert str(told.value) == f"robot redirected to {target}; redirects are not followed"
+        assert str(told.value) == f"the robot redirected to {target}; redirects are not followed"
     finally:
         web.kill()
 

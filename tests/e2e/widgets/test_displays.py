@@ -200,7 +200,7 @@ async def test_a_table_puts_the_gravest_first_and_filters(new_page: PageMaker) -
         )
         assert await rows.evaluate_all(names) == ["amps"]
         await page.fill(".table-filter", "nothing has this")
-        await until_text(page, ".table-body td:nth-child(2)", "no row fits the filter")
+        await until_text(page, ".table-body td:nth-child(2)", "no row matches the filter")
 
 
 async def test_a_heading_is_chosen_and_then_sent(new_page: PageMaker) -> None:

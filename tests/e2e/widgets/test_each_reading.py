@@ -70,7 +70,7 @@ async def test_a_recording_goes_on_out_of_sight_and_after_a_cut(new_page: PageMa
         robot.hub.publish([Sample("speed", value, robot.clock.now()) for value in (12, 13, 14)])
         await until_text(page, NOTE, "● recording: 13 rows")
         await cut_off(page, robot, "speed", 15, 16, 17)
-        await until_text(page, NOTE, "● recording: 14 rows · ▲ 2 lost on the way")
+        await until_text(page, NOTE, "● recording: 14 rows · ▲ 2 lost")
         async with page.expect_download() as saving:
             await page.locator(".recorder-save").click()
         saved = Path(await (await saving.value).path()).read_text("utf-8").splitlines()
@@ -100,5 +100,5 @@ async def test_a_terminal_shows_each_line_once(new_page: PageMaker) -> None:
         shown += ["< burst 19"]
         await expect(lines).to_have_text(shown)
         await cut_off(page, robot, "said", "one", "two", "three")
-        shown += ["… lines left out: 2", "< three"]
+        shown += ["… lines omitted: 2", "< three"]
         await expect(lines).to_have_text(shown)

@@ -35,7 +35,7 @@ said.window = open("about:blank") === null ? "none" : "opened";
 said.referrer = document.referrer;
 document.getElementById("said").textContent = JSON.stringify(said);
 </script>"""
-SILENT = "◆ the page does not answer, or does not let itself be shown in another"
+SILENT = "◆ the page does not respond, or does not allow other pages to show it"
 
 
 class Site:
@@ -130,9 +130,7 @@ async def test_a_page_of_somebody_else_is_seen_and_reaches_nothing(new_page: Pag
             assert page.url == f"{address}robots/puppet/"
 
             mine = f"{cell('mine')} .iframe-note"
-            await until_text(
-                page, mine, "◆ this is a page of the dashboard itself, which is not shown here"
-            )
+            await until_text(page, mine, "◆ pages of the dashboard itself cannot be shown here")
             assert await page.locator(f"{cell('mine')} iframe").is_hidden()
             assert not [one.url for one in page.frames[1:] if one.url == page.url]
 
@@ -141,7 +139,7 @@ async def test_a_page_of_somebody_else_is_seen_and_reaches_nothing(new_page: Pag
             await page.keyboard.type("a b")
             assert await frame.input_value("input") == "a b"
             await until_text(
-                page, note, "▲ keys go to this page, Space as well: STOP is on the screen"
+                page, note, "▲ this page receives all keys, including Space: use STOP on the screen"
             )
             asked = site.asked.count("/ui")
             await page.click(f"{cell('robot')} .iframe-reload")

@@ -211,7 +211,7 @@ async def test_a_lever_stays_only_while_a_dead_man_is_held(new_page: PageMaker) 
         await hands.lift(0)
         await hands.lift(1)
         await robot.until_stopped("level")
-        await until_text(page, ".axis-note", "◆ the dead-man was let go")
+        await until_text(page, ".axis-note", "◆ the dead-man control was released")
 
 
 async def test_an_axis_without_a_spring_stays_and_the_other_returns(new_page: PageMaker) -> None:
@@ -253,7 +253,7 @@ async def test_a_dead_man_is_a_key_too_or_a_switch_with_an_end(new_page: PageMak
         await until_values(robot, x=0.5)
         await page.keyboard.up("KeyW")
         await until_attribute(page, ".deadman", "data-open", "no")
-        await until_text(page, ".deadman-note", "◆ nothing was driven for too long")
+        await until_text(page, ".deadman-note", "◆ no control was used for too long")
 
 
 async def test_keys_drive_from_anywhere_once_they_are_switched_on(new_page: PageMaker) -> None:

@@ -37,7 +37,7 @@ async def test_what_the_page_knows_is_shown_and_acted_upon(new_page: PageMaker) 
         await page.fill(".log-filter", "")
         await page.click(".log-pause")
         robot.log("three")
-        await page.locator(".log-note", has_text="held still; 1 newer").wait_for()
+        await page.locator(".log-note", has_text="paused; 1 newer").wait_for()
         assert await lines.count() == 2
         await page.click(".log-pause")
         await lines.nth(2).wait_for()
@@ -74,11 +74,11 @@ async def test_no_alert_is_said_only_of_what_is_known(new_page: PageMaker) -> No
     async with running_dashboard(robot) as address:
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        await until_text(page, ".alerts-note", "— values not known now: 1 of 1")
+        await until_text(page, ".alerts-note", "— unknown values: 1 of 1")
         robot.set_reading("volts", 9.0, alarm="low", age_s=90)
         old = page.locator(".alerts-line[data-old='true'] .alerts-words", has_text="old")
         await old.wait_for()
-        note = "1 not acknowledged · values not known now: 1 of 1"
+        note = "1 not acknowledged · unknown values: 1 of 1"
         await until_text(page, ".alerts-note", note)
         robot.set_reading("volts", 12.0)
         await until_text(page, ".alerts-note", "1 not acknowledged")
@@ -107,7 +107,7 @@ async def test_what_was_acknowledged_stays_so_when_the_page_is_opened_anew(
         await page.goto("about:blank")
         await until(lambda: not robot.is_open)
         await page.goto(f"{address}robots/puppet/")
-        note = "0 not acknowledged · values not known now: 1 of 1"
+        note = "0 not acknowledged · unknown values: 1 of 1"
         await until_text(page, ".alerts-note", note)
         robot.set_reading("volts", 9.7, alarm="low")
         await until_text(page, ".alerts-note", "0 not acknowledged")

@@ -78,5 +78,5 @@ async def test_a_reason_leaves_a_small_stick_where_it_is(new_page: PageMaker, wi
         await until_attribute(page, ".joystick", "data-phase", "held")
         before = await page.locator(LEFT).bounding_box()
         await fire(page, "window.dispatchEvent(new Event('blur'))")
-        await until_text(page, ".joystick-note", "◆ the window lost the focus")
+        await until_text(page, ".joystick-note", "◆ the window lost focus")
         assert await page.locator(LEFT).bounding_box() == before

@@ -268,7 +268,9 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
             "() => /^2 /.test(document.querySelector('.map-words').textContent)"
         )
         await page.get_by_role("button", name="Send …").click()
-        await expect(page.locator(".map-words")).to_contain_text("Send the robot along 2 places")
+        await expect(page.locator(".map-words")).to_contain_text(
+            "Send the robot to 2 places in order"
+        )
         await page.get_by_role("button", name="Send", exact=True).click()
         await until(lambda: len(robot.commands) == 2)
         way = robot.commands[1][1]

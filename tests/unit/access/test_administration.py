@@ -65,7 +65,7 @@ def test_an_invited_person_exists_and_a_newer_code_replaces_the_older(store: Acc
     assert same == ann
     assert store.redeem(old, NOW) is None
     assert store.redeem(new, NOW) == Invitation("person", "Ann", DRIVE, ann.id, NOW + 90)
-    with pytest.raises(AccessError, match="'Ann' exists already"):
+    with pytest.raises(AccessError, match="'Ann' already exists"):
         invite_person(store, "ann", DRIVE, now=NOW, ends_at=NOW + 60)
     with pytest.raises(AccessError, match="a new person needs a role"):
         invite_person(store, "Ben", (), now=NOW, ends_at=NOW + 60)
@@ -76,7 +76,7 @@ def test_the_number_of_codes_is_bounded_and_ended_ones_make_room(store: AccessSt
     with store.transaction():
         for _ in range(MOST_INVITATIONS):
             store.invite(invitation, now=NOW)
-    with pytest.raises(AccessError, match="1000 codes are valid; wait until some have ended"):
+    with pytest.raises(AccessError, match="1000 codes are valid; wait until some have expired"):
         store.invite(invitation, now=NOW)
     store.invite(invitation._replace(ends_at=NOW + 90), now=NOW + 60)
 
@@ -196,5 +196,5 @@ def test_an_error_undoes_the_whole_transaction(store: AccessStore) -> None:
     with pytest.raises(AccessError, match="refused"):
         fail()
     assert not store.directory().principals
-    with pytest.raises(AccessError, match="it was removed already"):
+    with pytest.raises(AccessError, match="it was already removed"):
         change_grants(store, "unknown", lambda own: own)

@@ -25,7 +25,7 @@ def test_a_grant_is_read_and_written_in_one_form(text: str, grant: Grant) -> Non
         ("pilot", "expected a role (watch, drive, maintain, administer), found 'pilot' in 'pilot'"),
         ("drive@", "expected a robot or #tag after @, found 'drive@'"),
         ("drive@#", "expected a robot or #tag after @, found 'drive@#'"),
-        ("administer@cart", "administer is for all robots: write 'administer', found"
+        ("administer@cart", "administer applies to all robots: write 'administer', found"
                             " 'administer@cart'"),
     ],
 )  # fmt: skip

@@ -204,7 +204,7 @@ async def test_a_refusal_of_the_provider_is_told(provider: FakeProvider) -> None
         await house.account(error="access_denied")
     with pytest.raises(AccessError, match="refused the sign-in: no code"):
         await house.account(error="<script>", code="x")
-    with pytest.raises(AccessError, match="another provider"):
+    with pytest.raises(AccessError, match="different provider"):
         await house.account(iss="https://evil.example")
     with pytest.raises(AccessError, match="status 400: invalid_grant"):
         await house.account(code="guess")

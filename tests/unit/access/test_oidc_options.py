@@ -102,7 +102,7 @@ def test_claims_are_lists_of_text() -> None:
         ("https://id.example", "http://id.example", "expected an address with https://"),
         ("https://id.example", "https://u:p@id.example", "expected an address with https://"),
         ("https://robots.example/", "https://robots.example/x", "an address without a path"),
-        ("[openid, groups]", "[groups]", "expected a list of scopes with 'openid'"),
+        ("[openid, groups]", "[groups]", "expected a list of scopes that contains 'openid'"),
         ("[openid, groups]", "openid", "expected a list"),
         ("hours: 8", "hours: 13", "expected a number of hours up to 12, found 13"),
         ("hours: 8", "hours: 0", "expected a number of hours up to 12, found 0"),

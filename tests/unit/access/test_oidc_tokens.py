@@ -62,10 +62,10 @@ def test_the_time_may_differ_a_little() -> None:
         ({"sub": ""}, "names no account"),
         ({"sub": 17}, "names no account"),
         ({"sub": "s" * 256}, "names no account"),
-        ({"exp": None}, "no time 'exp'"),
-        ({"exp": True}, "no time 'exp'"),
-        ({"exp": "2099-01-01"}, "no time 'exp'"),
-        ({"iat": None}, "no time 'iat'"),
+        ({"exp": None}, "no valid time 'exp'"),
+        ({"exp": True}, "no valid time 'exp'"),
+        ({"exp": "2099-01-01"}, "no valid time 'exp'"),
+        ({"iat": None}, "no valid time 'iat'"),
     ],
 )
 def test_a_bad_claim_is_refused(change: dict[str, Any], message: str) -> None:

@@ -90,11 +90,11 @@ def test_each_challenge_is_valid_once(house: House) -> None:
     options = house.passkeys.registration(house.ann, PARTY, PLACE)
     made = house.phone.create(options)
     house.passkeys.register(house.ann, PARTY, made, "phone", NOW)
-    with pytest.raises(AccessError, match="answered already"):
+    with pytest.raises(AccessError, match="already complete"):
         house.passkeys.register(house.ann, PARTY, made, "again", NOW)
     answer = house.phone.get(house.passkeys.authentication(PARTY, PLACE))
     house.passkeys.authenticate(PARTY, answer, NOW)
-    with pytest.raises(AccessError, match="answered already"):
+    with pytest.raises(AccessError, match="already complete"):
         house.passkeys.authenticate(PARTY, answer, NOW)
 
 
@@ -270,7 +270,7 @@ def test_a_passkey_is_registered_once(house: House) -> None:
     house.register()
     eve = house.store.add("person", "Eve", now=NOW)
     (kept,) = house.table.of(house.ann.id)
-    with pytest.raises(AccessError, match="registered already"):
+    with pytest.raises(AccessError, match="already registered"):
         house.table.add(kept._replace(principal=eve.id))
     assert house.table.of(eve.id) == []
 
@@ -308,7 +308,7 @@ def test_passkeys_belong_to_the_host_name(host: str, port: int | None, party: Re
 
 @pytest.mark.parametrize("host", ["192.0.2.1", "127.0.0.1", "[::1]", "[fe80::1]"])
 def test_an_address_has_no_passkeys(host: str) -> None:
-    with pytest.raises(AccessError, match="open this page by a host name"):
+    with pytest.raises(AccessError, match="open this page by its host name"):
         relying_party(host, 8080)
 
 

@@ -102,12 +102,12 @@ def test_wrong_use_is_one_line(urc: Urc, tmp_path: Path) -> None:
     code, _, errors = urc("backup", file, "--data-dir", old)
     assert (code, errors) == (
         1,
-        f"urc backup: {file} exists already; --replace replaces the file\n",
+        f"urc backup: {file} already exists; --replace replaces the file\n",
     )
     assert urc("backup", file, "--data-dir", old, "--replace")[0] == 0
     code, _, errors = urc("restore", file, "--data-dir", old)
     assert code == 1
-    assert "has data already, such as access.sqlite" in errors
+    assert "already contains data, such as access.sqlite" in errors
     code, _, errors = urc("backup", tmp_path / "no" / "folder.zip", "--data-dir", old)
     assert code == 1
     assert errors.startswith("urc backup: the backup cannot be written: ")

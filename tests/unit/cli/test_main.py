@@ -213,7 +213,7 @@ def test_arguments_of_a_command_are_typed() -> None:
     [
         (["12"], "expected ARG=VALUE, such as 'n=12'; found '12'"),
         (["m=1"], "move has no argument 'm'; it has: n, x, b, s"),
-        (["n=1", "n=2"], "n is given twice"),
+        (["n=1", "n=2"], "n appears twice"),
         (["n=1.5"], "n: expected integer, found '1.5'"),
         (["x=fast"], "x: expected number, found 'fast'"),
         (["b=yes"], "b: expected true or false, found 'yes'"),

@@ -155,7 +155,7 @@ def test_roles_are_added_and_taken_away_one_by_one(urc: Run) -> None:
         (["people", "list", "Ann"], 2, "expected 'urc people list', found 1 of 0 arguments"),
         (["people", "remove", "Bem"], 1, "no person has the name 'Bem'; did you mean 'Ben'?"),
         (["people", "remove", "x"], 1, "no person has the name 'x'; known names: Ben"),
-        (["people", "add", "ben", "--role", "watch"], 1, "a person has the name 'ben' already"),
+        (["people", "add", "ben", "--role", "watch"], 1, "a person already has the name 'ben'"),
         (["people", "invite", "Ann"], 1, "no person has the name 'Ann'; a new person needs a role"),
         (
             ["people", "invite", "Ann", "--valid", "900h"],
@@ -170,7 +170,7 @@ def test_roles_are_added_and_taken_away_one_by_one(urc: Run) -> None:
         (
             ["devices", "pair", "--owner", "Ben", "--role", "watch"],
             2,
-            "a device has either the roles of its --owner, or roles of its own by --role",
+            "use either --owner or --role: with --owner, a device has its owner's roles",
         ),
         (
             ["devices", "pair", "--address", "robots.lab"],
@@ -260,7 +260,7 @@ def test_a_device_of_a_person_has_the_roles_of_the_owner(urc: Run, store: Access
         "urc devices: Phone has the roles of its owner; change the roles of the owner\n"
     )
     taken = urc("devices", "pair", "--name", "phone")
-    assert taken.errors == "urc devices: a device has the name 'phone' already\n"
+    assert taken.errors == "urc devices: a device already has the name 'phone'\n"
     assert urc("devices", "rename", "Phone", "Old phone").code == 0
     assert urc("devices", "remove", "old phone").code == 0
     assert not store.directory().sign_ins

@@ -75,5 +75,5 @@ async def test_a_shelf_has_an_end(alarms: RemoteAlarms, server: Server) -> None:
 
 async def test_an_unknown_answer_is_an_error(alarms: RemoteAlarms, server: Server) -> None:
     server.answer = {"done": True}
-    with pytest.raises(UrcError, match="unknown answer"):
+    with pytest.raises(UrcError, match="invalid response"):
         await alarms.unshelve("battery")

@@ -110,7 +110,7 @@ async def test_a_pause_of_the_process_ends_the_motion(stick: Stick) -> None:
     count = len(line.ticks)
     clock.ahead_s = HELD_UP_S + 0.1
     await task
-    assert stick.ended.startswith("this program was held up for")
+    assert stick.ended.startswith("this program was blocked for")
     assert len(line.ticks) == count
     assert len(line.releases) == 1
 

@@ -295,7 +295,7 @@ def test_resolve_writes_the_made_look_and_it_loads_as_the_same(tmp_path: Path) -
     profile = loaded(file, tmp_path).profile
     assert profile is not None
     text = resolve(str(file), registry(tmp_path / "shelf"), profile).text
-    assert "URC made 'widgets' and 'interfaces'" in text
+    assert "URC generated 'widgets' and 'interfaces'" in text
     file.write_text(text, "utf-8")
     again = loaded(file, tmp_path).profile
     assert again is not None

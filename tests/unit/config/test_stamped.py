@@ -49,7 +49,7 @@ def test_a_type_without_a_stamped_kind_is_refused(tmp_path: Path) -> None:
     folder.write(rover=rover("std_msgs/Float64", "data"))
     (problem,) = (one for one in folder.found("rover") if one.severity == "error")
     assert (problem.code, problem.path) == ("bad-value", "commands.drive.send.publish.stamped")
-    assert problem.message == "'std_msgs/Float64' has no known stamped type, or no json"
+    assert problem.message == "'std_msgs/Float64' has no known stamped type, or 'json' is missing"
 
 
 @pytest.mark.parametrize("given", ["auto", "2"])

@@ -22,7 +22,7 @@ def test_an_input_that_lay_in_a_buffer_is_refused() -> None:
     echo = fresh.issue(10.0)
     assert (
         fresh.refusal(ControlInput(3, 1, echo), 3, 10.401)
-        == "Link too slow: your input came 401 ms late"
+        == "Link too slow: your input arrived 401 ms late"
     )
 
 
@@ -53,7 +53,7 @@ def test_ticks_are_remembered_in_a_bounded_way() -> None:
         fresh.issue(number / 1000)
     assert (
         fresh.refusal(ControlInput(1, 1, first), 1, 0.0)
-        == "the input echoes no beat of this server"
+        == "the input does not echo a beat of this server"
     )
 
 
@@ -137,7 +137,7 @@ def test_echo_of_a_tick_before_the_first_is_refused() -> None:
     echo = fresh.issue(1.0)
     assert (
         fresh.refusal(ControlInput(1, 1, echo - 1), 1, 1.0)
-        == "the input echoes no beat of this server"
+        == "the input does not echo a beat of this server"
     )
 
 
@@ -147,5 +147,5 @@ def test_input_is_taken_up_to_its_greatest_age_and_told_how_old_it_is_beyond() -
     assert fresh.refusal(ControlInput(1, 1, echo), 1, OLDEST_S) == ""
     assert (
         fresh.refusal(ControlInput(1, 2, echo), 1, 2.0)
-        == "Link too slow: your input came 2000 ms late"
+        == "Link too slow: your input arrived 2000 ms late"
     )

@@ -80,18 +80,18 @@ def test_only_the_holder_answers_a_request() -> None:
     for who in ("b", "c"):
         for is_granted in (True, False):
             answered = lease.answer(who, 2.0, is_granted=is_granted)
-            assert answered == LeaseRefused("No screen asks you for control")
+            assert answered == LeaseRefused("No screen is asking you for control")
     assert (lease.state.holder, lease.state.asked_by) == (ANNA, BERT)
     lease.answer("a", 2.0, is_granted=False)
     late = lease.answer("a", 3.0, is_granted=True)
-    assert late == LeaseRefused("No screen asks you for control")
+    assert late == LeaseRefused("No screen is asking you for control")
 
 
 def test_one_asks_at_a_time_and_may_ask_again() -> None:
     lease = Lease()
     lease.acquire(ANNA, 0.0)
     lease.request(BERT, 1.0)
-    assert lease.request(CARL, 2.0) == LeaseRefused("Bert asks for the controls already")
+    assert lease.request(CARL, 2.0) == LeaseRefused("Bert has already asked for control")
     assert lease.request(EVE, 2.0) == LeaseRefused("viewers cannot drive")
     again = lease.request(BERT, 3.0)
     assert isinstance(again, LeaseChanged)

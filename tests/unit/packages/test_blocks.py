@@ -273,7 +273,7 @@ def test_the_list_of_an_unsigned_index_is_ignored(lab: Lab) -> None:
 def test_a_list_needs_a_key_and_an_index(lab: Lab, tmp_path: Path) -> None:
     entry = Block(WHY, "widgets/dial")
     before = (lab.folder / INDEX).read_bytes()
-    with pytest.raises(PackageError, match="clients believe only a signed list"):
+    with pytest.raises(PackageError, match="clients accept only a signed list"):
         block(lab.folder, entry, None)
     other = IndexSigner(new_signer("Mallory", tmp_path / "mallory.pem"))
     with pytest.raises(PackageError, match="the index is signed by Anna"):

@@ -111,10 +111,10 @@ def test_one_version_alone_can_be_removed(store: Store) -> None:
 
 def test_removing_what_is_not_there_is_told(store: Store) -> None:
     """With what there is."""
-    with pytest.raises(PackageError, match="bot is not installed; nothing is"):
+    with pytest.raises(PackageError, match="bot is not installed; installed: nothing"):
         remove(store, "bot")
     install(store, CAR, DIAL)
-    with pytest.raises(PackageError, match=r"bot is not installed; there is drivers/car 1\.0\.0"):
+    with pytest.raises(PackageError, match=r"bot is not installed; installed: drivers/car 1\.0\.0"):
         remove(store, "bot")
 
 

@@ -103,7 +103,7 @@ def test_what_no_repository_has_is_told_when_it_is_named(store: Store) -> None:
     old = install(store, BOT, DIAL)
     other = source(package("driver", "car"))
     assert newer(store, [other], silent) == []
-    with pytest.raises(PackageError, match="no repository has drivers/bot; what is installed stay"):
+    with pytest.raises(PackageError, match="no repository has drivers/bot; the installed version"):
         plan_update(old, [other], store, silent)
 
 

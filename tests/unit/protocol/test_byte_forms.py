@@ -70,7 +70,7 @@ REFUSED = [
     ("bytes: ['{{ x }}']", {"x": 256}, "x: expected a byte, 0 to 255, found 256"),
     ("bytes: ['{{ x }}']", {"x": None}, "x: None is neither a byte nor text"),
     ("bytes: ['{{ x }}']", {"x": 1.5}, "x: 1.5 is neither a byte nor text"),
-    ("json: ['{{ x }}']", {"x": float("inf")}, "JSON has no infinite number and no not-a-number"),
+    ("json: ['{{ x }}']", {"x": float("inf")}, "JSON cannot represent infinity or NaN"),
 ]  # fmt: skip
 
 

@@ -93,7 +93,7 @@ def test_steps_are_repeated_until_a_condition_is_true() -> None:
 @pytest.mark.parametrize(
     ("name", "rounds", "outcome", "sent", "message"),
     [
-        ("ask", 3, "failed", [], "ask.0: not done after 3 rounds"),
+        ("ask", 3, "failed", [], "ask.0: not finished after 3 iterations"),
         ("insist", 2, "done", ["HELP"], ""),
         ("complain", 1, "failed", [], "it is stuck"),
     ],
@@ -156,7 +156,7 @@ commands: { go: { send: GO } }
     talk.at(ends - 0.05)
     assert talk.links == []
     talk.at(ends)
-    assert talk.links == ["close wire: it took too long"]
+    assert talk.links == ["close wire: the sequence took too long"]
     assert talk.outcomes == {1: "disconnected"}
 
 

@@ -65,7 +65,7 @@ def test_the_refusal_says_what_would_happen_and_who_is_missing() -> None:
     """One line for people."""
     talk = Dialogue(BEAM).connect()
     ask(talk, "beam", "ada")
-    assert talk.messages == ["The beam goes on: two people must confirm beam, and 1 did"]
+    assert talk.messages == ["The beam goes on: two people must confirm beam, but only 1 did"]
 
 
 @pytest.mark.parametrize(("what", "outcome"), [("map", "done"), ("all", "not-confirmed")])

@@ -227,7 +227,7 @@ def test_a_frame_that_is_longer_than_the_room_is_refused() -> None:
     talk = Dialogue(STREAMED).connect()
     talk.run("line", code="G1 X100 Y100 Z100 F1")
     assert talk.outcomes == {1: "bad-argument"}
-    assert talk.messages == ["the request has 21 bytes; the robot accepts 20 (queue.bytes)"]
+    assert talk.messages == ["the request has 21 bytes; the robot accepts at most 20 (queue.bytes)"]
     talk.run("line", code="G1 X100 Y100 Z100 F")
     assert talk.sent == ["G1 X100 Y100 Z100 F"]
 

@@ -213,7 +213,7 @@ def test_a_robot_that_says_nothing_any_more_is_not_moved() -> None:
     talk.at(1.9)
     assert move("turn", {"v": 1}, 1.9)
     talk.at(2.1)
-    with pytest.raises(MotionUnavailable, match="the robot has said nothing for 2 s"):
+    with pytest.raises(MotionUnavailable, match="the robot has sent nothing for 2 s"):
         move("turn", {"v": 1}, 2.1)
     assert talk.engine.motions.stop_frame("turn"), "it is stopped all the same"
     talk.says("MODE manual")

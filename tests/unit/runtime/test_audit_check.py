@@ -242,10 +242,10 @@ def _parsed(text: str) -> object:
 @pytest.mark.parametrize(
     ("line", "told"),
     [
-        ("[]\n", "line 2 is no entry: expected an object"),
-        ("{\n", "line 2 is no entry: Expecting property name"),
-        ("{}\n", "line 2 is no entry: expected 'at' of type float"),
-        ("x" * 100_001, "line 2 is no entry: more than 100000 characters"),
+        ("[]\n", "line 2 is not an entry: expected an object"),
+        ("{\n", "line 2 is not an entry: Expecting property name"),
+        ("{}\n", "line 2 is not an entry: expected 'at' of type float"),
+        ("x" * 100_001, "line 2 is not an entry: more than 100000 characters"),
     ],
 )
 def test_line_that_is_no_entry_is_told(lines: list[str], line: str, told: str) -> None:

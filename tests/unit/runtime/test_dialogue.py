@@ -219,7 +219,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         (
             steps('feed: { wire: "HOOK U" }, expect: { hook: U }'),
             "3:9 1: hook: expected 'U', but nothing set it:"
-            " 'HOOK U' waits for the delimiter b'\\n' (write it in double quotes)",
+            " 'HOOK U' waits for the delimiter b'\\n' (write the delimiter in double quotes)",
         ),
         (
             steps('feed: { wire: "LOAD 3\\n" }, expect: { load: 3 }'),
@@ -237,7 +237,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         (
             steps('feed: { quiet: { hex: "07" } }, expect: { tone: 7 }'),
             "3:9 1: tone: expected 7, but nothing set it:"
-            " 07 waits for the silence after the frame (write wait: after it)",
+            " 07 waits for the silence after the frame (add 'wait' to the step)",
         ),
         (
             steps('feed: { once: "A 3\\n" }', "expect: { load: 3 }"),

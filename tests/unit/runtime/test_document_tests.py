@@ -166,7 +166,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         (
             trial(feed={"wire": "4"}, reply_to=0, expect={"battery": 4}),
             "battery: expected 4, but nothing set it:"
-            " '4' waits for the delimiter b'\\n' (write it in double quotes)",
+            " '4' waits for the delimiter b'\\n' (write the delimiter in double quotes)",
         ),
         (
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
@@ -213,7 +213,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(run="say", arguments={"word": "hi"}, sent={"wire": "say\nhi"}),
-            r"wire: b'say\nhi' contains the delimiter b'\n': this makes two frames",
+            r"wire: b'say\nhi' contains the delimiter b'\n': this would make two frames",
         ),
         (trial(run="say", sent={"wire": "x"}), None),
     ],

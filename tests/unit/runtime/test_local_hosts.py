@@ -81,6 +81,8 @@ def test_a_package_fixes_no_host_to_this_machine(line: str, host: str, tmp_path:
     if not host:
         check_hosts(profile)
         return
-    with pytest.raises(UrcError, match="a package may use it only through a setting") as told:
+    with pytest.raises(
+        UrcError, match="a package may use this machine only through a setting"
+    ) as told:
         check_hosts(profile)
-    assert f"the transport wire has the fixed host {host}, this machine itself" in str(told.value)
+    assert f"the transport wire has the fixed host {host}, which is this machine" in str(told.value)

@@ -62,12 +62,12 @@ def test_a_gesture_that_was_refused_is_told_why_for_as_long_as_it_goes_on() -> N
     it = Scene()
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
-    it.frames.refusal = "the robot has said nothing for 2 s"
-    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    it.frames.refusal = "the robot has sent nothing for 2 s"
+    assert it.tick(speed=0.5) == "the robot has sent nothing for 2 s"
     it.frames.refusal = ""
-    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    assert it.tick(speed=0.5) == "the robot has sent nothing for 2 s"
     it.controller.stopped("drive", "released")
-    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    assert it.tick(speed=0.5) == "the robot has sent nothing for 2 s"
     it.controller.release("ann", "drive")
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
@@ -149,7 +149,7 @@ def test_stop_needs_no_lease_stops_all_and_latches() -> None:
     assert it.heard() == ["stop drive lift"]
     assert it.tick(speed=0.5) == "Stopped by vic. Reset to drive again."
     assert it.drive("ann", "take") == "Stopped by vic. Reset to drive again."
-    assert it.drive("vic", "reset") == "viewers can stop the robot, and cannot reset it"
+    assert it.drive("vic", "reset") == "viewers can stop the robot, but cannot reset it"
     assert it.drive("bob", "reset") == ""
     assert it.controller.lease.state.holder is None
     assert it.heard() == []
@@ -238,7 +238,7 @@ def test_recorded_ticks_are_refused_by_the_next_connection() -> None:
     given = ControlInput(it.controller.lease.state.epoch, 1, echo)
     assert (
         it.controller.tick("ann", "drive", {}, given, it.now)
-        == "the input echoes no beat of this server"
+        == "the input does not echo a beat of this server"
     )
 
 

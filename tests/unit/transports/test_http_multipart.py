@@ -96,7 +96,7 @@ def test_anything_at_all_ends_in_parts_or_a_fault(pieces: list[bytes]) -> None:
 
 TOO_MUCH = {
     "a part has 1001 bytes; at most 1000 are permitted": b"--B\r\nContent-Length: 1001\r\n\r\n",
-    "a part without an end within 1000 bytes": b"--B\r\n\r\n" + b"x" * 2000,
+    "a part has no end within 1000 bytes": b"--B\r\n\r\n" + b"x" * 2000,
     "the headers of a part exceed 8192 bytes": b"--B\r\n" + b"X: y\r\n" * 2000,
     "no boundary within 8192 bytes": b"x" * 9000,
 }
@@ -131,8 +131,8 @@ def test_boundary_is_read_as_cameras_write_it(header: str, boundary: bytes) -> N
     [
         ("image/jpeg", "the response is image/jpeg, not multipart/x-mixed-replace"),
         ("", "the response is no Content-Type, not multipart/x-mixed-replace"),
-        ("multipart/x-mixed-replace", "the Content-Type names no boundary"),
-        ("multipart/x-mixed-replace; boundary=--", "the Content-Type names no boundary"),
+        ("multipart/x-mixed-replace", "the Content-Type has no boundary"),
+        ("multipart/x-mixed-replace; boundary=--", "the Content-Type has no boundary"),
         (
             "multipart/x-mixed-replace; boundary=" + "x" * 201,
             "the boundary has more than 200 characters, or invalid ones",

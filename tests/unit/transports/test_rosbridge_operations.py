@@ -150,8 +150,8 @@ def test_cbor_is_read_as_json_would_be() -> None:
     ("frame", "why"),
     [
         (b"", "not JSON"),
-        (b"[1]", "without an operation"),
-        (b'{"msg":1}', "without an operation"),
+        (b"[1]", "has no operation"),
+        (b'{"msg":1}', "has no operation"),
         (b"\xa1", "not CBOR"),
         (dumps({"op": "publish", "msg": CBORTag(9999, b"")}), "not CBOR"),
         (b'{"op":"fragment","id":"1","num":5,"total":2,"data":""}', "fragment 5 of 2"),

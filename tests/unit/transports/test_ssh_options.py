@@ -53,7 +53,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
             "ssh: keepalive_interval is a time from 200ms to 1m, not '2h'",
         ),
         ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
-        ({"environment": "A=b"}, "ssh: environment is a list of NAME: value"),
+        ({"environment": "A=b"}, "ssh: environment must contain entries of the form NAME: value"),
         ({"environment": {"A B": "c"}}, "ssh: 'A B' is not a name of an environment variable"),
         (
             {"environment": {"A": 1}},

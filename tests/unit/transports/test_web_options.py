@@ -24,7 +24,7 @@ WRONG: list[tuple[str, dict[str, object], str]] = [
     ("http", {"url": "http://a:0"}, f"http needs {URL} 'http://a:0'"),
     ("http", {"url": "http://a/#x"}, f"http needs {URL} 'http://a/#x'"),
     ("http", {"url": "http://a b/"}, f"http needs {URL} 'http://a b/'"),
-    ("http", {"url": 5}, "http needs a text as url, not 5"),
+    ("http", {"url": 5}, "http needs text as url, not 5"),
     (
         "http",
         {"url": "http://me:secret@robot"},
@@ -38,7 +38,7 @@ WRONG: list[tuple[str, dict[str, object], str]] = [
 ]
 
 BESIDE: list[tuple[dict[str, object], str]] = [
-    ({"tls": True}, "http has tls options, but its url is without TLS"),
+    ({"tls": True}, "http has tls options, but its url does not use TLS"),
     ({"auth": "me"}, "http needs a mapping as auth, not 'me'"),
     ({"auth": {"type": "magic"}}, "http needs basic, bearer or digest as type, not 'magic'"),
     ({"auth": {"type": "bearer"}}, "http needs a token for auth of type bearer"),

@@ -132,11 +132,11 @@ def test_an_old_address_says_that_it_is_old() -> None:
     with at(ACCESS) as browser:
         page = browser.get("/?key=of-yesterday")
         assert page.status_code == 401
-        assert "The key in this address is old or was used already." in page.text
+        assert "The key in this address has expired or was already used." in page.text
         assert "set-cookie" not in page.headers
     with at(OPEN) as browser:
         page = browser.get("/?key=of-yesterday")
-        assert "old or was used" in page.text
+        assert "has expired or was already used" in page.text
         assert "Continue without a key" in page.text
     with at(ACCESS, HERE) as browser:
         page = browser.get("/?key=of-yesterday")

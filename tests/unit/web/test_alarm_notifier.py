@@ -153,7 +153,7 @@ def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (("false",), "exit code 1"),
         (("/does/not/exist",), "No such file"),
-        (("sh", "-c", "sleep 60 & wait"), "ended after 1 s without a result"),
+        (("sh", "-c", "sleep 60 & wait"), "did not finish within 1 s"),
     ],
 )
 def test_a_command_that_fails_is_tried_again_logged_and_counted(
@@ -217,7 +217,7 @@ def test_secrets_of_a_url_are_in_no_log(hook: str, caplog: pytest.LogCaptureFixt
     gone.publish("battery", 15, "low")
     assert gone.notifier.settle(10)
     gone.close()
-    assert caplog.text.count("the notification of alarms of rover failed: http://127.0.0.1:") == 2
+    assert caplog.text.count("the alarm notification for rover failed: http://127.0.0.1:") == 2
     assert "status 500" in caplog.text
     for secret in ("s3cret", "open sesame"):
         assert secret not in caplog.text
@@ -252,7 +252,7 @@ def test_the_file_is_read(tmp_path: Path) -> None:
         ("url: http://x.example/a\n", "expected https:"),
         ("url: https://me:pass@x.example/a\n", "expected a URL"),
         ("url_file: missing\n", "cannot be read"),
-        ("url_file: open\n", "all users of this machine may use"),
+        ("url_file: open\n", "all users of this machine can access"),
         ("command: [a]\nsecret_file: token\n", "'secret_file' is for a URL"),
         ("command: [a]\npriority: urgent\n", "expected low, medium or high"),
         ("command: [a]\nreturned: maybe\n", "expected true or false"),

@@ -191,7 +191,7 @@ def test_what_cannot_be_compared_can_still_be_replaced(tmp_path: Path) -> None:
     with served(tmp_path) as client:
         job = asked(client, "add", **WAYS["add"])
         assert not job["isUpdate"]
-        assert any("drivers/rover 1.0.0" in line and "not known" in line for line in job["notes"])
+        assert any("drivers/rover 1.0.0" in line and "are unknown" in line for line in job["notes"])
 
 
 def test_urc_install_of_what_cannot_be_compared_is_not_agreed_to_beforehand(

@@ -109,7 +109,7 @@ def test_a_replaced_authority_is_announced(monkeypatch: pytest.MonkeyPatch, tmp_
     assert LocalCertificate(tmp_path, "0.0.0.0").load().notes == ()
     assert LocalCertificate(tmp_path, "0.0.0.0").load().notes == ()
     (note,) = LocalCertificate(tmp_path, "0.0.0.0", ["robots.example"]).load().notes
-    assert "all devices have to trust it" in note
+    assert "all devices must trust it" in note
     on_machine(monkeypatch, "141.30.1.2")
     (note,) = LocalCertificate(tmp_path, "0.0.0.0", ["robots.example"]).load().notes
     assert "exclude 141.30.1.2" in note
@@ -173,4 +173,4 @@ def test_an_ended_certificate_is_announced(monkeypatch: pytest.MonkeyPatch, tmp_
     past = datetime(2021, 1, 1, tzinfo=UTC)
     issued = CertificateAuthority(tmp_path, ["one.lab"], past).issue()
     (note,) = GivenCertificate(issued.chain, issued.key).load().notes
-    assert "the certificate ended on 2022-02-02" in note
+    assert "the certificate expired on 2022-02-02" in note

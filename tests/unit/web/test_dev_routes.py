@@ -56,7 +56,7 @@ def test_the_menu_leads_to_it() -> None:
     [
         (False, True, "/robots/puppet/dev", 404, HOW_TO_TURN_ON),
         (True, True, "/robots/nobody/dev", 404, "This server has no robot called “nobody”."),
-        (True, False, "/robots/puppet/dev", 403, "needs the key"),
+        (True, False, "/robots/puppet/dev", 403, "needs the start key"),
     ],
 )
 def test_where_there_is_no_dev_page_a_line_says_why(

@@ -82,7 +82,7 @@ def test_a_file_beside_the_document_has_an_address_and_nothing_else_has(tmp_path
         ("{ urdf: a/../../arm.urdf }", "is not a path inside this folder"),
         ("{ urdf: 'file:arm.urdf' }", "is not a path inside this folder"),
         ("{ urdf: robot.yaml }", "has a file type that is not served"),
-        ("{ urdf: link.urdf }", "is outside of this folder"),
+        ("{ urdf: link.urdf }", "is outside this folder"),
         ("{ meshes: [gone.stl] }", "there is no file 'gone.stl'"),
     ],
 )
@@ -170,7 +170,7 @@ def test_a_page_of_the_dashboard_itself_is_not_framed(tmp_path: Path, url: str) 
     assert answer.status_code == 404
     assert "frame-src 'none'" in answer.headers["content-security-policy"]
     assert "<iframe" not in answer.text
-    assert "this is a page of the dashboard itself" in answer.text
+    assert "pages of the dashboard itself cannot be shown here" in answer.text
 
 
 def test_no_page_has_no_address(tmp_path: Path) -> None:
@@ -189,9 +189,9 @@ def test_whoever_installs_a_robot_or_a_layout_is_told_of_the_pages_that_it_shows
         + "widgets:\n  wiki: { use: iframe, options: { url: 'http://wiki.local/b' } }\n",
         "utf-8",
     )
-    assert "has the browser show the page http://wiki.local/a" in permissions(
+    assert "makes the browser show the page http://wiki.local/a" in permissions(
         tmp_path / "robot.yaml", tmp_path, ()
     )
     assert permissions(layout, tmp_path, ()) == [
-        "has the browser show the page http://wiki.local/b"
+        "makes the browser show the page http://wiki.local/b"
     ]

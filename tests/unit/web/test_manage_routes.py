@@ -129,7 +129,7 @@ def test_a_sign_in_of_long_ago_changes_no_package(
         monkeypatch.setattr(OPEN.control, "now", lambda: later)
         kept = client.post("/api/v1/packages/remove", json={"package": "wide", "yes": True})
     assert kept.status_code == 403
-    assert "this needs a sign-in of the last 5 minutes" in kept.json()["error"]
+    assert "this needs a sign-in within the last 5 minutes" in kept.json()["error"]
 
 
 def test_only_pages_of_ours_have_repositories_asked(
@@ -158,7 +158,7 @@ def test_the_pages_say_who_may(tmp_path: Path) -> None:
     with served(tmp_path, cookies={}) as client:
         for page in ("/drivers", "/interfaces", "/widgets/installed"):
             text = client.get(page).text
-            assert "You may look at the packages." in text
+            assert "You can view the packages." in text
             assert "<form" not in text
     with served(tmp_path) as client:
         assert "data-connect" in client.get("/drivers").text
@@ -271,7 +271,7 @@ def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
     stock(tmp_path)
     with served(tmp_path, given=lambda _: {"host": "10.9.9.9"}) as client:
         page = client.get("/robots/rover/settings").text
-        assert "Given when URC was started" in page
+        assert "Set when URC was started" in page
         send(client, settings={"host": "10.0.0.7", "key": "x"})
         assert "10.9.9.9" in client.get("/robots/rover/settings").text
 

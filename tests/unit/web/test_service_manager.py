@@ -61,4 +61,4 @@ async def test_without_a_watchdog_nothing_is_watched() -> None:
 
 def test_manager_that_does_not_listen_is_ignored(caplog: pytest.LogCaptureFixture) -> None:
     ServiceManager({"NOTIFY_SOCKET": "/nowhere/at/all"}).tell("READY=1")
-    assert "systemd gets no messages" in caplog.text
+    assert "cannot send messages to systemd" in caplog.text

@@ -111,7 +111,7 @@ class Expander:
                 f"'each' creates {name!r} twice",
                 at="each",
                 key=True,
-                hint="use every variable in the name, and give each value only once",
+                hint="use every variable in the name, and list each value only once",
             )
         made.setdefault(name, copy.tree)
 
@@ -150,7 +150,7 @@ class Expander:
                 "incompatible-values",
                 f"the values of {unlike[0]!r} are of different kinds",
                 at=unlike[0],
-                hint="give only plain values, or only mappings with the same keys",
+                hint="use only plain values, or only mappings with the same keys",
             )
             return None
         self._check_variables(part)
@@ -190,7 +190,7 @@ class _First:
         """Report a key that is missing from the variable's mappings."""
         first: Any = self._each[name][0]
         is_mapping = isinstance(first, dict)
-        plain = f"its values are plain: write {{{name}}}"
+        plain = f"its values are not mappings: write {{{name}}}"
         self._expander.problems.error(
             Node(self._expander.document, path, None),
             "unknown-variable",

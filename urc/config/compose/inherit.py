@@ -178,7 +178,7 @@ class _Composer:
             found = value.problem(
                 (),
                 "include-clash",
-                f"{place} gives this key another value",
+                f"{place} sets this key to another value",
                 hint="set the key in the document that includes both",
             )
             self._problems.problems.append(found._replace(path=".".join(map(str, path))))

@@ -83,7 +83,7 @@ class Library:
         known = [name for kind in kinds for name in _names(kind)]
         hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
         if not hint.startswith("did"):
-            hint = f"the path of a document ends with .yaml; {hint}"
+            hint = f"the path of a document must end with .yaml; {hint}"
         self.problems.error(
             reference,
             "no-such-file",

@@ -184,7 +184,9 @@ class _ParameterFiller:
         self._problems.error(
             Node(self._document, path, None),
             "unknown-param",
-            f"there is no param {word!r}" if word else "'params' has all params; name one of them",
+            f"there is no param {word!r}"
+            if word
+            else "'params' contains all params; name one of them",
             hint=did_you_mean(word, self._values, "params"),
             **place,
         )

@@ -60,7 +60,7 @@ def check_option(
     problems.error(
         part,
         "wrong-type",
-        f"'{part.name}' is {wanted}, but the setting {found[1]!r} has the type {setting.type}",
+        f"'{part.name}' must be {wanted}, but the setting {found[1]!r} has the type {setting.type}",
         hint=f"give the setting 'type: {hint}'",
     )
 

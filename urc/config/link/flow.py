@@ -66,7 +66,7 @@ def link_command(linker: Linker, part: Node, command: Command) -> None:
             linker.problems.error(
                 part.must("hold"),
                 "wrong-command",
-                "a second person cannot confirm every new value of a held command",
+                "a second person cannot approve every new value of a held command",
                 key=True,
                 hint="require two people for a command that enables the motion",
             )
@@ -81,7 +81,7 @@ def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -
         kind = argument.items if argument.type == "array" else argument.type
         if kind not in ("integer", "number") or argument.choices:
             what = "has choices" if argument.choices else f"is {kind}"
-            text = f"argument {name!r} {what}, and has no values in between"
+            text = f"argument {name!r} {what}, so its value cannot change gradually"
             hint = "limit only numeric arguments without choices"
             problems.error(inner, "wrong-type", text, key=True, hint=hint)
 
@@ -99,7 +99,7 @@ def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
         linker.problems.error(
             part,
             "wrong-command",
-            f"{command.name!r} needs two people, and must not run automatically",
+            f"{command.name!r} needs two people, so it must not run automatically",
             hint="run a command without two_person",
         )
 
@@ -124,7 +124,7 @@ def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
     if command is None:
         return
     if command.steps or command.hold is not None or runs_what_moves(command, poll.arguments):
-        what = "a sequence" if command.steps else "a motion"
+        what = "a sequence" if command.steps else "a motion command"
         linker.problems.error(
             part.must("run"),
             "wrong-command",
@@ -254,7 +254,7 @@ def link_arguments(
             part,
             "missing-argument",
             f"command {command.name!r} needs {missing[0]!r}",
-            hint=f"give a value here, or give a default to the argument {missing[0]!r}",
+            hint=f"give a value here, or give the argument {missing[0]!r} a default",
             **where,
         )
 

@@ -53,7 +53,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
                 "contains-delimiter",
                 f"{_what(send)} {_shown(mark)} inside, which the framing adds to each frame:"
                 " the robot would receive two frames",
-                hint="remove this part: the framing adds the marks of a frame",
+                hint="remove this part: the framing adds the start and end of each frame",
             )
             return
     wanted = None if layout.size is None else layout.size - layout.head - layout.tail

@@ -47,7 +47,7 @@ def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Probl
         problems.error(
             part,
             "wrong-form",
-            f"a reply in the form {verb!r} would expect another reply",
+            f"a reply in the form {verb!r} would itself need a reply",
             at=verb,
             key=True,
             hint="write 'publish', or write text or bytes on a byte transport",
@@ -96,7 +96,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
         problems.error(
             part,
             "wrong-form",
-            f"{spec.type} carries bytes and has no {form!r}",
+            f"{spec.type} carries bytes and does not support {form!r}",
             at=form,
             key=True,
             hint="write text, or one of the forms hex, bytes, struct and json",
@@ -113,7 +113,7 @@ def _check_ros(part: Node, problems: Problems) -> None:
             problems.error(
                 part,
                 "wrong-form",
-                f"ros carries JSON and has no {key!r}",
+                f"ros carries JSON and does not support {key!r}",
                 at=key,
                 key=True,
                 hint="write the message's fields: json: { data: … }",
@@ -122,7 +122,7 @@ def _check_ros(part: Node, problems: Problems) -> None:
         problems.error(
             part,
             "missing-key",
-            "'type' is missing, and the topic may not be advertised yet",
+            "'type' is missing, and the topic might not be advertised yet",
             key=True,
             hint="'rostopic info' shows the type, such as type: geometry_msgs/Twist",
         )
@@ -144,7 +144,7 @@ def _check_read(
                 f"{spec.type} has no topics to subscribe to",
                 at="subscribe",
                 key=True,
-                hint="remove 'subscribe', because the form reads everything on this transport",
+                hint="remove 'subscribe': the form already matches all data on this transport",
             )
         return
     if subscribe is None:
@@ -209,7 +209,7 @@ def check_via(
             hint = f"possible types: {', '.join(sorted(CARRIERS))}"
             problems.error(part, "wrong-form", text, at="tunnel", hint=hint)
         elif _is_circular(name, transports):
-            text = f"{name!r} is a tunnel through itself"
+            text = f"{name!r} tunnels through itself"
             problems.error(part, "wrong-form", text, at="tunnel", hint="break the circle")
         else:
             carriers.add(spec.tunnel)

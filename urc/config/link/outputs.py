@@ -83,7 +83,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
             problems.error(
                 inner,
                 "given-twice",
-                f"{name!r} is set here, but {names[name]!r} of {port.name!r} also gives a value",
+                f"{name!r} is set here, but {names[name]!r} of {port.name!r} also sets it",
                 key=True,
                 hint="each argument takes one value",
             )
@@ -148,7 +148,7 @@ def _check_values(
         problems.error(
             part,
             "missing-argument",
-            f"{port.name!r} of widget {widget.name!r} does not give all arguments of"
+            f"{port.name!r} of widget {widget.name!r} does not set these arguments of"
             f" {command.name!r}: {listed(missing)}",
             hint=_remedy(command, port, taken, missing),
         )

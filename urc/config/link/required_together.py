@@ -47,7 +47,7 @@ def _check_needs(
         options = [name for name in widget.at_least_one_of if name in widget.options]
         ports = [name for name in widget.at_least_one_of if name not in widget.options]
         ways = [f"bind {_one_of(ports)}"] if ports else []
-        ways += [f"give the option {_one_of(options)}"] if options else []
+        ways += [f"set the option {_one_of(options)}"] if options else []
         problems.error(
             part,
             "unbound-input",
@@ -160,10 +160,10 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems)
             problems.error(
                 own.get(name) or own[above],
                 "wrong-order",
-                f"option {name!r} is {low:g}, and must be below {above!r}, {high:g}",
+                f"option {name!r} is {low:g}, but must be below {above!r} ({high:g})",
                 hint="change one of the two options"
                 if above in own
-                else f"give the option {above} too",
+                else f"set the option {above} too",
             )
 
 

@@ -51,12 +51,12 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
         fault = _file_fault(part.data)
         place = FilePath(part.document.file).absolute().parent / part.data
         if fault:
-            hint = "name a file in the folder of this document or below"
+            hint = "name a file in this document's folder or a subfolder"
             problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
         elif not place.is_file():
             problems.error(part, "no-such-file", f"there is no file {part.data!r}")
         elif not _is_below(place, FilePath(part.document.file).absolute().parent):
-            problems.error(part, "file-not-served", f"{part.data!r} is outside of this folder")
+            problems.error(part, "file-not-served", f"{part.data!r} is outside this folder")
         elif place.stat().st_size > MOST_BYTES:
             text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
             problems.error(part, "file-not-served", text)
@@ -118,14 +118,14 @@ def _page_fault(url: str) -> str:
         return f"is longer than {LONGEST_URL} characters"
     authority = parts["authority"] or ""
     if "@" in authority:
-        return "has a user name or password, which every viewer of the page could read"
+        return "contains a user name or password that every viewer of the page could read"
     if authority.startswith("["):
         return "has an IPv6 address, which a page's security policy cannot contain; use a host name"
     host = _HOST.fullmatch(authority)
     if host is None or not _is_host(host["host"]):
         return "has an ambiguous or missing host"
     if host["port"] is not None and not 0 < int(host["port"]) <= _LAST_PORT:
-        return f"has a port outside of 1 to {_LAST_PORT}"
+        return f"has a port outside the range 1 to {_LAST_PORT}"
     if not _REST.fullmatch(parts["rest"]):
         return "has a character that must be written as %XX"
     return ""

@@ -27,13 +27,9 @@ def link_values(
     if "state" in parts:
         for name, inner in parts["state"].entries().items():
             if name in driver.signals or name in ("now", "settings", "world"):
-                what = "a signal" if name in driver.signals else "something else"
-                text = f"{name!r} is already {what}"
-                hint = (
-                    "give the initial value of a signal under 'signals'"
-                    if what == "a signal"
-                    else ""
-                )
+                is_signal = name in driver.signals
+                text = f"{name!r} is {'already a signal' if is_signal else 'a reserved name'}"
+                hint = "set the initial value of a signal under 'signals'" if is_signal else ""
                 problems.error(inner, "duplicate-name", text, key=True, hint=hint)
             values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
     if "signals" in parts:
@@ -64,11 +60,11 @@ def _value(part: Node, signal: Signal, problems: Problems) -> Reading:
     if data is None:
         return None
     if signal.type in ("object", "image", "blob"):
-        text = f"signal {signal.name!r}: a value of type {signal.type} cannot be given here"
+        text = f"signal {signal.name!r}: a value of type {signal.type} cannot be set here"
         problems.error(part, "wrong-type", text)
         return None
     if (signal.type == "array") != isinstance(data, list):
-        wanted = f"a list of {signal.items}s" if signal.type == "array" else "no list"
+        wanted = f"a list of {signal.items}s" if signal.type == "array" else "one value"
         text = f"signal {signal.name!r} is of type {signal.type}: expected {wanted}"
         problems.error(part, "wrong-type", text)
         return None
@@ -156,7 +152,7 @@ def _of_command(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.send.form == "frames":
         text = f"{rule.request!r} sends several frames, but a rule matches only one"
-        hint = "write a rule with match: for each frame of the command"
+        hint = "write a rule with 'match' for each frame of the command"
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
         _elsewhere(linker, inner, rule, command.transport)
@@ -216,7 +212,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
     """Report each signal that both a rule and the emulated robot's world set."""
     for name, inner in part.named("set").items():
         if name in told:
-            text = f"the world sets the signal {name!r}"
+            text = f"the world also sets the signal {name!r}"
             hint = "remove the signal here, or from world.signals"
             linker.problems.error(inner, "two-sources", text, key=True, hint=hint)
 

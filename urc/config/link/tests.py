@@ -240,7 +240,7 @@ def _reply_to(
             inner,
             "unknown-request",
             f"there is no poll {waiting}: {text}",
-            hint="the first poll has the number 0",
+            hint="polls are numbered from 0",
         )
         return None
     poll = driver.polls[waiting]

@@ -74,7 +74,7 @@ def _link_signals(
     begun = parts["signals"].data if "signals" in parts else {}
     for name, inner in part.named("signals").items():
         if settable(name, inner, driver, problems) is not None and name in begun:
-            text = f"the world sets the signal {name!r}"
+            text = f"the world also sets the signal {name!r}"
             hint = "remove the signal here, or from the world"
             problems.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
 

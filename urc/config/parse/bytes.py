@@ -60,7 +60,7 @@ def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes 
             "these bytes are constant and cannot contain templates",
             offset=template.start(),
             length=len(template[0]),
-            hint="write constant bytes; settings are only possible in sent frames",
+            hint="write constant bytes; settings are available only in sent frames",
         )
         return None
     backslash = _BACKSLASH.search(text)

@@ -98,7 +98,7 @@ def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
-            hint="remove 'scale', or give the size of one step of the raw number",
+            hint="remove 'scale', or set it to the size of one raw step",
         )
     if scale is None and offset is None:
         return ()
@@ -114,7 +114,8 @@ def _points(part: Node | None, problems: Problems) -> tuple[tuple[float, float],
             problems.error(
                 after,
                 "wrong-order",
-                f"{after.data[0]:g} is not above {before.data[0]:g} of the previous point",
+                f"{after.data[0]:g} is not above {before.data[0]:g}, the raw number of the"
+                " previous point",
                 hint="the first number of each pair is the raw number, and must increase",
             )
     return tuple((inner.data[0], inner.data[1]) for inner in pairs)

@@ -174,21 +174,21 @@ def _check_stop(command: Command, part: Node, problems: Problems) -> None:
         problems.error(
             part,
             "misplaced-key",
-            "'role' has no effect with 'stop', because stopping never needs a right",
+            "'role' has no effect with 'stop', because a stop requires no role",
             at="role",
             key=True,
             hint="remove 'role', or use a separate command for the stop",
         )
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):
-            what = "asks people" if one.confirm else "has no default"
+            what = "asks for confirmation" if one.confirm else "has no default"
             problems.error(
                 part,
                 "missing-argument",
-                f"STOP sends it without arguments, and {name!r} {what}",
+                f"STOP sends this command without arguments, but {name!r} {what}",
                 at="stop",
                 key=True,
-                hint="use a command for the stop that needs no arguments",
+                hint="use a stop command that needs no arguments",
             )
 
 
@@ -283,7 +283,7 @@ def _keepalive(part: Node | None, context: FormContext, problems: Problems) -> K
         return None
     given = [key for key in ("send", "run") if key in part.data]
     if len(given) != 1:
-        text = "both 'send' and 'run' are given" if given else "'send' or 'run' is missing"
+        text = "'send' and 'run' exclude each other" if given else "'send' or 'run' is missing"
         where = {"at": "run"} if given else {}
         problems.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
         return None
@@ -320,10 +320,10 @@ def _hold(part: Node, problems: Problems) -> Hold:
         problems.error(
             part,
             "missing-release",
-            "a held command needs a stop for its release",
+            "'release' or 'step' is missing, so nothing stops the motion",
             key=True,
-            hint="write release: { … } with the arguments for standstill, or step: with the"
-            " duration of a step after which the robot stops itself",
+            hint="write release: { … } with arguments that stop the robot, or 'step' with the"
+            " step's duration if the robot stops after each step",
         )
         return Hold(repeat_s)
     entries = release.entries() if release is not None else {}
@@ -362,7 +362,7 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
             "'confirm' of an argument needs 'choices'",
             at="confirm",
             key=True,
-            hint="write choices: […], or 'confirm' next to 'send' to ask every time",
+            hint="write choices: […], or put 'confirm' next to 'send' to ask every time",
         )
     for name, inner in asked.items():
         if words and name not in words:

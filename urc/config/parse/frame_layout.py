@@ -85,10 +85,10 @@ def _check_trail(part: Node, written: DeclaredChecksum, count: int, problems: Pr
             f"'{key}' needs text frames, but frames of type {kind!r} have fixed positions",
             at=key,
             key=True,
-            hint="give the place of the checksum with 'at'",
+            hint="set the position of the checksum with 'at'",
         )
     elif count > 1:
-        text = f"a checksum with '{key}' must be the only one of its frame"
+        text = f"a checksum with '{key}' must be the only checksum of its frame"
         problems.error(written.part, "misplaced-key", text, at=key, key=True)
 
 
@@ -221,13 +221,13 @@ def _check_checksum(
     """Report a checksum or window outside the frame, and a checksum that overlaps another part."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
-        text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
+        text = f"a checksum of {size} bytes at {at} extends beyond the end of the frame"
         problems.error(
             part, "outside-frame", text, at="at", hint=f"the last possible position is {-size}"
         )
         return
     if frame_size is not None and not -frame_size <= at <= frame_size - size:
-        text = f"a checksum of {size} bytes at {at} is outside a frame of {frame_size}"
+        text = f"a checksum of {size} bytes at {at} is outside a frame of {frame_size} bytes"
         problems.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
         return
     if at < 0 and at + size > -len(layout.end):
@@ -258,7 +258,10 @@ def _check_window(
         if layout.length is None or over.start >= 0 or "over" not in part.data:
             return
         if -over.start > least:
-            text = f"the window starts {-over.start} before the end; a frame has {least} or more"
+            text = (
+                f"the window starts {-over.start} bytes before the end, but a frame may have only"
+                f" {least}"
+            )
             problems.warn(part, "outside-frame", text, at=where)
         return
     if size < layout.head + layout.tail:
@@ -287,7 +290,7 @@ def _check_size(part: Node, layout: FrameLayout, longest: int, problems: Problem
             part,
             "frame-too-small",
             f"a frame has at least {max(least, layout.size or 0)} bytes, which is more"
-            f" than {longest}",
+            f" than the limit of {longest}",
             at="max" if "max" in part.data else "",
         )
 

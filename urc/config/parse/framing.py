@@ -105,7 +105,7 @@ def _check_raw(
             problems.warn(
                 part.must("checksum"),
                 "raw-checksum",
-                "a binary checksum may contain the delimiter and end its own frame",
+                "a binary checksum may contain the delimiter and end its frame too early",
                 hint="write 'as: hex', or use a framing with a known frame size",
             )
             return
@@ -243,7 +243,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
             part,
             "misplaced-anchor",
             "'^', '$' and '\\b' have no effect inside a stream",
-            hint="a frame starts where the pattern matches; add the bytes at the end of a frame",
+            hint="a frame starts where the pattern matches; add the bytes that end a frame",
         )
     elif _is_open(tree):
         problems.error(

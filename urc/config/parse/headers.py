@@ -16,5 +16,5 @@ def check_headers(part: Node, problems: Problems) -> None:
                 "reserved-header",
                 f"a document may not set the header {name!r}",
                 key=True,
-                hint="URC sets this header if necessary; put a login under 'auth'",
+                hint="URC sets this header if necessary; put credentials under 'auth'",
             )

@@ -126,7 +126,7 @@ def _grid(part: Node, problems: Problems) -> Layout:
         problems.error(part, "empty-grid", "the grid has no rows")
         return Layout(1, 1, ())
     if len(rows) > _MOST or len(rows[0]) > _MOST:
-        problems.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
+        problems.error(part, "wrong-size", f"a grid may have at most {_MOST} rows and columns")
         return Layout(1, 1, ())
     width = len(rows[0])
     is_sound = True

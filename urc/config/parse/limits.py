@@ -121,7 +121,7 @@ def _hysteresis(part: Node, values: Mapping[str, float | None], problems: Proble
     width = part.number("hysteresis") or 0.0
     if width and all(value is None for value in values.values()):
         text = "'hysteresis' has no effect for alarm states"
-        hint = "write 'off_delay' against short changes"
+        hint = "use 'off_delay' to suppress brief changes"
         problems.error(part, "misplaced-key", text, at="hysteresis", key=True, hint=hint)
         return 0.0
     low = values["low"] if values["low"] is not None else values["lolo"]

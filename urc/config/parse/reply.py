@@ -94,7 +94,7 @@ def _silence(
 ) -> Stage:
     """Return the stage of a reply that treats silence as success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
-    refuse(part, beside, "has no effect with 'silence', which is the reply", problems)
+    refuse(part, beside, "has no effect with 'silence', because silence is the reply", problems)
     read, within_s = ReadSpec("silence"), problems.duration(part, "silence", 0.3, most=60)
     return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 

@@ -120,7 +120,7 @@ def _check_rotation(part: Node, kind: str, problems: Problems) -> None:
             "no-axes",
             f"{part.name!r} has no axis convention",
             key=True,
-            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down), see the robot's"
+            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down); see the robot's"
             " manual",
         )
 
@@ -134,13 +134,13 @@ def _axes(part: Node, kind: str, problems: Problems) -> str:
     size = part.integer("size")
     if axes == "bearing":
         fits = kind in _NUMBERS and part.text("unit") in _ANGLE_UNITS
-        wanted = f"a bearing is a number in one of the units {', '.join(_ANGLE_UNITS)}"
+        wanted = f"a bearing must be a number in one of the units {', '.join(_ANGLE_UNITS)}"
     elif kind in _NUMBERS:
         fits = part.text("unit") != ""
         wanted = "a number with axes needs a unit"
     else:
         fits = kind == "object" or (kind == "array" and size in (2, 3, 4))
-        wanted = "a vector is an array of size 2 or 3, a quaternion one of size 4, or an object"
+        wanted = "write an array of size 2 or 3 (vector) or 4 (quaternion), or an object"
     if not fits:
         problems.error(inner, "wrong-axes", f"axes {axes} do not fit this signal", hint=wanted)
     return axes
@@ -161,7 +161,7 @@ def _deadband(
             part,
             "out-of-range",
             f"a change of {band:g} is impossible between {low:g} and {high:g}, so no change would"
-            " show",
+            " count",
             at="deadband",
         )
     return band

@@ -65,7 +65,7 @@ def parse_world(part: Node, problems: Problems) -> WorldSpec:
         text = "the end of the field of view is before its start"
         problems.error(part.must("laser"), "wrong-order", text, key=True)
     if battery.empty >= battery.full:
-        text = f"empty at {battery.empty:g} V is not below full at {battery.full:g} V"
+        text = f"'empty' ({battery.empty:g} V) is not below 'full' ({battery.full:g} V)"
         problems.error(part.must("battery"), "wrong-order", text, key=True)
     plan, start, datum = part.get("map"), part.get("start"), part.get("datum")
     return WorldSpec(

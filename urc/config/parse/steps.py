@@ -49,7 +49,7 @@ def parse_steps(part: Node, context: StepContext, problems: Problems) -> tuple[s
         problems.error(
             part,
             "too-many-steps",
-            f"found {count} steps with branches; the limit is {sequence.MAX_STEPS}",
+            f"found {count} steps, including branches; the limit is {sequence.MAX_STEPS}",
         )
     most = sequence.most_steps(steps)
     if most > sequence.MAX_STEPS_DONE:
@@ -78,7 +78,7 @@ def _step(part: Node, context: StepContext, problems: Problems) -> sequence.Step
         problems.error(
             part,
             "two-verbs" if verbs else "missing-verb",
-            f"'{verbs[0]}' and '{verbs[1]}' are two actions"
+            f"'{verbs[0]}' and '{verbs[1]}' are two actions in one step"
             if verbs
             else "this step has no action",
             at=verbs[1] if verbs else "",

@@ -69,13 +69,13 @@ def _step(part: Node, problems: Problems) -> DialogueStep:
         problems.error(
             part,
             "two-verbs",
-            f"'{happens[0]}' and '{happens[1]}' are two actions",
+            f"'{happens[0]}' and '{happens[1]}' are two actions in one step",
             at=happens[1],
             key=True,
             hint="write two steps",
         )
     if "of" in part.data and not {"reply", "fails"} & part.data.keys():
-        text = "'of' needs a 'reply' or a failure"
+        text = "'of' needs 'reply' or 'fails'"
         problems.error(part, "misplaced-key", text, at="of", key=True)
     line, column, source = _place(part)
     wait = part.get("wait")

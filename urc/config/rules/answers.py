@@ -63,7 +63,7 @@ def _check_silence(
                 "silence means success, but no error reply is declared",
                 at="silence",
                 key=True,
-                hint="write the error replies under errors:, or remove 'reply'",
+                hint="write the error replies under 'errors', or remove 'reply'",
             )
 
 

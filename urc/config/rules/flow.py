@@ -59,7 +59,7 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
             part.must("keepalive").must("every"),
             "slow-keepalive",
             f"the watchdog of the robot expires first, after {shown_duration(watchdog_s)}",
-            hint="use half of this time, so that one frame may be lost",
+            hint="use half of this time, to tolerate the loss of one frame",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
@@ -115,7 +115,7 @@ def _check_stages(
         problems.warn(
             part.must("stages"),
             "stages-block-line",
-            f"while this command waits up to {shown_duration(longest_s)} for its last stage, the"
+            f"while this command waits up to {shown_duration(longest_s)} for a later stage, the"
             f" poll every {shown_duration(min(periods))} also waits",
             key=True,
             hint="write queue: { in_flight: 2 } if the robot can reply in between",

@@ -150,10 +150,11 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner,
                     "ambiguous-frame",
-                    f"{other!r}, above, takes the same frames{shown}, so no frame reaches this"
+                    f"{other!r}, above, matches the same frames{shown}, so no frame reaches this"
                     " declaration",
                     key=True,
-                    hint="put the more specific declaration first, or distinguish both by 'when'",
+                    hint="put the more specific declaration first, or distinguish the two with"
+                    " 'when'",
                 )
                 break
         seen.append((name, message.transport, message.read, text))

@@ -56,7 +56,7 @@ def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
             "the loss of the robot would go unnoticed: no transport has 'stale_after',"
             " and no poll has a reply",
             key=True,
-            hint="give the transport stale_after: or add a poll with a reply, or write replies:"
+            hint="give the transport 'stale_after', add a poll with a reply, or write replies:"
             " never if the robot never sends anything",
         )
     elif held:
@@ -78,7 +78,7 @@ def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, problems
         f"while {command.name!r} is held, a frozen robot program would go unnoticed:"
         f" {spec.name!r} has no liveness check",
         key=True,
-        hint=f"give {spec.name!r} a stale_after: as short as the robot's traffic allows, or"
+        hint=f"give {spec.name!r} a 'stale_after' as short as the robot's traffic allows, or"
         " replies: never if the robot never sends anything",
     )
 
@@ -101,9 +101,9 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
         problems.warn(
             part,
             "unknown-watchdog",
-            f"the time of the robot's own watchdog after the last {command.name!r} is unknown",
+            f"the robot's own watchdog time after the last {command.name!r} is unknown",
             key=True,
-            hint="write watchdog: with the time from the manual, or watchdog: none if the robot"
+            hint="write 'watchdog' with the time from the manual, or watchdog: none if the robot"
             " never stops itself",
         )
         return
@@ -121,8 +121,8 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
             "repeat-too-slow",
             f"the command is repeated every {shown_duration(hold.repeat_s)}, but the robot stops"
             f" itself after {shown_duration(watchdog_s)}: the motion would stutter",
-            hint="repeat the command three times within the watchdog, so that one value may be"
-            " lost",
+            hint="repeat the command three times within this time, to tolerate the loss of one"
+            " value",
         )
 
 
@@ -174,7 +174,7 @@ def _check_baud(
         part.must("repeat"),
         "line-too-slow",
         f"{what} {bits_per_s:.0f} bit/s or more, but the line carries only {baud:g}",
-        hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms and slower",
+        hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms or slower",
     )
 
 
@@ -190,7 +190,7 @@ def _check_will(
         "motion-without-will",
         f"if the connection to the broker is lost, nothing ends {command.name!r}",
         key=True,
-        hint=f"give {spec.name!r} a will: with the topic and payload of the stop, for the broker"
+        hint=f"give {spec.name!r} a 'will' with the topic and payload of the stop, for the broker"
         " to publish",
     )
 

@@ -55,8 +55,8 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
             problems.warn(
                 inner.must("send"),
                 "uncounted",
-                f"{transport!r} counts the unread bytes of the robot, but no reply shows when the"
-                " robot has read these bytes",
+                f"{transport!r} counts the bytes that the robot has not read, but no reply shows"
+                " when the robot reads them",
                 hint="add the 'reply' of the robot, or priority: realtime if the robot does not"
                 " buffer the command",
             )
@@ -94,7 +94,7 @@ def _check_kept(part: Node, command: Command, problems: Problems) -> None:
     if not isinstance(attributes, Mapping):
         return
     kept = [("retain", "is kept for later subscribers")] if attributes.get("retain") else []
-    kept += [("qos", "is repeated until its acknowledgement")] if attributes.get("qos") else []
+    kept += [("qos", "is repeated until it is acknowledged")] if attributes.get("qos") else []
     for key, what in kept:
         problems.error(
             part.must("publish"),
@@ -148,5 +148,5 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Pr
                 "slow-keepalive",
                 f"the line {what} after {shown_duration(limit_s)}, but the robot is polled every"
                 f" {shown_duration(min(periods))}",
-                hint="allow at least two periods, so that one reply may be lost",
+                hint="allow at least two periods, to tolerate the loss of one reply",
             )

@@ -110,7 +110,7 @@ def why_it_moves(name: str, command: Command) -> str:
     pair = " ".join(words[:2])
     is_quiet = pair not in _PAIRS and not _QUIET.isdisjoint(words)
     if not is_quiet and (found := pair if pair in _PAIRS else _motion_word(words)):
-        return f"its name has {found!r}"
+        return f"its name contains {found!r}"
     for argument in command.arguments.values():
         own = words_of(argument.name)
         if not _BOUND.isdisjoint((*own, *words)):

@@ -149,7 +149,7 @@ def _without_kind(document: Document) -> Problem:
     return document.problem(
         ("kind",),
         "unknown-kind",
-        f"there is no kind of document {kind!r}",
+        f"there is no document kind {kind!r}",
         hint="use the word 'robot'"
         if kind in ("profile", "robot-profile", "robots")
         else did_you_mean(str(kind), KINDS, "kinds"),

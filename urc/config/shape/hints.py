@@ -67,7 +67,7 @@ _UNITS: Final = "a duration has the unit ms, s, m (minutes) or h"
 _NUMBERS: Final = {"integer", "number"}
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
-    ("reply_to", "leaves"): "polls run automatically in these steps; 'feed' gives their replies",
+    ("reply_to", "leaves"): "polls run automatically in these steps; put the replies under 'feed'",
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
@@ -111,7 +111,7 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
 def word_hint(word: str, words: Sequence[str]) -> str:
     """Return a hint with the probable meaning of an unknown word; "" if no word is similar."""
     if word == "watch" and "drive" in words:
-        return "visitors with the role 'watch' give no commands; the lowest role is 'drive'"
+        return "visitors with the role 'watch' cannot send commands; the lowest role is 'drive'"
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
         return f"use the word '{other}'"
@@ -197,7 +197,7 @@ def text_hint(document: Document, path: Path, value: str, schema: Mapping[str, A
         return "" if _is_filled_in(document, path) else f"remove the quotes: {value}"
     if path == ("name",):
         plain = re.sub(r"[^a-z0-9]+", "-", value.lower()).strip("-")
-        rule = "a name has lower-case letters, digits and '-'"
+        rule = "a name may have only lower-case letters, digits and '-'"
         return f"write {plain}; {rule}" if plain[:1].isalpha() else ""
     return ""
 

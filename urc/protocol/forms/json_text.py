@@ -38,7 +38,7 @@ class JsonWriter:
         except TypeError as error:
             raise NotWritable(f"this cannot be written as JSON: {error}") from None
         except ValueError:
-            raise NotWritable("JSON has no infinite number and no not-a-number") from None
+            raise NotWritable("JSON cannot represent infinity or NaN") from None
 
     def value(self, namespace: Mapping[str, object]) -> object:
         """Return the JSON data before encoding; raise `NotWritable` or `ExpressionError`."""

@@ -71,7 +71,7 @@ class Checksum:
         if found == right or (spelling[0] in "hH" and found.upper() == right.upper()):
             return
         raise self.wrong(
-            f"the frame carries the checksum {_shown(found, spelling)},"
+            f"the frame has the checksum {_shown(found, spelling)},"
             f" expected {_shown(right, spelling)}; dropped"
         )
 

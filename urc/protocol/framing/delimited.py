@@ -37,7 +37,7 @@ class DelimiterFraming(NamedTuple):
         frame = payload if self.codec is None else encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
-                f"{payload!r} contains the delimiter {self.tx!r}: this makes two frames"
+                f"{payload!r} contains the delimiter {self.tx!r}: this would make two frames"
             )
         return frame + self.tx
 

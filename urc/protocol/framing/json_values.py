@@ -49,7 +49,7 @@ class JsonFraming(NamedTuple):
         """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if _JsonDecoder(None, b"", None, self.max_bytes).feed(frame) != [frame.strip(_BETWEEN)]:
-            raise FramingError(f"{payload[:80]!r} is not one JSON object or array")
+            raise FramingError(f"{payload[:80]!r} is not a single JSON object or array")
         return frame if self.is_reversed else frame + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:

@@ -58,7 +58,7 @@ class RegexFraming(NamedTuple):
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
-                raise FramingError(f"{payload!r} contains {self.tx!r}: this makes two frames")
+                raise FramingError(f"{payload!r} contains {self.tx!r}: this would make two frames")
             return frame + self.tx
         found = self.search(frame, 0)
         if found is None or found.span() != (0, len(frame)):

@@ -44,7 +44,7 @@ class XmlFraming(NamedTuple):
         found = _XmlDecoder(None, b"", self.max_bytes).feed(payload)
         element = found[0] if len(found) == 1 else None
         if not isinstance(element, bytes) or not payload.strip(_BETWEEN).endswith(element):
-            raise FramingError(f"{payload[:80]!r} is not one XML element")
+            raise FramingError(f"{payload[:80]!r} is not a single XML element")
         return payload if self.is_reversed else payload + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:

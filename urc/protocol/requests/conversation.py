@@ -128,12 +128,13 @@ class Conversation(Connection):
         may_pass = self.is_ready or exchange.is_privileged
         if exchange.is_realtime and may_pass and not self.is_per_request:
             if len(self._pending_replies) >= MOST_IN_FLIGHT:
-                text = f"{MOST_IN_FLIGHT} requests already wait for their replies"
+                text = f"{MOST_IN_FLIGHT} requests are already waiting for replies"
                 return [ExchangeEnded(exchange, ExchangeOutcome("queue-full", text))]
             return self._send(exchange, now) + self._pump(now)
         most = self.spec.queue.most_bytes
         if most is not None and not exchange.is_realtime and self._size_of(exchange) > most:
-            text = f"the request has {self._size_of(exchange)} bytes; the robot accepts {most}"
+            size = self._size_of(exchange)
+            text = f"the request has {size} bytes; the robot accepts at most {most}"
             return [
                 ExchangeEnded(exchange, ExchangeOutcome("bad-argument", f"{text} (queue.bytes)"))
             ]
@@ -552,7 +553,7 @@ class Conversation(Connection):
             return []
         else:
             self._pending_replies.remove(pending)
-            text = f"the late answer to {exchange.ask.label} has been dropped"
+            text = f"the late reply to {exchange.ask.label} was dropped"
             return [Violation(self.spec.name, "late-reply", text)]
         pending.is_late = False
         return None

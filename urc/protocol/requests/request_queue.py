@@ -43,8 +43,9 @@ class RequestQueue(PriorityQueue[Exchange]):
         if gone is None:
             return None
         if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
-            return gone, ExchangeOutcome("superseded", "replaced by a newer request before sending")
-        text = f"{self._spec.queue.depth} requests already wait on {self._spec.name}"
+            text = "replaced by a newer request before it was sent"
+            return gone, ExchangeOutcome("superseded", text)
+        text = f"{self._spec.queue.depth} requests are already waiting on {self._spec.name}"
         return gone, ExchangeOutcome("queue-full", text)
 
     def has(self, label: str) -> bool:

@@ -164,7 +164,7 @@ class _Parser:
         name = self._take()
         fields: dict[str, MessageField] = {}
         if self._peek() == ":":
-            raise BadDefinition(f"{self._owner}: {name} inherits from another structure")
+            raise BadDefinition(f"{self._owner}: {name} inherits from a structure: not supported")
         self._take("{")
         while self._peek() != "}":
             default = self._annotations()
@@ -189,7 +189,7 @@ class _Parser:
                 length = self._size()
                 self._take("]")
             if self._peek() == "[":
-                raise BadDefinition(f"{self._owner}: {name} is an array of arrays")
+                raise BadDefinition(f"{self._owner}: {name} is an array of arrays: not supported")
             found.append((name, length))
             if self._take() == ";":
                 return found
@@ -210,7 +210,7 @@ class _Parser:
                 bound = self._size()
                 self._take(">")
             if inner.length is not None:
-                raise BadDefinition(f"{self._owner}: a sequence of arrays")
+                raise BadDefinition(f"{self._owner}: a sequence of arrays: not supported")
             return _Type(inner.name, 0, bound)
         if word in ("string", "wstring"):
             if self._peek() == "<":

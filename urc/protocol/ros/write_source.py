@@ -81,13 +81,13 @@ def _binary(value: Any, length: int) -> bytes:
         value = base64.b64decode(value, validate=True)
     data = bytes(value) if not isinstance(value, int) else b"\0"[:-value]
     if length and len(data) != length:
-        raise ValueError(f"{len(data)} elements in place of {length}")
+        raise ValueError(f"{len(data)} elements instead of {length}")
     return data
 
 
 def _listed(value: Any, length: int) -> list[Any]:
     if isinstance(value, str | Mapping) or (length and len(value) != length):
-        raise ValueError("a list of another length")
+        raise ValueError("a list of a different length")
     return list(value)
 
 

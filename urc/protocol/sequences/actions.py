@@ -109,7 +109,7 @@ def _repeating(label: str, step: sequence.RepeatStep, builder: RequestCompiler) 
     body = _actions(f"{label}.repeat", step.body, builder)
     otherwise = _otherwise(label, step.otherwise, builder)
     until = step.until
-    text = step.text or f"{label}: not done after {step.times} rounds"
+    text = step.text or f"{label}: not finished after {step.times} iterations"
 
     def rounds(is_done: list[bool]) -> Iterator[Action]:
         def look(runner: SequenceRunner, now: float) -> list[LineEvent]:

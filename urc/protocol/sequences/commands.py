@@ -105,7 +105,7 @@ def why_refused(
     asked = next((one for one in questions(command, values) if one.is_two_person), None)
     if asked is None or len(people) >= _BOTH:
         return None
-    text = f"{asked.text}: two people must confirm {command.name}, and {len(people)} did"
+    text = f"{asked.text}: two people must confirm {command.name}, but only {len(people)} did"
     return ExchangeOutcome("not-confirmed", text)
 
 

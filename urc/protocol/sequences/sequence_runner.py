@@ -179,7 +179,7 @@ class SequenceRunner:
     def expire(self, now: float) -> None:
         """Process the timeout of the current wait."""
         if self.ends_at is not None and self.ends_at <= now:
-            self.stop("timed-out", "it took too long")
+            self.stop("timed-out", "the sequence took too long")
             return
         if self.program.sequence_control.is_paused:
             self.stop("timed-out", f"the sequence was paused for {PAUSE_S:g} s")

@@ -201,7 +201,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
         if len(raw) > size:
             raise NotWritable(f"{name}: {len(raw)} bytes do not fit into {size}")
         if ends_at_nul and pad in raw:
-            raise NotWritable(f"{name}: {quoted(raw)} contains a NUL, the end of the text")
+            raise NotWritable(f"{name}: {quoted(raw)} contains a NUL, which ends the text")
         return raw.ljust(size, pad)
 
     return padded

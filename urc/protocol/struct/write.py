@@ -259,7 +259,7 @@ def _put_size(
             scope[only] = solved(extent.expression, only, number, name)
             builder.fill(gap, scope[only])
         elif evaluate(extent.expression, scope) != number:
-            wanted = f"{extent.expression.source.strip()!r} gives another length"
+            wanted = f"{extent.expression.source.strip()!r} gives a different length"
             raise NotWritable(f"{name}: the length is {number}, but {wanted}")
 
 

@@ -68,7 +68,7 @@ class Frame:
 
     def _decoded(self) -> str:
         if not isinstance(self.payload, bytes):
-            raise BadText("a message without text")
+            raise BadText("the message has no text")
         try:
             return self.payload.decode(self.encoding)
         except UnicodeDecodeError as error:

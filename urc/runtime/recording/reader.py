@@ -155,7 +155,7 @@ def _unpacked(chunk: Any) -> Iterable[object]:
 
 
 def _unreadable(time_ns: int, fault: Exception) -> RecordedMessage:
-    text = f"a piece of the recording cannot be read: {str(fault) or type(fault).__name__}"
+    text = f"part of the recording cannot be read: {str(fault) or type(fault).__name__}"
     told = {"level": 3, "name": "recording", "message": text}
     return RecordedMessage(time_ns, LOG, json.dumps(told).encode())
 

@@ -210,7 +210,7 @@ class Recorder:
                 self._writer.flush()
                 whole_s = time.monotonic()
                 if not self.file.exists():  # the system would write to a deleted file
-                    raise UrcError(f"{self.file} was removed, or moved away")
+                    raise UrcError(f"{self.file} was deleted or moved")
 
     def _next(self) -> list[Tapped] | None:
         """Return the queued events; [] after a second without events; None at the end."""

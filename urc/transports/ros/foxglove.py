@@ -102,9 +102,9 @@ class FoxgloveTransport:
                 await self._greeted.wait()
                 await self._flush(session)
         except (TimeoutError, TransportError) as fault:
-            why = session.queue.ended or str(fault) or "it does not describe itself"
+            why = session.queue.ended or str(fault) or "it sent no server information"
             await self.close()
-            raise ConnectFailed(f"{self._where} is no Foxglove server ({why})") from fault
+            raise ConnectFailed(f"{self._where} is not a Foxglove server ({why})") from fault
         except BaseException:
             await self.close()
             raise

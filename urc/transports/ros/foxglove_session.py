@@ -407,7 +407,7 @@ class FoxgloveSession:
             if self.encodings and "json" not in self.encodings:
                 known = ", ".join(self.encodings)
                 raise TransportError(
-                    f"the type {kind} of {topic} is unknown; the bridge takes {known}"
+                    f"the type {kind} of {topic} is unknown; the bridge accepts {known}"
                 )
             encoding, data = "json", self._as_json(envelope.body)
         elif stamps := said.get("stamps"):

@@ -187,7 +187,8 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
     compression = attributes.get("compression") or "none"
     if compression not in ("none", "png", "cbor"):
-        raise TransportError(f"ros: {compression!r} of {topic} is not none, png or cbor")
+        text = f"ros: compression {compression!r} of {topic} is not none, png or cbor"
+        raise TransportError(text)
     if compression == "cbor" and find_spec("cbor2") is None:
         raise TransportError(missing("cbor needs", "cbor2", "cbor"))
     return RosSubscription(

@@ -97,7 +97,7 @@ class OperationReader:
     def _join(self, piece: Mapping[str, Any]) -> str | None:
         name, number, total, data = (piece.get(key) for key in ("id", "num", "total", "data"))
         if not (isinstance(number, int) and isinstance(total, int) and isinstance(data, str)):
-            raise BadOperation("a fragment without number, total or data")
+            raise BadOperation("a fragment has no number, total or data")
         if not 0 <= number < total <= MAX_FRAGMENTS:
             raise BadOperation(f"fragment {number} of {total} is invalid")
         key = str(name) if isinstance(name, str | int) else "?"
@@ -122,7 +122,7 @@ class OperationReader:
 
 def _operation(found: object) -> dict[str, Any]:
     if not isinstance(found, dict) or not isinstance(found.get("op"), str):
-        raise BadOperation("a frame without an operation")
+        raise BadOperation("a frame has no operation")
     return found
 
 
@@ -249,7 +249,7 @@ def _unfiltered(rows: bytes, stride: int) -> bytes:
             case 1 | 3 | 4 as kind:
                 _undo_left(kind, row, above)
             case unknown:
-                raise BadOperation(f"a png has a filter {unknown}")
+                raise BadOperation(f"a png has the unknown filter {unknown}")
         out += row
         above = bytes(row)
     return bytes(out)

@@ -183,9 +183,9 @@ class AlarmNotifier:
                 self._counts["sent"] += 1
                 return
             except NotifyFailed as error:
-                log.warning("the notification of alarms of %s failed: %s", robot, error)
+                log.warning("the alarm notification for %s failed: %s", robot, error)
             except Exception:  # supervisor: the next notification is always tried
-                log.exception("the notification of alarms of %s failed", robot)
+                log.exception("the alarm notification for %s failed", robot)
             if wait_s is None or self._is_closing:
                 break
             with self._wakes:
@@ -219,7 +219,7 @@ def _run(options: NotifyOptions, data: bytes) -> None:
             os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         raise NotifyFailed(
-            f"{options.place}: ended after {options.timeout_s:g} s without a result"
+            f"{options.place}: did not finish within {options.timeout_s:g} s"
         ) from None
     if process.returncode:
         raise NotifyFailed(f"{options.place}: exit code {process.returncode}")

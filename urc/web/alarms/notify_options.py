@@ -96,7 +96,7 @@ def _url(given: OptionsFile, key: str) -> str:
     if url.scheme not in ("http", "https") or not url.host or url.userinfo:
         raise given.fault((key,), "expected a URL such as https://hooks.example/alarms")
     if url.scheme == "http" and not is_loopback_host(url.host):
-        raise given.fault((key,), "expected https:, because http: is readable on the network")
+        raise given.fault((key,), "expected https:, because http: is not encrypted")
     return text
 
 

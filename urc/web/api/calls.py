@@ -108,11 +108,11 @@ _FILTERS: Final = (
     Query("robot", "Name of a robot."),
     Query("who", "Name of a person, device or program."),
     Query("what", "Kinds of entries, separated by commas."),
-    Query("text", "Text in an entry."),
+    Query("text", "Text to find in entries."),
     Query("since", "Earliest time, in seconds since 1970.", "number"),
     Query("until", "Latest time, in seconds since 1970.", "number"),
     Query("before", "Number of an entry; only older entries are returned.", "integer"),
-    Query("last", "Largest number of entries, up to 1000.", "integer"),
+    Query("last", "Maximum number of entries, at most 1000.", "integer"),
 )
 _NO_ROBOT: Final = (409, 429)
 """URC cannot connect to the robot, or too many clients use it."""
@@ -126,7 +126,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "document",
         f"{_ROBOT}/document",
         MAINTAIN,
-        "The document of a robot as one YAML text, without values of settings.",
+        "The document of a robot as one YAML text, without setting values.",
         None,
         errors=(409,),
         media=("application/yaml",),
@@ -144,8 +144,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "signal",
         f"{_ROBOT}/signals/{{signal}}",
         WATCH,
-        "The latest value of one signal. An image is sent as a file; the header x-urc-age-ms has"
-        " its age.",
+        "The latest value of one signal. An image is sent as a file; the header x-urc-age-ms"
+        " contains its age.",
         SignalValue,
         errors=_NO_ROBOT,
         media=(
@@ -157,8 +157,9 @@ CALLS: Final[tuple[Call, ...]] = (
         "stream",
         f"{_ROBOT}/stream",
         WATCH,
-        "Server-Sent Events: “values” has changed signals, “connections” the states of the"
-        " connections, and “end” the reason for the end. A slow reader skips values.",
+        "Server-Sent Events: “values” contains changed signals, “connections” contains the states"
+        " of the connections, and “end” contains the reason for the end. A slow reader misses"
+        " values.",
         None,
         query=(_NAMES,),
         errors=_NO_ROBOT,
@@ -190,8 +191,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "motion",
         f"{_ROBOT}/motion",
         DRIVE,
-        "Pass on the newest input of a held command. Silence longer than its lease stops the"
-        " robot. For motion, the WebSocket is the better way.",
+        "Send the newest input of a held command. A pause longer than the lease stops the robot."
+        " The WebSocket is better for motion.",
         MotionAnswer,
         MotionAsked,
         "POST",
@@ -218,7 +219,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_overview",
         "/api/v1/alarms",
         SIGNED_IN,
-        "The numbers of alarms of all robots that you may watch.",
+        "The number of alarms of each robot that you may watch.",
         AlarmOverview,
     ),
     Call(
@@ -245,7 +246,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_acknowledge",
         f"{_ROBOT}/alarms/acknowledge",
         DRIVE,
-        "Acknowledge alarms as you saw them. An alarm that was raised again is left out.",
+        "Acknowledge alarms as you saw them. An alarm that was raised again since then is skipped.",
         AlarmAction,
         AcknowledgeAsked,
         "POST",
@@ -255,7 +256,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_shelve",
         f"{_ROBOT}/alarms/shelve",
         DRIVE,
-        "Shelve alarms for at most 24 hours. At the end, an active alarm is raised again.",
+        "Shelve alarms for at most 24 hours. At the end of this period, an active alarm is raised"
+        " again.",
         AlarmAction,
         ShelveAsked,
         "POST",
@@ -265,7 +267,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_unshelve",
         f"{_ROBOT}/alarms/unshelve",
         DRIVE,
-        "End the shelves of alarms.",
+        "Unshelve alarms.",
         AlarmAction,
         UnshelveAsked,
         "POST",
@@ -403,7 +405,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "repositories_add",
         "/api/v1/repositories",
         MAINTAIN_SERVER_FRESH,
-        "Add a repository, which must respond.",
+        "Add a repository; the call fails if the repository does not respond.",
         ResultLine,
         Url,
         "POST",
@@ -434,7 +436,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_add",
         "/api/v1/packages/add",
         MAINTAIN_SERVER_FRESH,
-        "Start a job for a package given by its path in a repository or on this machine.",
+        "Start a job for the package at a path in a repository or on this machine.",
         JobNews,
         Add,
         "POST",
@@ -468,7 +470,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_back",
         "/api/v1/packages/back",
         MAINTAIN_SERVER_FRESH,
-        "Restore the version of a package before its last update.",
+        "Restore the version that a package had before its last update.",
         RemovedPackages,
         InstallRequest,
         "POST",
@@ -478,7 +480,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_remove",
         "/api/v1/packages/remove",
         MAINTAIN_SERVER_FRESH,
-        "Remove a package; without yes, only list the packages that would be removed.",
+        "Remove a package; without “yes”, only list the packages that would be removed.",
         RemovedPackages,
         InstallRequest,
         "POST",

@@ -115,7 +115,7 @@ class EventStream:
 
     def _recheck(self) -> None:
         if not self._may_read():
-            self._reason = "your sign-in or your right has ended"
+            self._reason = "your sign-in or your right to watch has ended"
             self._revoked.set()
 
     async def _write(self, send: Send) -> None:

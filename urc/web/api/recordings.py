@@ -172,7 +172,7 @@ class RecordingCalls:
         check_installed()
         running = self._running.get(name)
         if running is not None and running.state.active:
-            raise ApiError(409, "a program records this robot already", "recording")
+            raise ApiError(409, "a program is already recording this robot", "recording")
         if service.robot.playback is not None:
             raise ApiError(409, "this is the playback of a recording", "recorded")
         running = self._running[name] = _Running()
@@ -197,7 +197,7 @@ class RecordingCalls:
         name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         if running is None or running.task is None or not running.state.active:
-            raise ApiError(409, "no program records this robot", "not-recording")
+            raise ApiError(409, "no program is recording this robot", "not-recording")
         running.stop.set()
         await asyncio.wait((running.task,))
         return answer(running.state)

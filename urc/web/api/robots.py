@@ -225,7 +225,7 @@ class RobotCalls:
         known = session.service.robot.profile.driver.commands[wanted]
         questioned = questions(known, asked.arguments)
         if any(one.is_two_person for one in questioned):
-            text = "two people must confirm this command: give it on a page"
+            text = "two people must confirm this command: run it on a page"
             raise ApiError(428, text, "needs-two-people")
         if not questioned or not asked.confirmed:
             return ""
@@ -241,7 +241,7 @@ class RobotCalls:
         asked = await body_of(request, LeaseAsked)
         peer = self._moving_peer(request, name, service)
         if not service.controls.controller.can_move:
-            raise ApiError(409, "this robot has no motion", "no-motion")
+            raise ApiError(409, "this robot has no motion commands", "no-motion")
         if asked.session:
             session = self._session(request, service, asked.session)
             return answer(self._asked(session, asked))

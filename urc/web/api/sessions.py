@@ -125,7 +125,7 @@ class ProgramSession:
             if notice.kind == "refused":
                 return notice.message
         lease = self.service.controls.controller.lease
-        late = "the input is too old, or not newer than the last one; repeat the newest beat"
+        late = "the input is too old, or not newer than the last input; send the newest beat"
         return lease.refusal(self.operator.client.id, asked.epoch) or late
 
     def notices(self) -> tuple[MotionNotice, ...]:
@@ -199,7 +199,7 @@ class ProgramSessions:
             and kept.session.peer.identity == who
         )
         if kept is None or not is_ours:
-            raise ApiError(404, "this session is not open, or has ended", "no-session")
+            raise ApiError(404, "this session does not exist, or has ended", "no-session")
         if kept.session.live.ended.is_set():
             self.end(kept.session)
             raise ApiError(409, "the session of the robot has ended", "no-session")

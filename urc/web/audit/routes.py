@@ -37,7 +37,7 @@ from urc.web.words import t
 
 __all__ = ["AuditPage", "AuditRoutes"]
 
-_NO_LOG: Final = "there is no audit log: this server has no folder for its data"
+_NO_LOG: Final = "this server has no audit log, because it has no data folder"
 _NO_STORE: Final = {"cache-control": "no-store"}
 _SETTLE_S: Final = 0.5
 _SEARCHES: Final = 2
@@ -121,7 +121,7 @@ class AuditRoutes:
         if self._log is None:
             return told(404, _NO_LOG)
         if self._exports >= _EXPORTS:
-            return told(429, f"{_EXPORTS} exports are under way: try again in a minute")
+            return told(429, f"{_EXPORTS} exports are in progress: try again in a minute")
         robots = self._scope(request)
         self._recorder.audit_exported(actor_of(request))
         await asyncio.to_thread(self._log.settle, _SETTLE_S)

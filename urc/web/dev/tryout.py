@@ -302,7 +302,7 @@ def _from_hex(text: str) -> bytes:
     digits = re.sub(r"0[xX]|[\s,:;]", " ", text).split()
     for number, word in enumerate(digits, 1):
         if len(word) % 2 or not re.fullmatch(r"[0-9A-Fa-f]+", word):
-            raise UrcError(f"expected pairs of hex digits; word {number} is {word[:20]!r}")
+            raise UrcError(f"expected pairs of hex digits; group {number} is {word[:20]!r}")
     return bytes.fromhex("".join(digits))
 
 

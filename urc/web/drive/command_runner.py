@@ -93,7 +93,7 @@ class CommandRunner:
                     )
         except asyncio.CancelledError:
             recorder = self._controls.recorder
-            text = "nobody waited for the answer"
+            text = "no client waited for the answer"
             recorder.ran(operator.client, asked.command, asked.arguments, text, _last(sent))
             raise
         except TimeoutError:

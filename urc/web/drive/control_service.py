@@ -449,7 +449,7 @@ class ControlService:
         if late_s > TOO_LATE_S:
             now = self._clock.now()
             for command in self.controller.halt():
-                self.recorder.stopped(command, "the server was held up", now)
+                self.recorder.stopped(command, "the server was blocked", now)
                 for operator in self._operators.values():
                     operator.forget(command)
                     operator.moved_s.pop(command, None)

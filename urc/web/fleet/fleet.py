@@ -117,7 +117,7 @@ class Fleet:
         holder = service.controls.controller.lease.state.holder
         if holder is not None:
             return holder.name
-        return t("a stop that is on its way") if service.is_open else ""
+        return t("a pending stop") if service.is_open else ""
 
     def _apart(self, name: str, robot: Robot) -> Robot:
         others = [one.profile for other, one in self.robots.items() if other != name]

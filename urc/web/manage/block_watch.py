@@ -76,7 +76,7 @@ class BlockWatch:
             try:
                 await changed()
             except (UrcError, OSError) as error:
-                log.warning("the lists of blocked packages cannot be read: %s", error)
+                log.warning("the block lists cannot be read: %s", error)
             seen = stamp
 
     async def enforce(self) -> None:

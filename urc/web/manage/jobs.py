@@ -168,7 +168,7 @@ class Jobs:
     def begin(self, what: Wanted) -> Job:
         """Start planning an installation; raise `Busy` while another job is working."""
         if self.newest is not None and self.newest.state == "working":
-            raise Busy(f"{self.newest.title} is still in progress: wait for its end, or cancel it")
+            raise Busy(f"{self.newest.title} is still in progress: wait for it, or cancel it")
         if self._left >= _LEFT_MOST:
             raise Busy("too many cancelled downloads are still open: try again in two minutes")
         title = what.name if isinstance(what, FileSource) else str(what)
@@ -209,7 +209,7 @@ class Jobs:
         plan = planned.plan._replace(waived=frozenset(unsigned))
         if lacks := [one for one in planned.unsigned if one not in plan.waived]:
             raise PackageError(
-                f"{', '.join(lacks)}: not signed: approve each package by name, or give up"
+                f"{', '.join(lacks)}: not signed: approve each package by name, or cancel"
             )
         job.state, job.line = "working", _INSTALLING
         try:
@@ -307,7 +307,7 @@ class Jobs:
         if before.key != plan.lock.key:
             job.notes.append(
                 phrase(
-                    "{package} stays in use under this name: remove it to use the other one",
+                    "{package} stays in use under this name: remove it to use the new package",
                     package=before,
                 )
             )
@@ -317,7 +317,7 @@ class Jobs:
         except UrcError as error:
             job.notes.append(
                 phrase(
-                    "what changes is not known: {package} cannot be read: {why}",
+                    "the changes are unknown: {package} cannot be read: {why}",
                     package=before,
                     why=_line(error),
                 )

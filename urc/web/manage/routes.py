@@ -89,7 +89,7 @@ def manage_page(
         ),
         "interfaces": (
             t("Interfaces"),
-            t("An interface arranges the widgets of a robot. Each robot that it fits offers it."),
+            t("An interface arranges the widgets of a robot. Each compatible robot offers it."),
         ),
         "widgets": (
             t("Widgets"),
@@ -211,7 +211,7 @@ class ManageRoutes:
 
     @_api
     async def connect(self, request: Request) -> Response:
-        """Add a repository, which must respond."""
+        """Add a repository; the call fails if the repository does not respond."""
         said = await body_of(request, Url)
         text = said.url.strip()
         if "://" not in text:
@@ -226,7 +226,7 @@ class ManageRoutes:
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
         self._record(request, "repository remove", [said.url])
-        return answer(ResultLine(t("forgotten; what is installed stays")))
+        return answer(ResultLine(t("forgotten; installed packages stay")))
 
     @_api
     async def install(self, request: Request) -> Response:
@@ -236,7 +236,7 @@ class ManageRoutes:
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Start a job for a package given by its path in a repository or on this machine."""
+        """Start a job for the package at a path in a repository or on this machine."""
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
@@ -260,7 +260,7 @@ class ManageRoutes:
 
     @_api
     async def back(self, request: Request) -> Response:
-        """Restore the version of a package before its last update."""
+        """Restore the version that a package had before its last update."""
         said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
         self._record(request, "restore", [str(old)])
@@ -279,7 +279,7 @@ class ManageRoutes:
         self._record(request, "remove", gone or [said.package])
         line = t("removed {names}", names=", ".join(gone))
         if not gone:
-            line = t("removed; another package needs its files")
+            line = t("removed; its files stay, because another package needs them")
         return answer(RemovedPackages(tuple(gone), line))
 
     @_api
@@ -320,7 +320,7 @@ class ManageRoutes:
                 pass  # a folder on this machine may have that name
         if not visitor_of(request).is_local:
             raise ApiError(
-                403, "a path on this machine needs the key in the address that URC printed"
+                403, "a path on this machine needs the start key: open the address that URC printed"
             )
         place = Path(path).expanduser()
         if not place.is_absolute():

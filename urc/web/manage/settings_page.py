@@ -161,7 +161,7 @@ def _monitoring(profile: Profile, chosen: bool | None) -> tuple[Option, ...]:
     if all(one.limits.is_empty for one in profile.driver.signals.values()):
         return ()
     return (
-        Option("", t("As this server was started"), chosen is None),
+        Option("", t("As set when this server was started"), chosen is None),
         Option("true", t("Always: stay connected"), chosen is True),
         Option("false", t("Only while a page is open"), chosen is False),
     )

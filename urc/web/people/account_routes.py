@@ -122,9 +122,9 @@ class AccountRoutes:
             if before is None and not visitor_of(request).is_fresh:
                 raise ApiError(403, stale_text())
             if before is not None and not await asyncio.to_thread(matches, said.current, before):
-                reason = AccessError("the present passphrase is wrong")
+                reason = AccessError("the current passphrase is wrong")
                 sign_ins.failed(request, "passphrase", reason, key, person=who.principal)
-                raise ApiError(403, t("The present passphrase is wrong."))
+                raise ApiError(403, t("The current passphrase is wrong."))
             kept = await asyncio.to_thread(hash_of, said.passphrase, name=who.name)
         await asyncio.to_thread(replace_passphrase, store, who.principal, kept)
         # Before `reload`, after which this request has no identity: its own sign-in has ended, too.
@@ -140,7 +140,7 @@ class AccountRoutes:
         """Return a code for pairing one of the visitor's devices."""
         who = visitor_of(request).identity
         if not _is_person(who):
-            raise ApiError(409, t("Only a person pairs devices."))
+            raise ApiError(409, t("Only a person can pair devices."))
         invitation = Invitation("device", "", (), who.principal)
         made = await asyncio.to_thread(self._links.pairing, request, invitation)
         self._sign_ins.recorder.paired(
@@ -167,10 +167,12 @@ class AccountRoutes:
         """End one of the visitor's sign-ins."""
         said = await body_of(request, SignInChoice)
         if visitor_of(request).identity.kind == "guest":
-            raise ApiError(409, t("Other guests may use the same link."))
+            raise ApiError(
+                409, t("A guest cannot end a sign-in, because other guests may use the same link.")
+            )
         found = self._control.directory.sign_ins.get(said.id)
         if found is None or found.principal not in self._own(visitor_of(request).identity):
-            raise ApiError(404, t("This sign-in has ended already."))
+            raise ApiError(404, t("This sign-in has already ended."))
         actor = actor_of(request)  # before the change, which may concern the visitor
         await self._control.end_sign_in(said.id)
         self._sign_ins.recorder.revoked(actor, "sign-in", name=actor.name, agent=found.agent)

@@ -169,7 +169,7 @@ class AdminRoutes:
         await asyncio.to_thread(change_grants, store, one.id, lambda _: grants)
         command = f"{_PLURALS[one.kind]} grant"
         await self._changed(request, command, name=one.name, roles=_texts(grants))
-        return answer(ResultLine(t("saved, and valid from now on")))
+        return answer(ResultLine(t("saved; the change takes effect immediately")))
 
     @answers_changes
     async def remove(self, request: Request) -> Response:
@@ -202,10 +202,10 @@ class AdminRoutes:
         grants = _grants(said.roles)
         owner = self._chosen(PrincipalChoice(said.owner), "person") if said.owner else None
         if (owner is None) == (not grants):
-            raise AccessError(t("A device needs either an owner, or roles of its own."))
+            raise AccessError(t("A device needs either an owner or its own roles."))
         name = parse_name(said.name) if said.name.strip() else ""
         if name and principal_named(self._control.directory, "device", name) is not None:
-            raise AccessError(t("A device has this name already."))
+            raise AccessError(t("A device with this name already exists."))
         invitation = Invitation("device", name, grants, owner.id if owner else "")
         made = await asyncio.to_thread(self._links.pairing, request, invitation)
         rights = f"roles of {owner.name}" if owner else _texts(grants)
@@ -248,7 +248,7 @@ class AdminRoutes:
         said = await body_of(request, SignInChoice)
         found = self._control.directory.sign_ins.get(said.id)
         if found is None:
-            raise AccessError(t("This sign-in has ended already."))
+            raise AccessError(t("This sign-in has already ended."))
         holder = self._control.directory.principals[found.principal]
         await self._control.end_sign_in(said.id)
         self._sign_ins.recorder.revoked(

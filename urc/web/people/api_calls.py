@@ -46,7 +46,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "sign-in",
         ANYONE,
-        "Sign a browser in with name and passphrase; the response sets the cookie.",
+        "Sign a browser in with a name and a passphrase; the response sets the cookie.",
         told.SignInResult,
         told.SignInRequest,
     ),
@@ -54,14 +54,14 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "codes",
         ANYONE,
-        "The right that a code of a pairing or invitation gives; the code stays valid.",
+        "The rights that a pairing or invitation code grants; the code stays valid.",
         told.CodeInfo,
         told.CodeRequest,
     ),
     PeopleCall(
         "pair",
         ANYONE,
-        "Make the browser a device; the response sets its key in a cookie.",
+        "Pair the browser as a device; the response sets its key in a cookie.",
         told.PairResult,
         told.PairRequest,
     ),
@@ -75,7 +75,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "guest",
         ANYONE,
-        "Let a guest in by the secret of a link.",
+        "Sign a guest in with the secret of a guest link.",
         told.GuestResult,
         told.CodeRequest,
     ),
@@ -89,7 +89,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "people/invite",
         ADMINISTER_FRESH,
-        "Make a link with which a person chooses a passphrase.",
+        "Make a link for a person to choose a passphrase.",
         told.SecretLink,
         told.PrincipalChoice,
     ),
@@ -138,34 +138,38 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "guests/add",
         ADMINISTER_FRESH,
-        "Make a link with which guests watch one robot.",
+        "Make a link for guests to watch one robot.",
         told.SecretLink,
         told.GuestRequest,
     ),
     PeopleCall("sign-ins/end", ADMINISTER, "End one sign-in.", ResultLine, told.SignInChoice),
-    _list("account", SIGNED_IN, "The own account.", told.AccountInfo),
+    _list("account", SIGNED_IN, "Your own account.", told.AccountInfo),
     PeopleCall(
         "account/passphrase",
         SIGNED_IN,
-        "Change the own passphrase; all other sign-ins of the person end.",
+        "Change your own passphrase; all your other sign-ins end.",
         told.SignInResult,
         told.PassphraseRequest,
     ),
     PeopleCall(
         "account/devices/pair",
         SIGNED_IN_FRESH,
-        "Make a code that pairs an own device.",
+        "Make a code that pairs one of your devices.",
         told.PairingCode,
     ),
     PeopleCall(
         "account/devices/remove",
         SIGNED_IN,
-        "Remove an own device.",
+        "Remove one of your devices.",
         ResultLine,
         told.PrincipalChoice,
     ),
     PeopleCall(
-        "account/sign-ins/end", SIGNED_IN, "End an own sign-in.", ResultLine, told.SignInChoice
+        "account/sign-ins/end",
+        SIGNED_IN,
+        "End one of your sign-ins.",
+        ResultLine,
+        told.SignInChoice,
     ),
 )
 """All calls."""

@@ -82,7 +82,7 @@ class BrowserSignIns:
         """The store of people; raise `ApiError` for a server without a store."""
         store = self.control.store
         if store is None:
-            raise ApiError(404, t("This server keeps no people."))
+            raise ApiError(404, t("This server has no list of people."))
         return store
 
     def check_wait(self, request: Request, *names: str) -> None:
@@ -124,7 +124,7 @@ class BrowserSignIns:
         """Wait for a turn to hash a passphrase; raise `ApiError` 503 if too many attempts wait."""
         # Each attempt delays all later attempts, so a crowd is refused immediately.
         if self._waiting >= MOST_WAITING:
-            raise ApiError(503, t("Too many people sign in at this moment: try again."))
+            raise ApiError(503, t("Too many people are signing in: try again."))
         self._waiting += 1
         try:
             async with self._hashes:

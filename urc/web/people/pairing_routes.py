@@ -120,7 +120,7 @@ class PairingRoutes:
         found = await self._invitation(request, said.code)
         person = sign_ins.control.directory.principals.get(found.owner)
         if found.kind != "person" or person is None:
-            raise ApiError(403, t("This code is unknown, was used already, or is too old."))
+            raise ApiError(403, t("This code is unknown, already used, or expired."))
         try:
             async with sign_ins.hashing():
                 kept = await asyncio.to_thread(hash_of, said.passphrase, name=person.name)
@@ -148,7 +148,7 @@ class PairingRoutes:
         found = await asyncio.to_thread(sign_ins.store.invitation, code, sign_ins.control.now())
         if found is None:
             sign_ins.failed(request, "pairing", AccessError(UNKNOWN_CODE))
-            raise ApiError(403, t("This code is unknown, was used already, or is too old."))
+            raise ApiError(403, t("This code is unknown, already used, or expired."))
         return found
 
     def _links(self, secret: str) -> tuple[RobotLink, ...]:

@@ -144,7 +144,7 @@ class PasskeyRoutes:
     @property
     def _passkeys(self) -> Passkeys:
         if self._known is None:
-            raise ApiError(404, "this server keeps no people, so it has no passkeys")
+            raise ApiError(404, "this server has no list of people, so it has no passkeys")
         return self._known
 
     def _record(self, request: Request, command: str, name: str) -> None:

@@ -79,7 +79,8 @@ class ProxyMiddleware:
             except AccessError as error:
                 # STOP does not need a signed-in person.
                 if scope["type"] == "http" and not is_stop(scope["method"], scope["path"]):
-                    await _refuse(send, f"The proxy {found.proxy.name} was not believed: {error}")
+                    name = found.proxy.name
+                    await _refuse(send, f"The sign-in by the proxy {name} was refused: {error}")
                     return
             else:
                 is_secure = scope["scheme"] in ("https", "wss")
@@ -143,7 +144,7 @@ class ProxyMiddleware:
         control, now = self._sign_ins.control, self._sign_ins.control.now()
         store = control.store
         if store is None:
-            raise AccessError("this server keeps no people")
+            raise AccessError("this server has no list of people")
         client = scope.get("client") or ("",)
         place = str(client[0])
 

@@ -70,7 +70,7 @@ class SignInRoutes:
         who = visitor_of(request).identity
         access = self._sign_ins.access
         if visitor_of(request).is_program:
-            raise ApiError(409, t("A token has no sign-out: remove the token."))
+            raise ApiError(409, t("A program cannot sign out: remove its token."))
         if who.kind in ("person", "guest"):
             self._sign_ins.recorder.signed_out(actor_of(request))
         if who.kind == "person":  # other guests may use the same link

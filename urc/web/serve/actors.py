@@ -37,7 +37,7 @@ def stopper_of(connection: HTTPConnection, robot: str) -> Operator:
     if visitor.is_known and not visitor.is_local:
         name = who.name
     else:
-        name = "a screen of this machine" if is_near or not host else host
+        name = "a screen on this machine" if is_near or not host else host
     return Operator(
         "",
         name,
@@ -61,7 +61,7 @@ def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent:
         agent: browser and operating system in words.
     """
     if who == NOBODY:
-        recorder.sign_in_failed("key", place, "the start key is wrong, or of an earlier start")
+        recorder.sign_in_failed("key", place, "the start key is wrong, or from an earlier start")
     else:
         actor = Actor(who.name, who.principal, who.kind, "administer", "key", place, who.sign_in)
         recorder.signed_in(actor, agent)
@@ -74,4 +74,4 @@ def record_bad_token(recorder: ServerRecorder, place: str) -> None:
         recorder: writer of the audit entries.
         place: network address.
     """
-    recorder.sign_in_failed("token", place, "the token is unknown, over or revoked")
+    recorder.sign_in_failed("token", place, "the token is unknown, expired or revoked")

@@ -87,13 +87,13 @@ class LocalCertificate:
         notes = []
         if authority.is_new and had_one:
             notes.append(
-                "a new certificate authority replaces the old one: all devices have to trust it"
+                "a new certificate authority replaces the old one: all devices must trust it"
             )
         if authority.left_out:
             left_out = ", ".join(authority.left_out)
             notes.append(
-                f"the authority's limits exclude {left_out}; --allow-host with this name makes"
-                " a new authority"
+                f"the authority's limits exclude {left_out}; to make a new authority, use"
+                " --allow-host with this name"
             )
         return LoadedCertificate(
             _context(issued.chain, issued.key),
@@ -148,7 +148,7 @@ class GivenCertificate:
             raise UrcError(f"--tls-cert: cannot use {file}: {reason}") from error
         ends = leaf.not_valid_after_utc
         late = ends <= datetime.now(UTC)
-        notes = (f"{self._chain}: the certificate ended on {ends:%Y-%m-%d}",) if late else ()
+        notes = (f"{self._chain}: the certificate expired on {ends:%Y-%m-%d}",) if late else ()
         return LoadedCertificate(
             context, fingerprint(leaf), self._chain.absolute(), _name_in(leaf), b"", notes
         )

@@ -236,7 +236,7 @@ class Policy:
         names = self._names if is_near else self._names | self._own
         if authority is None or not is_host_allowed(authority, names, is_loopback=is_near):
             shown = authority.host if authority is not None else "that host name"
-            return 421, f"This server accepts no requests to {shown}; --allow-host adds a name."
+            return 421, f"This server accepts no requests to {shown}; use --allow-host to allow it."
         is_upgrade = scope["type"] == "websocket"
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
@@ -247,9 +247,9 @@ class Policy:
         lengths = _values(scope, b"content-length")
         if lengths and _values(scope, b"transfer-encoding"):
             # A web server in front of URC may interpret the rest of the body as the next request.
-            return 400, "A request has either a length or a transfer encoding."
+            return 400, "A request cannot have both a content length and a transfer encoding."
         if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):
-            return 413, f"A request may carry at most {BODY_BYTES} bytes."
+            return 413, f"A request may have at most {BODY_BYTES} bytes."
         return None
 
 
@@ -328,7 +328,7 @@ def _limited(scope: Scope, receive: Receive) -> Receive:
         message = await receive()
         total += len(message.get("body", b""))
         if total > BODY_BYTES:
-            raise HTTPException(413, f"A request may carry at most {BODY_BYTES} bytes.")
+            raise HTTPException(413, f"A request may have at most {BODY_BYTES} bytes.")
         return message
 
     return counted

@@ -56,7 +56,7 @@ class Right(NamedTuple):
     def refusal(self) -> str:
         """The message for visitors who lack the right."""
         if self.is_local:
-            return t("This needs the key in the address that URC printed.")
+            return t("This needs the start key: open the address that URC printed.")
         if self.scope == "server":
             return t("This needs the role {role} for all robots.", role=self.role)
         return t("This needs the role {role}.", role=self.role)
@@ -132,7 +132,7 @@ class ProtectedSocket(WebSocketRoute):
 def stale_text() -> str:
     """Return the message for visitors whose sign-in is too old."""
     minutes = round(FRESH_S / 60)
-    return t("Sign in again: this needs a sign-in of the last {n} minutes.", n=minutes)
+    return t("Sign in again: this needs a sign-in within the last {n} minutes.", n=minutes)
 
 
 async def turn_away(receive: Receive, send: Send, reason: str) -> None:

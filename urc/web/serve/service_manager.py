@@ -54,7 +54,7 @@ class ServiceManager:
                 out.setblocking(False)
                 out.sendto("\n".join(lines).encode(), place)
         except OSError as error:
-            log.warning("systemd gets no messages: %s", error.strerror or error)
+            log.warning("cannot send messages to systemd: %s", error.strerror or error)
 
     async def watch(self, is_healthy: Callable[[float], Awaitable[bool]]) -> None:
         """Send heartbeats while the server is healthy; with a watchdog, never return.
@@ -72,7 +72,7 @@ class ServiceManager:
             if healthy:
                 self.tell("WATCHDOG=1")
             elif was_healthy:
-                log.warning("the server does not answer itself; systemd gets no heartbeat")
+                log.warning("the server does not answer its own request; systemd gets no heartbeat")
             was_healthy = healthy
             await asyncio.sleep(every_s)
 

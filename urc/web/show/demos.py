@@ -226,14 +226,16 @@ def _file(folder: Path, name: str) -> bytes:
     if not path.is_relative_to(folder.resolve()) or not path.is_file():
         raise UrcError(f"there is no file {name!r} in the widget's folder")
     if path.stat().st_size > PICTURE_BYTES:
-        raise UrcError(f"{name!r} is longer than {PICTURE_BYTES} bytes")
+        raise UrcError(f"{name!r} is larger than {PICTURE_BYTES} bytes")
     return path.read_bytes()
 
 
 def colour_bars(width: int, height: int) -> bytes:
     """Return a PNG with colour bars above a grey ramp; the bytes depend only on the size."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
-        raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
+        raise UrcError(
+            f"expected a test picture of 1 to 2048 pixels per side, found {width} x {height}"
+        )
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))
     ramp = b"".join(bytes((x * 255 // max(1, width - 1),) * 3) for x in range(width))
     rows = b"".join(b"\0" + (bars if y < height * 2 // 3 else ramp) for y in range(height))

@@ -95,7 +95,7 @@ def framed_page(profile: Profile, key: str, request: Request) -> Response:
     parts = urlsplit(url)
     origin = f"{parts.scheme}://{parts.netloc}".lower()
     is_ours = _is_ours(origin, parts.netloc, request)
-    fault = words.t("this is a page of the dashboard itself, which is not shown here")
+    fault = words.t("pages of the dashboard itself cannot be shown here")
     page = FramedPage(parts.netloc, "" if is_ours else url, fault if is_ours else "")
     request.state.frame_policy = _POLICY.format(frames="'none'" if is_ours else origin)
     html = render("framed.html.j2", page)

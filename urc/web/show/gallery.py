@@ -293,7 +293,7 @@ class Gallery:
             found = self._lookup.find(name)
             widget = found and found.widget
             title, summary = (widget.title, widget.summary) if widget else (name, "")
-            fault = "" if widget else t("its manifest cannot be read: urc validate says why")
+            fault = "" if widget else t("its manifest cannot be read: see “urc validate”")
             entries.append(GalleryEntry(name, title, summary, f"/widgets/{quote(name)}/", fault))
         return entries
 

@@ -195,7 +195,7 @@ def _step_words(step: sequence.Step) -> dict[str, str]:
         case sequence.SendStep():
             return {"text": mark("send"), "what": ""}
         case sequence.ExpectStep():
-            return {"text": mark("wait for the answer"), "what": ""}
+            return {"text": mark("wait for the reply"), "what": ""}
         case sequence.PromptStep():
             return {"text": mark("wait for the prompt"), "what": ""}
         case sequence.WaitStep(seconds):

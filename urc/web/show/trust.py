@@ -51,7 +51,7 @@ _GUIDES: Final = (
             phrase("Open the settings of the device, and search for “CA certificate”."),
             phrase("Confirm the warning, and choose the downloaded file authority.crt."),
         ),
-        phrase("Search for “trusted credentials”, open “User”, choose it, and remove it."),
+        phrase("Search for “trusted credentials”, open “User”, and remove the certificate."),
     ),
     DeviceGuide(
         "ios",
@@ -80,7 +80,7 @@ _GUIDES: Final = (
             phrase("Open the file: Keychain Access adds it to the login keychain."),
             phrase("Open it there, open “Trust”, and choose “Always Trust” for SSL."),
         ),
-        phrase("Delete it in Keychain Access."),
+        phrase("Delete the certificate in Keychain Access."),
     ),
     DeviceGuide(
         "linux",
@@ -101,7 +101,7 @@ _GUIDES: Final = (
             phrase("Open the settings, search for “certificates”: View Certificates, Authorities."),
             phrase("Import the file, and select “Trust this CA to identify websites”."),
         ),
-        phrase("Choose it in the same list, then “Delete or Distrust”."),
+        phrase("Choose the certificate in the same list, then “Delete or Distrust”."),
     ),
 )
 """Guides in English, to be translated. Menu names match those in the operating systems."""

@@ -129,7 +129,7 @@ def test_a_file_that_is_removed_is_missed(file: Path, monkeypatch: pytest.Monkey
     wait(lambda: kept.is_begun)
     file.unlink()
     wait(lambda: kept.fault != "")
-    assert kept.fault == f"{file} was removed, or moved away"
+    assert kept.fault == f"{file} was deleted or moved"
     kept.close()
 
 

@@ -50,7 +50,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         return None
     if part.name == "request" and ("url" in part.data) == ("path" in part.data):
         both = "url" in part.data
-        text = "'path' and 'url' are both given" if both else "'path' is missing"
+        text = "'path' and 'url' exclude each other" if both else "'path' is missing"
         hint = "write 'path', or 'url' for an address from the robot itself"
         problems.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None
@@ -87,9 +87,9 @@ def _stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
     problems.error(
         part,
         "bad-value",
-        f"{kind!r} has no known stamped type, or no json",
+        f"{kind!r} has no known stamped type, or 'json' is missing",
         at="stamped",
-        hint=f"types of geometry_msgs with json: {', '.join(_STAMPED)}; write others in full",
+        hint=f"geometry_msgs types to use with json: {', '.join(_STAMPED)}; write others in full",
     )
     return None
 

@@ -14,7 +14,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     pairs, separator = part.must("pairs"), part.must("separator")
     if pairs.data == separator.data:
         problems.error(
-            separator, "same-separator", "the separator of pairs also separates key and value"
+            separator, "same-separator", "'pairs' and 'separator' must be different"
         )
         return None
     named = part.named("fields")
@@ -32,7 +32,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     bare = tuple(inner.data or "" for inner in part.listed("first"))
     for place, inner in enumerate(part.listed("first")):
         if inner.data and (inner.data in bare[:place] or inner.data in keys.values()):
-            text = f"the field {inner.data!r} is named twice"
+            text = f"the field {inner.data!r} occurs twice"
             problems.error(inner, "duplicate-name", text)
             return None
     strip = part.get("strip")

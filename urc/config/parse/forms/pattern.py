@@ -81,7 +81,7 @@ def _hole(inside: str, before: str, offset: int, holes: list[PatternField]) -> P
     name, kind = found[1] or "", found[2]
     if kind not in _KINDS:
         hint = did_you_mean(kind, _KINDS, "kinds")
-        text = f"there is no kind of field {kind!r}"
+        text = f"there is no field kind {kind!r}"
         raise _PatternFault(text, offset + found.start(2), len(kind), hint)
     if name and any(hole.name == name for hole in holes):
         raise _PatternFault(f"the field {name!r} occurs twice", offset, len(name))
@@ -99,7 +99,7 @@ def _check_after(holes: list[PatternField], literal: str, last: tuple[int, int])
     if kind == "rest":
         raise _PatternFault("nothing can follow a field of kind 'rest'", start, end - start)
     if not literal:
-        hint = "write the text between both fields, or give a width: {name:number:6}"
+        hint = "write the text between the two fields, or give a width: {name:number:6}"
         text = "there is no text between this field and the next"
         raise _PatternFault(text, start, end - start, hint)
     if literal[0] in _EATS.get(kind, ""):

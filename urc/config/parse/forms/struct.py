@@ -76,7 +76,9 @@ def _check_size(
         if least > room or (size is not None and size < room):
             over = f"write {{ size: {room - least} }} for unused bytes"
             hint = over if least < room else ""
-            text = f"the items take {least} bytes, but a frame of this transport has {room}"
+            text = (
+                f"the items take {least} bytes, but a frame of this transport has room for {room}"
+            )
             problems.error(part, "does-not-fit", text, hint=hint)
     elif least + around > framing.max_bytes:
         text = f"the items take {least} bytes, but a frame on this line has {framing.max_bytes}"

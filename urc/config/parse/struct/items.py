@@ -210,12 +210,12 @@ class ItemParser:
             size_is_free = item.size is not None and item.size.kind != "fixed"
             if not size_is_free or fixed_size(_without_rest(items)) is None:
                 self.problems.error(
-                    part, "misplaced-key", "'trim' needs a fixed type in a window of another size",
-                    at="trim", key=True, hint="write 'size: rest', or name the item with the size",
+                    part, "misplaced-key", "'trim' needs a fixed-size type and a variable 'size'",
+                    at="trim", key=True, hint="write 'size: rest', or 'size' with an item's name",
                 )  # fmt: skip
                 return None
         if item.value is not None and item.times is None:
-            text = "'value' of a struct needs an array"
+            text = "'value' has no effect for a struct without 'count'"
             self.problems.error(part, "misplaced-key", text, at="value", key=True)
         return item._replace(items=items, trim=trim)
 
@@ -293,7 +293,7 @@ class ItemParser:
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
             text = f"{key!r} is not a value of {subject.id!r}"
-            hint = f"its words: {', '.join(words)}" if words else "the item has only numbers"
+            hint = f"its words: {', '.join(words)}" if words else "the item has no words"
             self.problems.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]

@@ -83,7 +83,7 @@ class LeafParser:
             self.problems.error(
                 part.must("bits"),
                 "wrong-size",
-                f"the bits take {widths} in total, but {named.data} has {number.bits}",
+                f"the bit fields have {widths} bits in total, but {named.data} has {number.bits}",
                 hint="declare reserved bits with { width: … }" if widths < number.bits else "",
             )
             return None

@@ -67,7 +67,7 @@ def unknown_type(
     elif number_of(f"{word}be") is not None:
         hint = f"add the byte order: {word}be or {word}le"
     elif word[:-2] in ("u8", "i8"):
-        hint = f"one byte has no byte order: {word[:-2]}"
+        hint = f"write {word[:-2]}; one byte has no byte order"
     else:
         known = [*types, *(() if only_types else (*_COMMON_TYPES, *WORDS_OF_TYPES))]
         hint = did_you_mean(word, known, "types")

@@ -25,7 +25,7 @@ export class AlarmHistory {
     this.typing = undefined;
     this.text = /** @type {HTMLInputElement} */ (
       made("input", {
-        class: "urc-input", type: "search", maxlength: "200", "aria-label": t("Search in the history"),
+        class: "urc-input", type: "search", maxlength: "200", "aria-label": t("Search the history"),
         placeholder: t("Search"), oninput: () => this.typed(),
       })
     );
@@ -64,7 +64,7 @@ export class AlarmHistory {
       this.more.hidden = !has_more;
       const missing = lost > 0 ? t("{count} events could not be stored.", { count: lost }) : "";
       const empty = this.list.childElementCount === 0 ? t("No event.") : "";
-      write(this.said, [fault && t("Nothing new is stored: {why}", { why: fault }), missing, empty].filter(Boolean).join(" "));
+      write(this.said, [fault && t("New events are not stored: {why}", { why: fault }), missing, empty].filter(Boolean).join(" "));
     } catch (error) {
       if (mine === this.round) write(this.said, `▲ ${reason(error)}`);
     }

@@ -141,7 +141,7 @@ export class PageAlarms {
   async act(asked) {
     try {
       const { stored } = await asked;
-      if (!stored) this.tell(t("Done, but not stored: a restart of URC would forget it."));
+      if (!stored) this.tell(t("Done, but not stored: a restart of URC would undo it."));
     } catch (error) {
       this.tell(`▲ ${reason(error)}`);
     }

@@ -37,9 +37,9 @@ export const EVENTS = Object.freeze({
   suppressed: mark("suppressed by design"),
   unsuppressed: mark("no longer suppressed"),
   unknown: mark("value unknown"),
-  removed: mark("removed with the document"),
-  "flood began": mark("flood of alarms began"),
-  "flood ended": mark("flood of alarms ended"),
+  removed: mark("removed from the document"),
+  "flood began": mark("alarm flood began"),
+  "flood ended": mark("alarm flood ended"),
 });
 
 /**

@@ -132,7 +132,7 @@ export class AlarmSheet {
    */
   say(book, count) {
     const words = count === 0 ? t("✓ no alarm") : count === 1 ? t("1 alarm") : t("{count} alarms", { count });
-    const flood = t("Flood: more than 10 alarms in 10 minutes. Alarms of one burst stand together, the first one first.");
+    const flood = t("Flood: more than 10 alarms in 10 minutes. The alarms of a burst are grouped, with the first alarm first.");
     write(this.note, book.isFlooded ? `${words}. ${flood}` : words);
   }
 
@@ -219,7 +219,7 @@ export class AlarmSheet {
       t("since {time}", { time: timeOf(row.began - book.leadMs) }),
       t("number {number}", { number }),
       times > 1 && t("{count} times", { count: times }),
-      !row.known && t("value unknown: the alarm stays"),
+      !row.known && t("value unknown: the alarm stays active"),
     ].filter(Boolean);
     const isWaiting = state === "unacknowledged" || state === "returned";
     return made(

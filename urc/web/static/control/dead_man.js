@@ -89,7 +89,7 @@ export class DeadMan {
     this.isOpen = false;
     this.reason = reason;
     this.show();
-    this.keeper.letGo(reason || t("the dead-man was let go"));
+    this.keeper.letGo(reason || t("the dead-man control was released"));
   }
 
   /** Run one animation frame. @param {number} nowMs */
@@ -100,7 +100,7 @@ export class DeadMan {
     } else if (this.keeper.isDriving()) {
       this.untilMs = nowMs + this.spec.timeoutMs;
     } else if (nowMs >= this.untilMs) {
-      this.close(t("nothing was driven for too long"));
+      this.close(t("no control was used for too long"));
     }
     this.show(nowMs);
   }

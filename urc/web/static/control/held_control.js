@@ -288,7 +288,7 @@ export class HeldControl {
     const { phase, together } = this.control;
     const lost = together.lost(this);
     const values = this.counted(lost);
-    const reason = this.control.reason || (lost.size > 0 ? t("Another control sets this: let go, then start again") : "");
+    const reason = this.control.reason || (lost.size > 0 ? t("Another control sets this value: let go, then start again") : "");
     const kind = this.hand?.kind ?? "";
     const look = `${phase} ${reason} ${kind} ${JSON.stringify(values)}`;
     if (look === this.shown && !isForced) return;

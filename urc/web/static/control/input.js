@@ -53,12 +53,12 @@ export class Input {
   /** Listen for all page events that release held controls. */
   watch() {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
-    addEventListener("blur", all(t("the window lost the focus")));
+    addEventListener("blur", all(t("the window lost focus")));
     addEventListener("pagehide", all(t("the page was left")));
-    addEventListener("resize", all(t("the window changed its size")));
-    addEventListener("orientationchange", all(t("the screen was turned")));
-    screen.orientation?.addEventListener("change", all(t("the screen was turned")));
-    addEventListener("gamepaddisconnected", all(t("the gamepad is gone")));
+    addEventListener("resize", all(t("the window was resized")));
+    addEventListener("orientationchange", all(t("the screen was rotated")));
+    screen.orientation?.addEventListener("change", all(t("the screen was rotated")));
+    addEventListener("gamepaddisconnected", all(t("the gamepad was disconnected")));
     document.addEventListener("freeze", all(t("the page was frozen")));
     document.addEventListener("fullscreenchange", all(t("full screen began or ended")));
     document.addEventListener("visibilitychange", () => {
@@ -335,7 +335,7 @@ export class Input {
       for (const grip of [...control.grips]) grip.check();
       if (control.grips.size === 0) continue;
       if (gapMs > control.leaseMs && control.phase === "held") {
-        this.spend(control, t("the page was held up"));
+        this.spend(control, t("the page was blocked"));
         this.release(control);
       }
       for (const grip of control.grips) grip.take(nowMs, control.phase !== "held");

@@ -26,15 +26,15 @@ const CAUSES = {
     cause: mark("URC's computer has no route to {place}."),
     step: mark("Is URC's computer on the robot's network?"),
   },
-  timeout: { cause: mark("{place} does not answer."), step: mark("Is the robot switched on? Is its address right?") },
-  name: { cause: mark("The name in {place} is unknown."), step: mark("Check the spelling, or enter a numeric address.") },
+  timeout: { cause: mark("{place} does not answer."), step: mark("Is the robot switched on? Is its address correct?") },
+  name: { cause: mark("The host name in {place} is unknown."), step: mark("Check the spelling, or enter a numeric address.") },
   "host-key": {
-    cause: mark("URC does not trust the key of {place}."),
-    step: mark("Compare the robot's host key, then run “urc trust”."),
+    cause: mark("URC does not trust the host key of {place}."),
+    step: mark("Compare the host key with the robot's, then run “urc trust”."),
   },
   permission: {
-    cause: mark("URC may not open {place}."),
-    step: mark("Add the user of URC to the group of the device."),
+    cause: mark("URC has no permission to open {place}."),
+    step: mark("Add the user that runs URC to the device's group."),
   },
   "sign-in": { cause: mark("{place} refuses the sign-in."), step: mark("Check user name, password and key.") },
   tls: {
@@ -43,15 +43,15 @@ const CAUSES = {
   },
   device: { cause: mark("{place} does not exist."), step: mark("Is the device plugged in? Check its path.") },
   closed: {
-    cause: mark("{place} ends the connection."),
-    step: mark("Does another program use the robot? Many robots serve only one."),
+    cause: mark("{place} closes the connection."),
+    step: mark("Does another program use the robot? Many robots accept only one connection."),
   },
   login: {
     cause: mark("{place} does not answer the sign-in."),
     step: mark("Check user name and password, and the kind of robot."),
   },
   silent: {
-    cause: mark("{place} accepts the connection and sends nothing."),
+    cause: mark("{place} accepts the connection, but sends nothing."),
     step: mark("Check the port and the kind of robot."),
   },
 };

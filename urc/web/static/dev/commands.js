@@ -57,7 +57,7 @@ export class Commands {
     const key = JSON.stringify(commands);
     if (key === this.key) return; // filled-in values stay
     this.key = key;
-    const none = element("p", "dev-quiet", "This robot has no command.");
+    const none = element("p", "dev-quiet", "This robot has no commands.");
     this.el.replaceChildren(...(commands.length ? commands.map((one) => this.command(one)) : [none]));
   }
 

@@ -133,7 +133,7 @@ export class DebugCommands {
       const ticket = questions.length ? await asks.ask(result, questions, this.over) : undefined;
       if (!ticket) result.replaceChildren(element("p", "dev-quiet", `… ${t("waiting for the robot")}`));
       const reply = await run(command.name, values, ticket).finally(() => ticket?.close());
-      const done = command.isAnswered ? t("done") : t("sent; this command has no answer");
+      const done = command.isAnswered ? t("done") : t("sent; this command has no reply");
       const told = Object.entries(reply).map(([name, value]) => {
         return element("p", "", visible(`${name} = ${JSON.stringify(value)}`));
       });

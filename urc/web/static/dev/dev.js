@@ -59,7 +59,7 @@ const desk = {
     const said = { command, arguments: args };
     const { token } = confirmed ? await request(values, { t: "prepare", ...said }) : { token: "" };
     const reply = await request(values, { t: "run", ...said, token });
-    if (!reply.ok) throw new Error(reply.message ?? reply.code ?? "it was not done");
+    if (!reply.ok) throw new Error(reply.message ?? reply.code ?? "the command was not run");
     return reply.values ?? {};
   },
 };

@@ -53,7 +53,7 @@ export class Timeline {
 
 /** @param {Entry[]} entries */
 function told(entries) {
-  if (entries.length === 0) return "Nothing has happened yet.";
+  if (entries.length === 0) return "No entries yet.";
   const older = entries.length === MOST ? ", 'urc audit' shows older ones" : "";
   const asked = new Date().toLocaleTimeString("en-GB", { hour12: false });
   return `${entries.length} entries at ${asked}${older}`;

@@ -40,7 +40,7 @@ export function contextOf(frame, options) {
       frame.listeners.set(input, [...(frame.listeners.get(input) ?? []), listener]);
     },
     each: () => {
-      throw new Error(t("a widget in a frame cannot do that: {wish}", { wish: "each" }));
+      throw new Error(t("a widget in a frame cannot use {wish}", { wish: "each" }));
     },
     send: async (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) => {
       bound(frame, output);
@@ -53,7 +53,7 @@ export function contextOf(frame, options) {
       Object.hasOwn(frame.commands, output) ? (frame.commands[output] ?? null) : null,
     steer: (/** @type {string} */ output, /** @type {string} */ verb) => frame.say({ t: "steer", output, verb }),
     drive: (/** @type {string} */ wish) => {
-      if (!WISHES.includes(wish)) throw new Error(t("a widget in a frame cannot do that: {wish}", { wish }));
+      if (!WISHES.includes(wish)) throw new Error(t("a widget in a frame cannot use {wish}", { wish }));
       frame.say({ t: "drive", wish });
     },
     memory: memoryOf(frame),
@@ -69,7 +69,7 @@ export function contextOf(frame, options) {
         return frame.pads;
       },
       setMap: () => {
-        throw new Error(t("a widget in a frame cannot do that: {wish}", { wish: "setMap" }));
+        throw new Error(t("a widget in a frame cannot use {wish}", { wish: "setMap" }));
       },
     },
     stop: () => frame.say({ t: "stop" }),
@@ -92,7 +92,7 @@ export function contextOf(frame, options) {
 }
 
 function refused() {
-  throw new Error(t("a widget in a frame cannot do that: {wish}", { wish: "alarms" }));
+  throw new Error(t("a widget in a frame cannot use {wish}", { wish: "alarms" }));
 }
 
 /**

@@ -196,7 +196,7 @@ export class Frame {
     })(undefined);
     this.budget.count(nowMs, performance.now() - nowMs);
     const { isSlow } = this.budget;
-    if (this.budget.isSpent) this.fail(new Error(t("it stops the page again and again")));
+    if (this.budget.isSpent) this.fail(new Error(t("it blocks the page repeatedly")));
     else if (isSlow !== wasSlow) this.say({ t: "slow", isSlow });
     if (isSlow) setTimeout(() => this.say({ t: "more" }), SLOW_EVERY_MS);
     else this.say({ t: "more" });

@@ -124,13 +124,13 @@ export class FrameHost extends Cell {
     frame.addEventListener("load", () => {
       loads += 1;
       if (loads === 1) this.meet(frame);
-      else this.fail(new Error(t("it went to another page")));
+      else this.fail(new Error(t("it navigated to another page")));
     }, { signal });
     const late = setTimeout(() => {
       if (!this.isMounted) this.remark(t("◌ still loading"));
     }, LOADING_MS);
     const never = setTimeout(() => {
-      if (!this.isUp) this.fail(new Error(t("its frame did not come up")));
+      if (!this.isUp) this.fail(new Error(t("its frame did not start")));
     }, COMING_MS);
     signal.addEventListener("abort", () => {
       clearTimeout(late);
@@ -210,7 +210,7 @@ export class FrameHost extends Cell {
         this.doors.wake();
         break;
       case "slow":
-        this.remark(message.isSlow ? t("◆ slow: shown once a second") : "");
+        this.remark(message.isSlow ? t("◆ slow: updated once a second") : "");
         break;
       default:
         this.serve(message);
@@ -344,7 +344,7 @@ export class FrameHost extends Cell {
     try {
       if (document.hidden) throw new Error(t("the page was hidden"));
       if (!this.commands.take(performance.now())) {
-        throw new Error(t("too many commands: {most} a second at most", { most: MOST_COMMANDS }));
+        throw new Error(t("too many commands: at most {most} per second", { most: MOST_COMMANDS }));
       }
       const values = await give(this, output, args);
       this.post({ t: "answer", id, values });

@@ -18,9 +18,9 @@ export function offerHints(root) {
   if (!bands || !matchMedia("(pointer: coarse)").matches || wasSeen()) return;
   const lines = [
     root.querySelector('[data-footprint="stick"]') ? t("Hold a stick to drive. Let go to stop.") : "",
-    root.querySelector("[data-stop-button]") ? t("STOP works at any time, without control.") : "",
+    root.querySelector("[data-stop-button]") ? t("STOP works at any time, even without control.") : "",
     root.querySelector(".urc-pip") ? t("Tap a small view to swap it with the large one.") : "",
-    t("Tap the sign of the connection to see its state and the log."),
+    t("Tap the connection symbol to see the connection's state and the log."),
   ].filter(Boolean);
   const card = document.createElement("section");
   card.className = "urc-hints";

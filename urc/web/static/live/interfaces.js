@@ -82,7 +82,7 @@ export class Interfaces {
       if (round !== this.round) return;
       console.warn("URC: the interface could not be opened:", error);
       this.choice.value = this.current;
-      this.note.textContent = t("It could not be opened: {reason}", {
+      this.note.textContent = t("The interface could not be opened: {reason}", {
         reason: error instanceof Error ? error.message : String(error),
       });
       return;

@@ -137,7 +137,7 @@ const note = part(root, "[data-note]");
 const tell = (/** @type {string} */ text) => {
   note.textContent = text;
 };
-const AT_THE_DOOR = t("URC was started again: open the address that it printed, then this page goes on.");
+const AT_THE_DOOR = t("URC was restarted: open the address that it printed; this page then continues.");
 /** Show how to get access if the server does not know this browser; STOP still works. */
 function tellOfDoor() {
   if (socket.isShutOut) tell(AT_THE_DOOR);
@@ -314,7 +314,7 @@ function give({ id, token }) {
   if (!yes) return;
   const isLate = performance.now() - yes.atMs > MEANT_MS;
   if (isLate || !socket.send({ t: "run", ...yes.said, token })) {
-    settle({ id, ok: false, message: t("Not sent: it took too long") });
+    settle({ id, ok: false, message: t("Not sent: the server answered too late") });
   }
 }
 
@@ -331,7 +331,7 @@ function settle(reply) {
   const asked = waiting.get(reply.id);
   waiting.delete(reply.id);
   if (reply.ok) asked?.resolve(reply.values ?? {});
-  else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("it was not done"))));
+  else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("the command was not run"))));
 }
 
 /**

@@ -72,7 +72,7 @@ export class Panel {
       this.next = first;
     }
     if (first > this.next) {
-      const text = t("{n} lines are missing here: they came too fast for this connection", {
+      const text = t("{n} lines are missing here: they arrived too fast for this connection", {
         n: first - this.next,
       });
       this.log.prepend(lineElement({ age: 0, level: "warning", source: "URC", text }));

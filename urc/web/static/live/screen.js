@@ -18,7 +18,7 @@ export class FullScreen {
         if (document.fullscreenElement) await document.exitFullscreen();
         else await document.documentElement.requestFullscreen({ navigationUI: "hide" });
       } catch {
-        tell(t("This browser did not give the page the whole screen."));
+        tell(t("This browser did not allow full screen."));
       }
     });
     document.addEventListener("fullscreenchange", () => {

@@ -96,7 +96,7 @@ async function load(isMore) {
     oldest = entries.at(-1)?.id ?? oldest;
     table.hidden = shown === 0;
     more.hidden = !hasMore;
-    if (fault) say(t("nothing new is recorded: {why}", { why: fault }), "bad");
+    if (fault) say(t("new entries are not recorded: {why}", { why: fault }), "bad");
     else say(countText(hasMore));
   } catch (error) {
     if (mine === round) say(reason(error), "bad");
@@ -107,7 +107,7 @@ async function load(isMore) {
 
 /** @param {boolean} hasMore */
 function countText(hasMore) {
-  if (shown === 0) return filled().length ? t("No entry matches the search.") : t("Nothing has happened yet.");
+  if (shown === 0) return filled().length ? t("No entry matches the search.") : t("No entries yet.");
   if (hasMore) return t("the newest {count} entries", { count: shown });
   return shown === 1 ? t("1 entry") : t("{count} entries", { count: shown });
 }

@@ -197,7 +197,7 @@ export class JobDialog {
     if (unsigned.length === 0) return [];
     return [
       made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("Refused: not signed")}`),
-      made("p", { class: "urc-bad" }, t("Anyone on the way could have changed this. Ask its author for a signed version.")),
+      made("p", { class: "urc-bad" }, t("Anyone on the network could have changed this package. Ask its author for a signed version.")),
       ...unsigned.map((name) =>
         made(
           "label",

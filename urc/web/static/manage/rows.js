@@ -174,7 +174,7 @@ export function placeRow(one, act) {
   const state = !one.fault
     ? t("● {count} versions of packages", { count: one.count })
     : one.isKept
-      ? t("◆ not reached; what it said last is used: {count} versions of packages", { count: one.count })
+      ? t("◆ not reached; its last index is used: {count} versions of packages", { count: one.count })
       : t("▲ not reached");
   const kind = !one.fault ? "" : one.isKept ? "urc-caution" : "urc-bad";
   return made(
@@ -185,7 +185,7 @@ export function placeRow(one, act) {
     line(state, kind),
     line(one.fault),
     line(one.keeper ? t("its index is signed by {name}", { name: one.keeper }) : ""),
-    line(one.isPlain ? t("not encrypted: who is in between can change what it says") : ""),
+    line(one.isPlain ? t("not encrypted: others on the network can change its index") : ""),
     act && made(
       "div",
       { class: "urc-ways" },

@@ -201,7 +201,7 @@ for (const one of form.querySelectorAll("[data-forget]")) {
       field.value = "";
       field.placeholder = "";
     }
-    tell(t("Deleted when you save"));
+    tell(t("To be deleted when you save"));
   });
 }
 ready(root);

@@ -12,10 +12,10 @@ import { made, put } from "../core/dom.js";
 import { mark, t } from "../core/words.js";
 import { part } from "../live/badge.js";
 
-const NEEDS_HTTPS = mark("Browsers offer it only over HTTPS, or on the computer of URC itself.");
-const NEEDS_NAME = mark("Browsers offer it only over HTTPS with a domain name, not with an IP address.");
-const NEEDS_TRUST = mark("Browsers offer it only with a certificate that this device trusts.");
-const NOT_HERE = mark("This browser or this device does not have it.");
+const NEEDS_HTTPS = mark("Browsers offer this feature only over HTTPS, or on the computer that runs URC.");
+const NEEDS_NAME = mark("Browsers offer this feature only over HTTPS with a domain name, not with an IP address.");
+const NEEDS_TRUST = mark("Browsers offer this feature only with a certificate that this device trusts.");
+const NOT_HERE = mark("This browser or device does not offer this feature.");
 
 /** An IP address in the form of `location.hostname`. */
 const IP = /^(\d+(\.\d+){3}|\[.*\])$/;

@@ -95,7 +95,7 @@ change.addEventListener("submit", (event) => {
   void act("account/passphrase", { current: data.get("current") ?? "", passphrase: data.get("passphrase") }).then((answer) => {
     if (!answer) return;
     change.reset();
-    say(t("✓ The passphrase is changed; all other sign-ins have ended."));
+    say(t("✓ The passphrase was changed; all other sign-ins have ended."));
   });
 });
 ready(root);

@@ -77,9 +77,9 @@ export class PeopleDialog {
     const left = made("p", { class: "urc-quiet", "data-left": true });
     this.show(
       t("Pair a device"),
-      made("p", {}, t("Scan this code with the camera of the device, or open the address there.")),
+      made("p", {}, t("Scan this code with the camera of the device, or open the address on the device.")),
       picture(code.qr),
-      !code.isReachable && made("p", { class: "urc-caution" }, t("◆ Only this computer can open this address: start URC with --host for other devices.")),
+      !code.isReachable && made("p", { class: "urc-caution" }, t("◆ Only this computer can open this address. To allow other devices, start URC with --host.")),
       made("code", { class: "urc-secret", "data-secret": true }, code.link),
       code.fingerprint !== "" && made("p", { class: "urc-small" }, t("Fingerprint of this server's certificate authority, to compare with the device:"), " ", made("code", { "data-fingerprint": true }, code.fingerprint)),
       left,
@@ -103,7 +103,7 @@ export class PeopleDialog {
       } else if (now.state === "over") {
         this.show(
           t("Pair a device"),
-          made("p", {}, t("The code has ended; no device used it.")),
+          made("p", {}, t("The code has expired; no device used it.")),
           made("div", { class: "urc-ways" }, button(t("Close"), "no", () => this.close()), button(t("New code"), "again", again, { class: "urc-button-main" })),
         );
       } else {
@@ -120,7 +120,7 @@ export class PeopleDialog {
   paired({ name, device, check }, remove) {
     this.show(
       t("{name} is paired", { name }),
-      made("p", { role: "status" }, t("The device shows this number. If it shows another one, remove the device:")),
+      made("p", { role: "status" }, t("The device must show this number. If it shows a different number, remove the device:")),
       made("p", { class: "urc-check-number", "data-check": true }, check),
       made("div", { class: "urc-ways" },
         button(t("Remove"), "remove", () => remove(device, name)),

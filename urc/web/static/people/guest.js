@@ -24,4 +24,4 @@ async function watch() {
 
 button.addEventListener("click", () => void watch());
 if (code) ready(root);
-else say(t("This link is not complete."), "bad");
+else say(t("This link is incomplete."), "bad");

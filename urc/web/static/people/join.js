@@ -16,12 +16,12 @@ let code = takenCode();
 
 async function look() {
   if (!code) {
-    say(t("Open the link of your invitation: it has a code."), "bad");
+    say(t("Open the link in your invitation: the link contains a code."), "bad");
     return;
   }
   try {
     const { kind, name, roles } = await ask("/api/v1/codes", { code });
-    if (kind !== "person") throw new Error(t("This code pairs a device: open the page to pair a device."));
+    if (kind !== "person") throw new Error(t("This code is for pairing a device: open the page “Pair this device”."));
     say("");
     part(form, "[data-right]").textContent = t("You are {name}. Your rights: {roles}.", { name, roles: rolesText(roles) });
     /** @type {HTMLInputElement} */ (part(form, "[name=username]")).value = name;

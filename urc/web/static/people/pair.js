@@ -45,7 +45,7 @@ async function look() {
     }
     say("");
     part(named, "[data-right]").textContent = info.owner
-      ? t("It becomes a device of {name}: {roles}.", { name: info.owner, roles: rolesText(info.roles) })
+      ? t("This device will belong to {name}, with these rights: {roles}.", { name: info.owner, roles: rolesText(info.roles) })
       : t("Its rights: {roles}.", { roles: rolesText(info.roles) });
     field.value = info.name || info.suggested;
     field.readOnly = Boolean(info.name);

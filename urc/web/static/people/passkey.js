@@ -16,10 +16,10 @@ const ADDRESS = /^(?:\[.*\]|[0-9.]+)$/;
  */
 export function obstacle() {
   if (ADDRESS.test(location.hostname)) {
-    return t("Browsers offer no passkeys on an IP address. Open this page by a host name.");
+    return t("Browsers do not offer passkeys for an IP address. Open this page by its host name.");
   }
   if (!isSecureContext) return t("Browsers offer passkeys only over HTTPS.");
-  if (!("PublicKeyCredential" in window)) return t("This browser has no passkeys.");
+  if (!("PublicKeyCredential" in window)) return t("This browser does not support passkeys.");
   return "";
 }
 
@@ -112,8 +112,8 @@ async function dialog(open) {
     if (made instanceof PublicKeyCredential) return made;
   } catch (error) {
     const name = error instanceof DOMException ? error.name : "";
-    if (name === "InvalidStateError") throw new Error(t("This device has a passkey already."));
-    if (name === "SecurityError") throw new Error(t("The browser allows no passkeys on this page."));
+    if (name === "InvalidStateError") throw new Error(t("This device already has a passkey."));
+    if (name === "SecurityError") throw new Error(t("The browser does not allow passkeys on this page."));
     if (name !== "NotAllowedError" && name !== "AbortError") throw error;
   }
   throw new Error(t("The passkey dialog was closed, or took too long."));

@@ -53,7 +53,7 @@ export function passkeysPart(root, questions, say) {
   function row(one) {
     const title = /** @type {HTMLInputElement} */ (made("input", {
       class: "urc-input", type: "text", maxlength: "64", value: one.name, "aria-label": t("Name of the passkey"),
-      "data-key": `name ${one.id}`, onchange: () => void act(() => renamePasskey(one.id, title.value), t("The passkey has a new name.")),
+      "data-key": `name ${one.id}`, onchange: () => void act(() => renamePasskey(one.id, title.value), t("The passkey was renamed.")),
     }));
     const used = one.used_at ? t("last use {time}", { time: time(one.used_at) }) : t("not used yet");
     return made("li", { class: "urc-row" },
@@ -64,7 +64,7 @@ export function passkeysPart(root, questions, say) {
   /** @param {Passkey} one */
   function remove(one) {
     questions.confirm(t("Remove {name}?", { name: one.name }), t("The passkey no longer signs you in. Sign-ins that began with it continue; end them in the list below."),
-      t("Remove"), () => void act(() => removePasskey(one.id), t("The passkey is removed.")));
+      t("Remove"), () => void act(() => removePasskey(one.id), t("The passkey was removed.")));
   }
 
   form.addEventListener("submit", (event) => {
@@ -78,7 +78,7 @@ export function passkeysPart(root, questions, say) {
     void act(async () => {
       await addPasskey(name.value);
       return ownPasskeys();
-    }, t("The passkey is added.")).finally(() => (submit.disabled = false));
+    }, t("The passkey was added.")).finally(() => (submit.disabled = false));
   });
   ready(root);
   void act(ownPasskeys, "");

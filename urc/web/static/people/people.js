@@ -114,7 +114,7 @@ async function invite(one) {
   if (!made) return;
   dialog.secret(
     t("Invitation of {name}", { name: one.name }),
-    t("{name} opens this link and chooses a passphrase. The link works once, until {time}. URC never shows it again.", { name: one.name, time: time(made.endsAt) }),
+    t("{name} can open this link to choose a passphrase. The link works once, until {time}. URC never shows it again.", { name: one.name, time: time(made.endsAt) }),
     made.link,
     made.qr,
   );
@@ -213,12 +213,12 @@ form("program", async (el, data) => {
   const commands = String(data.get("commands") ?? "").split(",").map((one) => one.trim()).filter(Boolean);
   const days = data.get("days") ? Number(data.get("days")) : null;
   const made = await act("tokens/add", { name: data.get("name"), roles: [grantIn(el)], commands, days });
-  if (made) dialog.secret(t("Token of {name}", { name: made.name }), t("Keep the token now: URC never shows it again."), made.token);
+  if (made) dialog.secret(t("Token of {name}", { name: made.name }), t("Copy the token now: URC never shows it again."), made.token);
   return made;
 });
 form("guest", async (_, data) => {
   const made = await act("guests/add", { name: data.get("name"), robot: data.get("robot"), hours: Number(data.get("hours")) });
-  if (made) dialog.secret(t("Guest link"), t("With this link, guests watch the robot until {time}. URC never shows it again.", { time: time(made.endsAt) }), made.link, made.qr);
+  if (made) dialog.secret(t("Guest link"), t("With this link, guests can watch the robot until {time}. URC never shows it again.", { time: time(made.endsAt) }), made.link, made.qr);
   return made;
 });
 

@@ -320,9 +320,9 @@ export class Cell {
     }
     const wasSlow = this.budget.isSlow;
     this.budget.count(nowMs, performance.now() - startMs);
-    if (this.budget.isSpent) this.fail(new Error(t("it stops the page again and again")));
+    if (this.budget.isSpent) this.fail(new Error(t("it blocks the page repeatedly")));
     else if (this.budget.isSlow !== wasSlow) {
-      this.remark(this.budget.isSlow ? t("◆ slow: shown once a second") : "");
+      this.remark(this.budget.isSlow ? t("◆ slow: updated once a second") : "");
     }
   }
 

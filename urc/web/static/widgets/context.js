@@ -109,7 +109,7 @@ export async function give(cell, output, given) {
  * @param {string} title title of the command
  */
 async function agreed(cell, title) {
-  const text = t("This widget wants to give “{command}”. The robot may move.", { command: title });
+  const text = t("This widget wants to run “{command}”. The robot may move.", { command: title });
   /** @type {import("../core/types.js").Question} */
   const question = { argument: "", value: "", text, level: "normal", isTwoPerson: false };
   const ticket = await cell.doors.asks.ask(cell.el, [question], cell.end.signal);
