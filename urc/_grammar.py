@@ -75,7 +75,7 @@ def translate(
     python = parser.expression()
     parser.expect_end()
     if not allows_bytes and _NONCE_ALONE.fullmatch(python.removeprefix(resolve(NONCE))):
-        text = "nonce() gives bytes: write nonce() | b64encode, or send it by 'hex:' or 'bytes:'"
+        text = "nonce() returns bytes: write nonce() | b64encode, or send it by 'hex:' or 'bytes:'"
         raise ExpressionSyntaxError(text, 0)
     return python
 

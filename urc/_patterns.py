@@ -171,7 +171,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     if cost > MAX_COST:
         raise PatternError(
             f"this pattern has {cost} parts, and the limit is {MAX_COST}: use smaller numbers in"
-            " {…}, or start the pattern with '^' and let no repeat match the start of the next part"
+            " {…}, or start with '^' and let no repeat match the start of the next part"
         )
     return Pattern(text, groups, _re2_search(text), False)
 
@@ -352,8 +352,8 @@ def _re2_search(text: str) -> Any:
         import re2
     except ImportError:
         raise PatternError(
-            "this pattern needs the package google-re2, which is not installed: start the pattern"
-            f" with '^' and let no repeat match the start of the next part: {text!r}"
+            "this pattern needs google-re2, which is not installed: start with '^' and let no repeat"
+            f" match the start of the next part: {text!r}"
         ) from None
     options = re2.Options()
     options.log_errors = False

@@ -59,7 +59,7 @@ def test_bytes_are_refused_in_text(name: str) -> None:
 @pytest.mark.parametrize("source", ["{{ (x | u8) }}", "{{ (x | u8) ~ 'a' }}"])
 def test_brackets_do_not_hide_bytes(source: str) -> None:
     """Refused at load, too."""
-    with pytest.raises(ExpressionError, match="gives bytes"):
+    with pytest.raises(ExpressionError, match="returns bytes"):
         compile_template(source)
 
 

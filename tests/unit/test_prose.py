@@ -71,8 +71,8 @@ def given(monkeypatch: pytest.MonkeyPatch, **files: str) -> None:
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [
-        ("Anew. Anew.", 0, "prose: 2 hits, 0 fewer"),
-        ("Anew.", 0, "prose: 1 hits, 1 fewer"),
+        ("Anew. Anew.", 0, "prose: 2 hits; the baseline allows 0 more"),
+        ("Anew.", 0, "prose: 1 hits; the baseline allows 1 more"),
         ("Anew. Anew. Anew.", 1, "docs/a.md: anew: 3 hits, 2 in the baseline"),
         ("Anew. Nobody.", 1, "docs/a.md:1: somebody: Nobody."),
     ],

@@ -124,7 +124,7 @@ def test_documents_are_tried_with_a_time_and_bytes_that_are_always_the_same() ->
 @pytest.mark.parametrize(
     ("send", "why"),
     [
-        ('"{{ nonce() }}"', "nonce\\(\\) gives bytes"),
+        ('"{{ nonce() }}"', "nonce\\(\\) returns bytes"),
         ('"{{ nonce(0) | b64encode }}"', "a nonce has 1 to 64 bytes, not 0"),
         ('"{{ nonce(65) | b64encode }}"', "a nonce has 1 to 64 bytes, not 65"),
         ("\"{{ nonce('a') | b64encode }}\"", "write nonce\\(\\), or nonce\\(8\\)"),

@@ -481,7 +481,7 @@ def test_other_files_are_no_backup(tmp_path: Path) -> None:
     other = tmp_path / "other.zip"
     with zipfile.ZipFile(other, "w") as opened:
         opened.writestr("known_hosts", "")
-    for file, text in ((other, "not a backup"), (tmp_path / "missing", "No such file")):
+    for file, text in ((other, "not a URC backup"), (tmp_path / "missing", "No such file")):
         with pytest.raises(BackupError, match=text):
             restored(file, tmp_path / "new")
     other.write_bytes(b"")

@@ -90,7 +90,7 @@ def test_bytes_are_pasted_as_hex_or_as_text() -> None:
     """Blanks say nothing in hex; escapes are bytes in text; what is neither is told of."""
     assert pasted_bytes("0x42 41,54:0a", is_hex=True, encoding="utf-8") == b"BAT\n"
     assert pasted_bytes(r"BAT\r\n\x00\\", is_hex=False, encoding="utf-8") == b"BAT\r\n\0\\"
-    with pytest.raises(UrcError, match="word 2 is '4'"):
+    with pytest.raises(UrcError, match="group 2 is '4'"):
         pasted_bytes("42 4", is_hex=True, encoding="utf-8")
     with pytest.raises(UrcError, match=r"character 2: .* found \\q"):
         pasted_bytes(r"a\q", is_hex=False, encoding="utf-8")

@@ -13,9 +13,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
     """Return the separators and the field of each key."""
     pairs, separator = part.must("pairs"), part.must("separator")
     if pairs.data == separator.data:
-        problems.error(
-            separator, "same-separator", "'pairs' and 'separator' must be different"
-        )
+        problems.error(separator, "same-separator", "'pairs' and 'separator' must be different")
         return None
     named = part.named("fields")
     seen: set[str] = set()
