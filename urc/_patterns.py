@@ -352,8 +352,8 @@ def _re2_search(text: str) -> Any:
         import re2
     except ImportError:
         raise PatternError(
-            "this pattern needs google-re2, which is not installed: start with '^' and let no repeat"
-            f" match the start of the next part: {text!r}"
+            "this pattern needs google-re2, which is not installed: start with '^' and let no"
+            f" repeat match the start of the next part: {text!r}"
         ) from None
     options = re2.Options()
     options.log_errors = False

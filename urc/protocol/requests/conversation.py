@@ -134,7 +134,7 @@ class Conversation(Connection):
         most = self.spec.queue.most_bytes
         if most is not None and not exchange.is_realtime and self._size_of(exchange) > most:
             size = self._size_of(exchange)
-            text = f"the request has {size} bytes; the robot accepts {most} (queue.bytes)"
+            text = f"the request has {size} bytes; the robot accepts at most {most} (queue.bytes)"
             return [ExchangeEnded(exchange, ExchangeOutcome("bad-argument", text))]
         gone = self._request_queue.submit(exchange)
         events: list[LineEvent] = [] if gone is None else [ExchangeEnded(*gone)]
