@@ -10,7 +10,6 @@ tests are skipped and listed; with ``CI=true``, a skipped test is a failure.
 import asyncio
 import hashlib
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -46,11 +45,6 @@ class Step:
     timeout_s: float = HANGS_AFTER_S
     is_yielding: bool = False
     """Whether the step runs with a lower priority, so that it does not delay a measuring step."""
-
-    def command_line(self) -> tuple[str, ...]:
-        """Return the command, with its priority where the system has the program ``nice``."""
-        nice = shutil.which("nice") if self.is_yielding else None
-        return (nice, "-n", "10", *self.command) if nice else self.command
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +203,7 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
     start = time.monotonic()
     # A separate session, so that the processes of a killed test can also be ended.
     process = await asyncio.create_subprocess_exec(
-        *step.command_line(),
+        *step.command,
         cwd=ROOT,
         env=dict(environment),
         stdin=asyncio.subprocess.DEVNULL,
@@ -217,6 +211,8 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
         stderr=output,
         start_new_session=os.name != "nt",
     )
+    if step.is_yielding:
+        _lower_priority(process.pid)
     try:
         async with asyncio.timeout(step.timeout_s):
             code = await process.wait()
@@ -226,6 +222,15 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
     finally:
         await _end_group(process)
     return Outcome(step.name, fault, time.monotonic() - start)
+
+
+def _lower_priority(process: int) -> None:
+    """Lower the priority of a process that has its own session, where the system can."""
+    with suppress(AttributeError, OSError):
+        os.setpriority(os.PRIO_PROCESS, process, 10)
+    # Linux may divide the processors among sessions first, whatever the priority of a process.
+    with suppress(OSError):
+        Path(f"/proc/{process}/autogroup").write_text("10", "ascii")
 
 
 async def _end_group(process: asyncio.subprocess.Process) -> None:

@@ -15,7 +15,7 @@ from urc.problems import UrcError
 from urc.runtime.clock import Timer
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.fleet.robots import Robot, RobotService, SessionFailed, missing_settings
+from urc.web.fleet.robots import LINGER_S, Robot, RobotService, SessionFailed, missing_settings
 
 pytestmark = pytest.mark.anyio
 
@@ -117,6 +117,36 @@ async def test_a_client_that_comes_too_late_gets_a_new_session() -> None:
         with service.visit():
             assert await service.live() is not first
         assert robot.opened == 2
+
+
+async def test_a_client_that_comes_while_a_session_closes_gets_the_next_one() -> None:
+    """In whichever turn of the loop it comes: each waiting client is told of the new session."""
+
+    async def serve(session: object) -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            for _ in range(10):  # as the tasks of a robot that moves take some turns to end
+                await asyncio.sleep(0)
+
+    opened = set()
+    for turns in range(0, 100, 3):
+        clock = FakeClock()
+        robot = FakeRobot(dashboard_profile(), clock)
+        async with stationed(robot, clock) as service:
+            service.controls.serve = serve  # type: ignore[method-assign,assignment]
+            with service.visit():
+                await service.live()
+            advancing = asyncio.create_task(clock.advance(LINGER_S + 0.1))
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            with service.visit():
+                coming = asyncio.create_task(service.live())
+                await advancing
+                await settle()
+                assert coming.done(), f"after {turns} turns, it waits for a session in vain"
+                opened.add(robot.opened)
+    assert opened == {1, 2}, "it never came before the end, or never after it"
 
 
 async def test_a_session_that_cannot_be_opened_is_told_and_tried_again() -> None:

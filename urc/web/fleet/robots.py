@@ -411,7 +411,8 @@ class RobotService:
         each = keep_all_signals(self.robot.profile)
         fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event(), self.clock.now())
-        self._next_session().set_result(live)
+        opened = self._next_session()
+        opened.set_result(live)
         self.controls.recorder.attend(session.hub, self.clock.now)
         names = {"settings": self.robot.settings}
         try:
@@ -426,7 +427,8 @@ class RobotService:
                     for task in tasks:
                         task.cancel()
         finally:
-            self._next = None
+            if self._next is opened:  # otherwise, a client already waits for the next session
+                self._next = None
             self._keep_picture(session.hub)
             self.controls.recorder.attend(None, self.clock.now)
             live.ended.set()
