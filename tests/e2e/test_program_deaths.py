@@ -20,7 +20,7 @@ from tests.e2e.ports import free_port
 from urc.access.control import AccessControl
 from urc.access.grants import parse_grant
 from urc.access.store import AccessStore
-from urc.client import AccessDenied, CommandFailed, ConnectionLost, MotionEnded
+from urc.client import AccessDenied, CommandFailed, ConnectionLost, MotionEnded, remote_motion
 from urc.testing.entry import KEY
 from urc.web.serve.access import Access
 
@@ -152,6 +152,22 @@ async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
         async with asyncio.timeout(5):
             texts = [(await anext(lines)).text for _ in range(2)]
         assert any("connection was lost" in text for text in texts)
+
+
+async def test_a_robot_that_has_said_nothing_is_driven_without_a_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its connection is open: drive() waits for a connection, not for a word of the robot."""
+    monkeypatch.setattr(remote_motion, "_CONNECT_S", 3600.0)
+    async with (
+        carted(tmp_path) as (cart, file),
+        served_robot(file) as address,
+        urc.client.open(address, token=KEY) as robot,
+        asyncio.timeout(30),
+        robot.drive() as stick,
+    ):
+        await stick.hold(0.5, speed=0.5)
+        assert cart.newest("V") == "V 0.5 0"
 
 
 async def test_the_transports_are_known_from_the_start(tmp_path: Path) -> None:

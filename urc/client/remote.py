@@ -263,8 +263,10 @@ class RemoteRobot(HubReadings):
         self._note("error", str(self._over))
 
     def _is_connecting(self) -> bool:
+        # An open connection on which the robot has sent nothing yet is also "connecting", but has a
+        # detail. Many robots send nothing until they are asked.
         links = self.hub.links.values()
-        return any(one.state == "connecting" and not one.attempts for one in links)
+        return any(one.state == "connecting" and not (one.attempts or one.detail) for one in links)
 
     def check_open(self) -> None:
         """Raise `ConnectionLost` if the connection has ended for good."""
