@@ -263,10 +263,7 @@ class RemoteRobot(HubReadings):
         self._note("error", str(self._over))
 
     def _is_connecting(self) -> bool:
-        # An open connection on which the robot has sent nothing yet is also "connecting", but has a
-        # detail. Many robots send nothing until they are asked.
-        links = self.hub.links.values()
-        return any(one.state == "connecting" and not (one.attempts or one.detail) for one in links)
+        return any(link.is_opening for link in self.hub.links.values())
 
     def check_open(self) -> None:
         """Raise `ConnectionLost` if the connection has ended for good."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
@@ -21,9 +21,9 @@ from urc.runtime.redaction import Redactor
 
 if TYPE_CHECKING:
     from urc.runtime.audit_entry import AuditEntry
-from typing import Final
 
 __all__ = [
+    "NOTHING_YET",
     "STREAM_KEPT",
     "Hub",
     "LinkState",
@@ -90,6 +90,8 @@ class SampleHistory:
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 """In the state ``idle``, no connection has been requested yet. In the state ``silent``, the link is
 connected, but data is overdue. In the state ``lost``, the link is not connected."""
+NOTHING_YET: Final = "connected; nothing received yet"
+"""Detail of a connecting link whose login has ended, and which awaits the robot's first data."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
@@ -111,6 +113,15 @@ class LinkStatus:
     """Number of failed attempts since the last valid frame."""
     faults: int = 0
     """Number of protocol violations since the session began."""
+
+    @property
+    def is_opening(self) -> bool:
+        """Whether the first attempt to connect and log in is under way.
+
+        Many robots send nothing until they are asked, so a link that awaits only the first data
+        counts as open.
+        """
+        return self.state == "connecting" and not self.attempts and self.detail != NOTHING_YET
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,7 +165,7 @@ async def test_no_link_is_said_when_stop_cannot_be_delivered(new_page: PageMaker
 
 
 async def test_no_link_is_said_of_a_press_after_the_server_has_gone(new_page: PageMaker) -> None:
-    """The robot was stopped before; somebody else may have reset it since."""
+    """An earlier STOP may have been reset on another screen since the loss of the link."""
     async with calmly_driven() as (_, address):
         page = await opened(new_page, address)
         new_page.allow(page, lambda text: "/stop" in text)

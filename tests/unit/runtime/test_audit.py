@@ -97,7 +97,9 @@ def test_a_full_file_loses_its_oldest_entries(file: Path) -> None:
         assert log.settle(20)
         found = read(file, last=100_000)
         assert found[0].at > 2000.0
-        assert {4999.0, 5000.0} <= {one.at for one in found}, "the newest, and what was lost"
+        assert {4999.0, 5000.0} <= {one.at for one in found}, (
+            "the newest entry and the count of lost entries"
+        )
         assert check(file) == ""
     assert file.stat().st_size < 2 * most_bytes
 

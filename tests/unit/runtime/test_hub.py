@@ -8,7 +8,16 @@ import pytest
 
 from urc.model.values import Sample, Signal
 from urc.runtime import hub as hub_module
-from urc.runtime.hub import Hub, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
+from urc.runtime.hub import (
+    NOTHING_YET,
+    Hub,
+    LinkState,
+    LinkStatus,
+    LogEntry,
+    MotionRecord,
+    Tapped,
+    Traffic,
+)
 
 pytestmark = pytest.mark.anyio
 
@@ -24,6 +33,25 @@ def sample(name: str, value: float = 1.0) -> Sample:
 @pytest.fixture
 def hub() -> Hub:
     return Hub(SIGNALS)
+
+
+@pytest.mark.parametrize(
+    ("state", "detail", "attempts", "is_opening"),
+    [
+        ("connecting", "", 0, True),
+        ("connecting", "connected; the steps of the connection are not done yet", 0, True),
+        ("connecting", NOTHING_YET, 0, False),
+        ("connecting", "refused", 1, False),
+        ("live", "", 0, False),
+        ("lost", "refused", 0, False),
+    ],
+)
+def test_a_link_opens_until_its_login_ends_or_an_attempt_fails(
+    state: LinkState, detail: str, attempts: int, is_opening: bool
+) -> None:
+    """A program that drives waits for no more than that: many robots never speak first."""
+    link = LinkStatus("wire", state, "tcp x:1", 0.0, detail, attempts)
+    assert link.is_opening == is_opening
 
 
 def test_signals_keep_the_order_of_the_driver(hub: Hub) -> None:

@@ -119,7 +119,9 @@ async def test_a_client_that_comes_too_late_gets_a_new_session() -> None:
         assert robot.opened == 2
 
 
-async def test_a_client_that_comes_while_a_session_closes_gets_the_next_one() -> None:
+async def test_a_client_that_comes_while_a_session_closes_gets_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """In whichever turn of the loop it comes: each waiting client is told of the new session."""
 
     async def serve(session: object) -> None:
@@ -134,7 +136,7 @@ async def test_a_client_that_comes_while_a_session_closes_gets_the_next_one() ->
         clock = FakeClock()
         robot = FakeRobot(dashboard_profile(), clock)
         async with stationed(robot, clock) as service:
-            service.controls.serve = serve  # type: ignore[method-assign,assignment]
+            monkeypatch.setattr(service.controls, "serve", serve)
             with service.visit():
                 await service.live()
             advancing = asyncio.create_task(clock.advance(LINGER_S + 0.1))
