@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
 
 from hatch_build import NPM_TIMEOUT_S, VendorError, npm_command
@@ -67,7 +67,9 @@ STATIC = (
 PYTEST = (PYTHON, "-m", "pytest")
 
 
-_HALF_OF_UNIT = ("protocol", "runtime", "guard", "simulator", "motion", "config")
+_HALF_OF_UNIT = (
+    *("runtime", "access", "protocol", "guard", "packages", "simulator", "config", "motion"),
+)
 # Processes that do not communicate. A process for distributing thousands of small tests would use a
 # fifth of the processor time. Longest first, so that few steps are still running at the end.
 QUICK = (
@@ -118,8 +120,8 @@ def main() -> int:
     environment[BUILT_SITE] = str(HTML)
     quick = (*QUICK, *([javascript] if javascript else []), *STATIC)
     try:
-        # One more than processors, because some of these tests wait.
-        outcomes += run([(step,) for step in quick], environment, at_once=PROCESSORS + 1)
+        # Twice as many as processors, because the unit tests wait a quarter of their time.
+        outcomes += run([(step,) for step in quick], environment, at_once=2 * PROCESSORS)
         if not is_quick:
             names = ", ".join(step.name for steps in SLOW for step in steps)
             print(f"\n== running, with output at the end of each: {names}", flush=True)
@@ -190,8 +192,13 @@ async def _run_all(
 
 async def _shown(step: Step, environment: Mapping[str, str]) -> Outcome:
     """Run a step, then show its output."""
-    with TemporaryFile() as output:
-        outcome = await _run(step, environment, output)
+    # pytest also removes the folders of earlier runs. Two processes at once would disturb each
+    # other, so each step has a root of its own.
+    with (
+        TemporaryDirectory(prefix="urc-", ignore_cleanup_errors=True) as root,
+        TemporaryFile() as output,
+    ):
+        outcome = await _run(step, {**environment, "PYTEST_DEBUG_TEMPROOT": root}, output)
         output.seek(0)
         said = output.read().decode("utf-8", "replace")
     print(f"\n== {step.name}\n{said}", end="", flush=True)

@@ -105,7 +105,6 @@ def needs_of(item: pytest.Item) -> set[str]:
 
 def pytest_collection_finish() -> None:
     """Exempt modules and tests from garbage collection; they exist until the end of the run."""
-    gc.collect()
     gc.freeze()
 
 

@@ -25,8 +25,8 @@ class Share(NamedTuple):
 
 
 SHARES: Mapping[str, Share] = {
-    "/tests/unit/": Share(cases=8),
-    "/tests/contract/": Share(cases=8),
+    "/tests/unit/": Share(cases=5),
+    "/tests/contract/": Share(cases=5),
     "/tests/e2e/": Share(cases=2, functions=1 / 3),
 }
 WHOLE = "/tests/e2e/motion/"

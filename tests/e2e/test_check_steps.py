@@ -67,6 +67,17 @@ def test_steps_in_parallel_have_their_own_faults_and_outputs(
     ]
 
 
+def test_steps_in_parallel_share_no_temporary_folder_of_pytest(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """Two processes of pytest that remove the same old folder disturb each other."""
+    say = "import os; print(os.environ['PYTEST_DEBUG_TEMPROOT'])"
+    run([[Step(f"step {place}", (sys.executable, "-c", say))] for place in range(2)], os.environ)
+    folders = [part.splitlines()[1] for part in capfd.readouterr().out.split("\n== ")[1:]]
+    assert len(set(folders)) == 2
+    assert not [folder for folder in folders if Path(folder).exists()]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signal")
 def test_an_interrupt_ends_all_steps() -> None:
     """No step that waits for its turn is started."""

@@ -11,6 +11,7 @@ from typing import Any, cast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from tests.unit.web.test_client import FakeLine
 from urc.model.driver import Argument, Command
 from urc.model.exchange import Hold
@@ -164,7 +165,7 @@ async def _play(rights: _Rights, steps: list[tuple[Any, ...]]) -> _World:
 
 
 @given(_role, _scope, st.lists(_step, max_size=25))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=examples(2400), deadline=None)
 def test_no_message_acts_beyond_the_rights_of_its_page(
     role: Role | None, scope: tuple[str, ...], steps: list[tuple[Any, ...]]
 ) -> None:

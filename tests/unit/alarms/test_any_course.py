@@ -7,6 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
+from tests.effort import examples
 from urc.alarms.alarm_list import AlarmActor, AlarmList
 from urc.alarms.record import AlarmEvent, AlarmRecord
 from urc.model.values import Alarm, AlarmLimits
@@ -173,5 +174,7 @@ class AlarmCourse(RuleBasedStateMachine):
         }
 
 
-AlarmCourse.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+AlarmCourse.TestCase.settings = settings(
+    max_examples=examples(600), stateful_step_count=40, deadline=None
+)
 TestAnyCourse = AlarmCourse.TestCase
