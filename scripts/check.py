@@ -45,6 +45,8 @@ class Step:
     timeout_s: float = HANGS_AFTER_S
     is_yielding: bool = False
     """Whether the step runs with a lower priority, so that it does not delay a measuring step."""
+    is_measuring: bool = False
+    """Whether the step measures times, so that its session comes before all others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +100,7 @@ SLOW = (
         ),
     ),
     # These tests measure the time until a robot stops, and the rig has one set of addresses.
-    (Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone")),),
+    (Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone"), is_measuring=True),),
 )
 """Sequences of steps; the sequences run in parallel."""
 
@@ -218,8 +220,7 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
         stderr=output,
         start_new_session=os.name != "nt",
     )
-    if step.is_yielding:
-        _lower_priority(process.pid)
+    _set_priority(process.pid, step)
     try:
         async with asyncio.timeout(step.timeout_s):
             code = await process.wait()
@@ -231,13 +232,16 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
     return Outcome(step.name, fault, time.monotonic() - start)
 
 
-def _lower_priority(process: int) -> None:
-    """Lower the priority of a process that has its own session, where the system can."""
-    with suppress(AttributeError, OSError):
-        os.setpriority(os.PRIO_PROCESS, process, 10)
-    # Linux may divide the processors among sessions first, whatever the priority of a process.
-    with suppress(OSError):
-        Path(f"/proc/{process}/autogroup").write_text("10", "ascii")
+def _set_priority(process: int, step: Step) -> None:
+    """Set the priority of a process that has its own session, where the system allows it."""
+    if step.is_yielding:
+        with suppress(AttributeError, OSError):
+            os.setpriority(os.PRIO_PROCESS, process, 10)
+    # Linux may divide the processors among sessions first, whatever the priority of a process. The
+    # other tests have a session for each browser, so one session comes before all others instead.
+    if step.is_measuring:
+        with suppress(OSError):
+            Path(f"/proc/{process}/autogroup").write_text("-10", "ascii")
 
 
 async def _end_group(process: asyncio.subprocess.Process) -> None:

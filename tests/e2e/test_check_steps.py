@@ -78,6 +78,16 @@ def test_steps_in_parallel_share_no_temporary_folder_of_pytest(
     assert not [folder for folder in folders if Path(folder).exists()]
 
 
+def test_the_session_of_a_measuring_step_comes_first(capfd: pytest.CaptureFixture[str]) -> None:
+    """Where Linux divides the processors among sessions, and the user may raise a priority."""
+    group = Path("/proc/self/autogroup")
+    say = f"import time; time.sleep(0.5); print(open({str(group)!r}).read())"
+    if not group.exists() or os.geteuid() != 0:
+        say = "print('nice -10')"
+    run([[Step("step", (sys.executable, "-c", say), is_measuring=True)]], os.environ)
+    assert "nice -10" in capfd.readouterr().out
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signal")
 def test_an_interrupt_ends_all_steps() -> None:
     """No step that waits for its turn is started."""

@@ -177,6 +177,8 @@ async def test_remove_a_driver(new_page: PageMaker, has: dict[str, Path]) -> Non
         assert len(installed(data)) == 2
         await mine.get_by_role("button", name="Remove").click()
         await dialog.get_by_role("button", name="Remove").click()
+        # The list may change before the server has loaded its robots again.
+        await expect(page.locator("main > div [data-said]")).to_contain_text("✓ removed")
         await expect(mine).to_have_count(0)
         assert installed(data) == ["interfaces/wide 1.0.0"]
         await page.goto(address)
@@ -240,6 +242,8 @@ async def test_remove_an_interface(new_page: PageMaker, has: dict[str, Path]) ->
         mine = row(page, "installed", "interfaces/wide")
         await mine.get_by_role("button", name="Remove").click()
         await page.get_by_role("dialog").get_by_role("button", name="Remove").click()
+        # The list may change before the server has loaded its robots again.
+        await expect(page.locator("main > div [data-said]")).to_contain_text("✓ removed")
         await expect(mine).to_have_count(0)
         await page.goto(f"{address}robots/rover/settings")
         await expect(choice).to_have_text(["Plain", "Rover"])
