@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from playwright.async_api import Locator, Page, WebSocket
+from playwright.async_api import Locator, Page, WebSocket, expect
 
 from tests.e2e.dashboards import WAIT_S
 from urc.model.driver import Command
@@ -126,6 +126,8 @@ async def held(
     await what.evaluate("(el) => el.scrollIntoView({ block: 'center' })")
     end_s = time.monotonic() + 2 * WAIT_S
     while True:
+        # A busy machine may lose its robot for a moment; the card's buttons lie over the widgets.
+        await expect(page.locator(".urc-lost")).to_be_hidden(timeout=2_000 * WAIT_S)
         box = await what.bounding_box()
         assert box is not None
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
