@@ -14,6 +14,7 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from inspect import iscoroutinefunction
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any
 
@@ -23,6 +24,10 @@ from hypothesis import settings
 from scripts.needs import NEEDS
 from tests.effort import examples, seed
 from tests.sampling import left_out
+
+# The tests must not read or change the data of their user, such as the latched STOP of a robot.
+DATA = TemporaryDirectory(prefix="urc-data-", ignore_cleanup_errors=True)
+os.environ["URC_DATA_DIR"] = DATA.name
 
 # Python's own threshold checks all new objects 1,400 times while the tests are collected.
 gc.set_threshold(200_000, 20, 50)

@@ -2,10 +2,16 @@
 
 import sys
 from pathlib import Path
+from tempfile import gettempdir
 
 import pytest
 
 from urc._folders import data_folder
+
+
+def test_tests_use_no_data_of_their_user() -> None:
+    """Otherwise a test could reset the STOP of a real robot."""
+    assert data_folder().is_relative_to(gettempdir())
 
 
 def test_named_folder_wins() -> None:
