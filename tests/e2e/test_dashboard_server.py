@@ -26,6 +26,9 @@ from urc.web.serve.server import reachable_urls
 
 pytestmark = pytest.mark.anyio
 
+CROWD = 100
+"""Connections with a request at the same time; all of them wait for at least one turn of others."""
+
 
 def joined(address: str, **options: object) -> connect:
     """Return a connection to the robot's socket, as its own page makes it."""
@@ -340,6 +343,30 @@ async def test_one_connection_too_many_is_told_so() -> None:
             assert await next_value(first) == 8
         async with joined(address) as third:
             assert json.loads(await third.recv())["t"] == "hello"
+
+
+async def test_stop_overtakes_a_crowd_of_requests() -> None:
+    """All requests are sent before the server can read; STOP is the last of them."""
+    requests = [("GET", f"/missing/{number}") for number in range(CROWD)]
+    requests.append(("POST", "/api/v1/robots/puppet/stop"))
+    answered: list[str] = []
+
+    async def await_answer(path: str, reader: asyncio.StreamReader) -> None:
+        assert (await reader.readline()).startswith(b"HTTP/1.1 ")
+        answered.append(path)
+
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        lines = [(one, *(await opened(address))) for one in requests]
+        for (method, path), _, writer in lines:
+            head = f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n"
+            writer.write(head.encode())
+        async with asyncio.timeout(30), asyncio.TaskGroup() as group:
+            for (_, path), reader, _ in lines:
+                group.create_task(await_answer(path, reader))
+        for _, _, writer in lines:
+            writer.close()
+    assert answered.index("/api/v1/robots/puppet/stop") < CROWD / 2
+    assert sorted(answered) == sorted(path for _, path in requests)
 
 
 async def test_every_address_that_is_told_answers() -> None:

@@ -1,4 +1,4 @@
-"""One HTTP connection, with a time limit for requests and policy headers in every refusal.
+"""One HTTP connection, with turns and a time limit for requests, and headers in every refusal.
 
 Layer 5. A thin layer over uvicorn's protocol, used only by `server`. The library uvicorn refuses
 invalid HTTP, and connections above its limit. Without this layer, uvicorn's refusals would lack the
@@ -16,6 +16,7 @@ from uvicorn.server import ServerState
 
 from urc.web.serve.connection_quota import is_stop
 from urc.web.serve.policy import REFUSAL_HEADERS
+from urc.web.serve.request_turns import RequestTurns
 
 __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
@@ -50,14 +51,15 @@ def _stops(data: bytes) -> bool:
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's HTTP/1.1 protocol, with a time limit for receiving a request.
+    """uvicorn's HTTP/1.1 protocol, with turns and a time limit for receiving a request.
 
     The request state has two keys for endless responses. The event ``closing`` is set when the
     server ends. The function ``abort`` closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments, and the methods `send_400_response` and `shutdown`.
-        It also uses the attributes `conn`, `connections`, `loop` and `transport`. The tests in
+        class uses the constructor's arguments, and the methods `handle_events`,
+        `send_400_response` and `shutdown`. It also uses the attributes `conn`, `connections`,
+        `flow`, `loop` and `transport`. The tests in
         tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail if one of these parts
         changes.
     """
@@ -69,17 +71,21 @@ class HttpConnection(H11Protocol):
         app_state: dict[str, Any],
         _loop: asyncio.AbstractEventLoop | None = None,
         *,
+        turns: RequestTurns,
         request_s: float = REQUEST_S,
         most: int = CONNECTIONS,
     ) -> None:
         self._closing = asyncio.Event()
         state = {**app_state, "abort": self._abort, "closing": self._closing}
         super().__init__(config, server_state, state, _loop)
+        self._turns = turns
         self._request_s = request_s
         self._most = most
         self._alarm: asyncio.TimerHandle | None = None
         self._is_one_too_many = False
         self._has_spoken = False
+        self._is_urgent = False
+        """Whether the last received bytes begin a STOP request."""
         self.made_s = 0.0
         """Time at which the connection opened, on the event loop's clock."""
 
@@ -97,15 +103,32 @@ class HttpConnection(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Process received bytes, and check whether the request is complete."""
         self._has_spoken = True
-        if self._is_one_too_many and not _stops(data):
+        self._is_urgent = _stops(data)
+        if self._is_one_too_many and not self._is_urgent:
             # An earlier refusal would be lost, because the client must write its request first.
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "Too many connections are open.")
             return
         super().data_received(data)
         self._watch()
 
+    def handle_events(self) -> None:
+        """Read the requests in the received bytes, STOP immediately and others in turn."""
+        if self._is_urgent:
+            super().handle_events()
+            return
+        self.flow.pause_reading()
+        self._turns.take(self, self._handle_events)
+
+    def _handle_events(self) -> None:
+        if self.transport.is_closing():
+            return
+        self.flow.resume_reading()
+        super().handle_events()
+        self._watch()
+
     def connection_lost(self, exc: Exception | None) -> None:
-        """Cancel the request's time limit."""
+        """Leave the queue, and cancel the request's time limit."""
+        self._turns.remove(self)
         self._unwatch()
         super().connection_lost(exc)
 

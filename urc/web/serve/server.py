@@ -25,6 +25,7 @@ from urc.web.feed.client_socket import SocketFlow
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S, HttpConnection
 from urc.web.serve.frames import WebSocketFrames, text_of
+from urc.web.serve.request_turns import RequestTurns
 from urc.web.serve.tls_listener import FirstBytes, Handshakes
 from urc.web.serve.tls_port import TlsPort
 from urc.web.wire.messages import INBOUND_BYTES
@@ -72,7 +73,8 @@ async def serve(
     """
     listener = _listen(host, port)
     connection: Callable[..., asyncio.Protocol]
-    connection = partial(HttpConnection, request_s=request_s, most=connections)
+    turns = RequestTurns()
+    connection = partial(HttpConnection, turns=turns, request_s=request_s, most=connections)
     if certificates is not None:
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)

@@ -1,0 +1,62 @@
+"""Turns for the requests of all visitors, so that a crowd does not delay the ticks of a page.
+
+Layer 5. The event loop runs everything that is ready before it reads sockets again. Hundreds of
+requests that arrive together would therefore delay a tick by more than a lease.
+"""
+
+import asyncio
+from collections.abc import Callable
+
+__all__ = ["REQUESTS_AT_ONCE", "RequestTurns"]
+
+REQUESTS_AT_ONCE = 8
+"""Maximum number of connections whose requests are read in one iteration of the event loop. Ticks
+arrive on open WebSockets, which take no turns."""
+
+
+class RequestTurns:
+    """The connections of one server with unread requests, oldest first."""
+
+    def __init__(self, *, most: int = REQUESTS_AT_ONCE) -> None:
+        """Begin without connections.
+
+        Args:
+            most: maximum number of turns in one iteration of the event loop.
+        """
+        self._most = most
+        self._left = most
+        """Turns left in this iteration."""
+        self._waiting: dict[object, Callable[[], None]] = {}
+        self._is_scheduled = False
+
+    def take(self, connection: object, read: Callable[[], None]) -> None:
+        """Call `read` now or later, in the order of calls; a waiting connection keeps its place.
+
+        Args:
+            connection: the connection, which waits for at most one turn.
+            read: function that reads the connection's requests.
+        """
+        if self._waiting or not self._left:
+            self._waiting.setdefault(connection, read)
+            return
+        self._left -= 1
+        self._schedule()
+        read()
+
+    def remove(self, connection: object) -> None:
+        """Remove a lost connection."""
+        self._waiting.pop(connection, None)
+
+    def _schedule(self) -> None:
+        if not self._is_scheduled:
+            self._is_scheduled = True
+            asyncio.get_running_loop().call_soon(self._next_iteration)
+
+    def _next_iteration(self) -> None:
+        self._is_scheduled = False
+        self._left = self._most
+        while self._waiting and self._left:
+            self._left -= 1
+            self._schedule()
+            read = self._waiting.pop(next(iter(self._waiting)))
+            read()
