@@ -5,12 +5,15 @@ The files contain persistent data: settings, a latched STOP, host keys.
 
 import os
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["make_private", "put_private"]
+__all__ = ["make_private", "put_private", "remove_incomplete"]
 
 _OWN = 0o700
+_INCOMPLETE_S = 3600.0
+"""Age at which no process can still be writing a file, in seconds."""
 
 
 def make_private(folder: Path) -> None:
@@ -53,6 +56,19 @@ def put_private(file: Path, data: bytes) -> None:
             os.unlink(name)
         raise
     _keep_name(file.parent)
+
+
+def remove_incomplete(folder: Path) -> None:
+    """Delete the files that killed processes left incomplete in a folder and its direct subfolders.
+
+    Files that another process may be writing stay. So does a file that cannot be deleted.
+    """
+    oldest_s = time.time() - _INCOMPLETE_S
+    for pattern in (".*.new", "*/.*.new"):
+        for file in folder.glob(pattern):
+            with suppress(OSError):
+                if file.stat().st_mtime < oldest_s:
+                    file.unlink()
 
 
 def _keep_name(folder: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from urc.cli.data_folder import own_folder
 from urc.private_files import put_private
 
 
@@ -44,3 +45,16 @@ def test_a_full_disk_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
         put_private(file, b"new")
     assert file.read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["kept"]
+
+
+def test_what_killed_processes_left_is_removed_with_the_next_start(tmp_path: Path) -> None:
+    """A file that another process may be writing now stays, and so do all other files."""
+    put_private(tmp_path / "contact-times.json", b"{}")
+    put_private(tmp_path / "latches" / "tello", b"stopped")
+    for name in (".contact-times.json.a1b2.new", "latches/.tello.c3d4.new", "old.new"):
+        (tmp_path / name).write_bytes(b"half")
+        os.utime(tmp_path / name, (0, 0))
+    (tmp_path / "latches" / ".tello.e5f6.new").write_bytes(b"half")
+    own_folder(tmp_path)
+    assert sorted(os.listdir(tmp_path)) == ["contact-times.json", "latches", "old.new"]
+    assert sorted(os.listdir(tmp_path / "latches")) == [".tello.e5f6.new", "tello"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from urc._environment import DATA_DIR
 from urc._folders import data_folder
-from urc.private_files import make_private
+from urc.private_files import make_private, remove_incomplete
 
 __all__ = ["own_folder"]
 
@@ -14,7 +14,7 @@ _OWN = 0o700
 
 
 def own_folder(named: Path | None = None) -> Path:
-    """Return URC's data folder; create it if necessary.
+    """Return URC's data folder, without incomplete files; create it if necessary.
 
     The default folder becomes private, even if an older version created it with other permissions.
     The permissions of an existing custom folder remain unchanged, because the folder may be shared.
@@ -28,4 +28,5 @@ def own_folder(named: Path | None = None) -> Path:
         make_private(folder)
         if named is None and DATA_DIR not in os.environ:
             folder.chmod(_OWN)
+        remove_incomplete(folder)
     return folder
