@@ -12,7 +12,7 @@ import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideO
 import { Even, NO_RAY, Uneven, faultOf } from "../../widgets/scan/fan.js";
 import { arc, band, chart, dots, graph, view } from "../../widgets/scan/paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, rimOf, ringStep, sideOf as scanSide,
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf as scanSide,
 } from "../../widgets/scan/rays.js";
 import { fileOf } from "../../widgets/scene3d/model.js";
 import { angles, cameraAt, cloud, fromAngles, fromOrientation, posture, turned as spun } from "../../widgets/scene3d/pose.js";
@@ -94,16 +94,6 @@ test("the nearest thing of a sweep is told with its side; what is clear or not k
   assert.equal(nearest(measured([9, NaN, 8, null], 0, 8, new Float32Array(4)), fan, 8), null);
   assert.equal(nearest(measured([0.05], 0.1, 8, new Float32Array(1)), fan, 8)?.distance, 0);
   assert.deepEqual([10, 4, 0.9, 250].map((most) => ringStep(most)), [2, 1, 0.2, 50]);
-});
-
-test("obstacles fill the picture of a scan, and its scale stays while it fits", () => {
-  const room = Float32Array.of(2, 4.4, NaN, 12);
-  assert.equal(rimOf(room, 12, 0, 0), 5); // 4.4 m at most 90 % of the radius; the clear ray does not count
-  assert.equal(rimOf(room, 12, 0, 6), 6); // a little too large: it stays
-  assert.equal(rimOf(room, 12, 0, 12), 5);
-  assert.equal(rimOf(Float32Array.of(7), 12, 0, 5), 8); // never outside
-  assert.equal(rimOf(Float32Array.of(12, NaN), 12, 0, 5), 12); // nothing but free space
-  assert.equal(rimOf(Float32Array.of(0.2), 12, 1, 0).toFixed(3), "1.200"); // the zone of caution stays visible
 });
 
 const INK = { wall: 1, near: 2, stop: 3, free: 4, unknown: 5 };

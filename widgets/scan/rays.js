@@ -44,29 +44,6 @@ export function directions(fan) {
   return { right, down };
 }
 
-/** Maximum fraction of the picture's radius for the farthest obstacle. */
-const FILL = 0.9;
-/** Fraction of the shown distance at the rim below which a smaller distance replaces it. */
-const LOOSE = 0.75;
-
-/**
- * Return the distance at the rim of a picture that its obstacles fill: a round number, at most `most`.
- *
- * @param {Float32Array} distances
- * @param {number} most greatest distance that the sensor measures
- * @param {number} near distance that must be visible
- * @param {number} shown present distance at the rim, which stays while it fits, to avoid flicker
- */
-export function rimOf(distances, most, near, shown) {
-  let farthest = 0;
-  for (const distance of distances) if (distance < most && distance > farthest) farthest = distance;
-  if (farthest === 0) return most;
-  const least = Math.max(farthest, near) / FILL;
-  const step = ringStep(least, 8);
-  const wanted = Math.min(most, Math.ceil(least / step) * step);
-  return shown <= most && wanted <= shown && wanted > shown * LOOSE ? shown : wanted;
-}
-
 /**
  * Return the direction of each pixel of a square image around the sensor, in radians.
  *
