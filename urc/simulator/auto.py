@@ -265,10 +265,11 @@ class DefaultConnection:
         return best if best is not None and label in ("", best.request.label) else None
 
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
-        """Return `frame` as a request of the command `label`; None if the best match has a reply.
+        """Return `frame` as a request of the command `label`, or None.
 
-        Two of a driver's declarations often have the same stop frame. Examples are the release of a
-        held command, a close message and a command that has no reply.
+        A better match with arguments or a reply excludes all other commands. Otherwise, `frame`
+        may mean several commands. Two of a driver's declarations often have the same stop frame:
+        the release of a held command, a close message, a command without a reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:

@@ -65,7 +65,12 @@ class SimulatedBody:
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Record the commands in a received frame."""
+        """Restart the fail-safe's timer if a received frame has one of the timer's commands.
+
+        Args:
+            labels: commands that the frame may mean.
+            now_s: time of the frame.
+        """
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False
 

@@ -58,7 +58,7 @@ def build_read(
         BadDefinition: the layout is nested too deeply for a generated function.
     """
     try:
-        return _Generator(order, is_ros1, widest).function(layout, wanted)
+        return _ReadGenerator(order, is_ros1, widest).function(layout, wanted)
     except (SyntaxError, RecursionError, MemoryError, struct.error) as fault:
         raise BadDefinition(f"the type is too large or nested too deeply ({fault})") from fault
 
@@ -111,7 +111,7 @@ _SCOPE: Final[dict[str, Any]] = {
 }  # fmt: skip
 
 
-class _Generator:
+class _ReadGenerator:
     """A generator of source text; each instance creates one function."""
 
     def __init__(self, order: str, is_ros1: bool, widest: int) -> None:
@@ -385,7 +385,7 @@ class _Generator:
                 self._emit(f"room -= {count}")
                 with self._block("if room < 0:"):
                     self._emit("bad('the arrays have too many elements')")
-            inner = _Generator(self._order, self._is_ros1, self._widest)
+            inner = _ReadGenerator(self._order, self._is_ros1, self._widest)
             inner._count = self._count + 1000
             value = inner._read(element, wanted)
             if inner._lines or not inner._names:

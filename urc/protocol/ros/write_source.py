@@ -61,7 +61,7 @@ class Writer:
         """
         self._layout = layout
         try:
-            self._write = _Generator(is_ros1).function(layout)
+            self._write = _WriteGenerator(is_ros1).function(layout)
         except (SyntaxError, RecursionError, MemoryError, struct.error) as fault:
             raise BadDefinition(f"the type is too large or nested too deeply ({fault})") from fault
 
@@ -115,7 +115,7 @@ _SCOPE: Final[dict[str, Any]] = {
 }  # fmt: skip
 
 
-class _Generator:
+class _WriteGenerator:
     """A generator of source text; each instance creates one function."""
 
     def __init__(self, is_ros1: bool) -> None:
