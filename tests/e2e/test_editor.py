@@ -140,7 +140,11 @@ def server() -> Iterator[LanguageServer]:
 
 
 class Opened:
-    """A document as the editor has it, each of its own name; it need not be on the disk."""
+    """A document as the editor has it, each of its own name; it need not be on the disk.
+
+    Questions come after the first findings, as from a person. Before them, the server confuses its
+    copy of the schema, and computes for more than ten seconds.
+    """
 
     _count = 0
 
@@ -151,6 +155,7 @@ class Opened:
         self.address = (ROOT / "robots" / f"editor-{Opened._count}.yaml").as_uri()
         document = {"uri": self.address, "languageId": "yaml", "version": 1, "text": text}
         server.tell("textDocument/didOpen", textDocument=document)
+        self.findings = server.problems(self.address)
 
     def at(self, word: str, nth: int = 0) -> dict[str, Any]:
         """Return the place of the n-th line that has `word`, as the protocol writes it."""
@@ -206,7 +211,7 @@ def test_empty_line_is_completed_with_the_keys_of_its_place(server: LanguageServ
 def test_misspelt_key_is_found_and_the_right_one_offered(server: LanguageServer) -> None:
     """Underlined where it stands; completion at its place has the key that was meant."""
     opened = Opened(server, ROBOT.replace("    |\n", ""))
-    (finding,) = opened.server.problems(opened.address)
+    (finding,) = opened.findings
     assert "presicion" in finding["message"]
     start = opened.at("presicion")["position"]
     assert finding["range"]["start"] == start
