@@ -1,11 +1,15 @@
 """`stamped`: a ROS message in its stamped kind; params with choices of several types."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
-from tests.unit.config.folder import Folder, head
+from tests.unit.config.folder import ROOT, Folder, head
+from urc.config.load import check
+from urc.config.parse.widget import WidgetFolder
 from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 
 ROS = "transports: { ros: { type: ros, host: robot, stale_after: 3s, version: auto } }\n"
 DRIVE = """
@@ -50,6 +54,55 @@ def test_a_type_without_a_stamped_kind_is_refused(tmp_path: Path) -> None:
     (problem,) = (one for one in folder.found("rover") if one.severity == "error")
     assert (problem.code, problem.path) == ("bad-value", "commands.drive.send.publish.stamped")
     assert problem.message == "'std_msgs/Float64' has no known stamped type, or 'json' is missing"
+
+
+@pytest.mark.parametrize("word", ["true", "false"])
+def test_a_test_states_the_message_as_the_command_does(tmp_path: Path, word: str) -> None:
+    """One param sets both, so a driver's test passes with and without the header."""
+    plain = rover("geometry_msgs/Twist", "twist")
+    _, _, sent = plain.partition("    sent: ")
+    same = "type: geometry_msgs/Twist, stamped: true, json: { linear: { x: 0.5 } }"
+    text = plain.replace(sent, f"{{ ros: {{ publish: {{ topic: /cmd_vel, {same} }} }} }}\n")
+    folder = Folder(tmp_path)
+    folder.write(rover=text.replace("stamped: true", f"stamped: {word}"))
+    checked = folder.check("rover")
+    assert checked.profile is not None, checked.problems
+    assert exercise(checked.profile).problems == []
+
+
+def test_a_test_that_expects_another_stamp_fails(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    body = "json: { linear: { x: 0.5 } }"
+    text = rover("geometry_msgs/Twist", "twist").partition("    sent: ")[0]
+    text += f"    sent: {{ ros: {{ publish: {{ topic: /cmd_vel, {body} }} }} }}\n"
+    folder.write(rover=text)
+    profile = folder.check("rover").profile
+    assert profile is not None
+    assert len(exercise(profile).problems) == 1
+
+
+def test_a_test_with_a_type_without_a_stamped_kind_is_refused(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    plain = rover("geometry_msgs/Twist", "twist")
+    text = plain.replace("TwistStamped", "Twist2, stamped: true")
+    folder.write(rover=text.replace("type: geometry_msgs/Twist2", "type: std_msgs/String"))
+    (problem,) = (one for one in folder.found("rover") if one.severity == "error")
+    assert (problem.code, problem.path) == ("bad-value", "tests.0.sent.ros.publish.stamped")
+
+
+@pytest.mark.parametrize("robot", ["turtlebot3", "turtlebot4", "generic-ros2"])
+def test_shipped_robots_pass_their_tests_with_stamped_commands(tmp_path: Path, robot: str) -> None:
+    """As the documentation tells users of Jazzy to set them up."""
+    shipped = ROOT / "robots"
+    for name in ("drivers", "interfaces"):
+        shutil.copytree(shipped / name, tmp_path / name)
+    text = (shipped / f"{robot}.yaml").read_text("utf-8")
+    assert "params: { ros: 2" in text
+    folder = Folder(tmp_path)
+    folder.write(**{robot: text.replace("params: { ros: 2", "params: { stamped: true, ros: 2")})
+    checked = check(tmp_path / f"{robot}.yaml", built_in_catalog(), WidgetFolder(ROOT / "widgets"))
+    assert checked.profile is not None, checked.problems
+    assert exercise(checked.profile).problems == []
 
 
 @pytest.mark.parametrize("given", ["auto", "2"])

@@ -3,6 +3,7 @@
 from typing import Final
 
 from urc.config.node import Node, Problems
+from urc.config.parse.forms.stamped import stamped_body, stamped_type
 from urc.model.payload import Envelope
 from urc.model.profile import DialogueStep, DocumentTest, Expected, ExpectedState, Fed
 from urc.model.values import Value
@@ -163,6 +164,11 @@ def _message(part: Node, problems: Problems) -> Envelope:
             body = _hex(value, problems) if key == "hex" else str(value.data).encode()
     given = ((name, inner.get(name)) for name in _ADDRESS)
     attributes = {name: one.data for name, one in given if one is not None}
+    is_stamped = inner.get("stamped")
+    if is_stamped is not None and is_stamped.data:
+        kind = stamped_type(inner, attributes.get("type"), problems)
+        if kind is not None:
+            attributes["type"], body = kind, stamped_body(kind, body)
     return Envelope(verb, attributes, body)
 
 

@@ -1,8 +1,7 @@
 """The forms of message transports: `publish`, `call`, `goal` and `request`.
 
 An envelope has an address and a body. The address may contain templates, and the body has one of
-the other forms. With ``stamped``, the parser itself converts a ROS message to its stamped type, so
-the engine needs no special case.
+the other forms.
 """
 
 from collections.abc import Iterable
@@ -11,6 +10,7 @@ from typing import Final
 from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, body_form
 from urc.config.parse.forms.json_text import compiled_tree, placed_templates, templates_in
+from urc.config.parse.forms.stamped import stamped_body, stamped_type
 from urc.config.parse.headers import check_headers
 from urc.expressions import Template
 from urc.model.payload import WriteSpec
@@ -18,21 +18,6 @@ from urc.model.payload import WriteSpec
 __all__ = ["parse_write", "templates"]
 
 _BODY: Final = "body"
-_STAMPED: Final = {
-    "Accel": "accel",
-    "AccelWithCovariance": "accel",
-    "Inertia": "inertia",
-    "Point": "point",
-    "Polygon": "polygon",
-    "Pose": "pose",
-    "PoseWithCovariance": "pose",
-    "Quaternion": "quaternion",
-    "Twist": "twist",
-    "TwistWithCovariance": "twist",
-    "Vector3": "vector",
-    "Wrench": "wrench",
-}
-"""Value field of each stamped geometry_msgs type, by plain type (ROS common_interfaces)."""
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
@@ -62,10 +47,11 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         return None
     stamped = part.get("stamped") if part.name == "publish" else None
     if stamped is not None and attributes.pop("stamped"):
-        kind = _stamped_type(part, attributes.get("type"), problems)
+        kind = stamped_type(part, attributes.get("type"), problems)
         if kind is None or spec is None:
             return None
-        attributes["type"], spec = f"{kind}Stamped", _stamped(kind, spec)
+        attributes["type"] = kind
+        spec = spec._replace(options={"tree": stamped_body(kind, spec.options["tree"])})
     if part.name == "request":
         attributes.setdefault("method", "GET" if spec is None else "POST")
     found = list(templates_in(attributes))
@@ -77,28 +63,6 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         frozenset[str]().union(*names),
         frozenset[str]().union(*settings),
     )
-
-
-def _stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
-    """Return the type at `part`; report a type without a known stamped type."""
-    package, _, name = str(kind).replace("/msg/", "/").partition("/")
-    if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
-        return str(kind)
-    problems.error(
-        part,
-        "bad-value",
-        f"{kind!r} has no known stamped type, or 'json' is missing",
-        at="stamped",
-        hint=f"geometry_msgs types to use with json: {', '.join(_STAMPED)}; write others in full",
-    )
-    return None
-
-
-def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
-    """Return the body in its stamped type; rosbridge replaces ``now`` with the current time."""
-    header = {"stamp": "now", "frame_id": ""}
-    tree = {"header": header, _STAMPED[kind.rpartition("/")[2]]: spec.options["tree"]}
-    return spec._replace(options={"tree": tree})
 
 
 def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
