@@ -1,14 +1,13 @@
 """The page of the WebSocket messages, generated from the message types in `urc.wire`."""
 
-import ast
 import inspect
 import typing
-from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Iterator
 
 import msgspec
 
 from scripts.reference.markdown import plain, table
+from urc.web.api.field_texts import field_texts
 from urc.wire import client_messages, server_messages
 
 __all__ = ["page"]
@@ -59,31 +58,18 @@ def _message(message: type, right: str) -> Iterator[str]:
 
 def _fields(message: type) -> Iterator[str]:
     yield from (plain(inspect.cleandoc(message.__doc__ or "")), "")
-    texts = _texts(message)
+    texts = field_texts(message)
     rows = [
         (
             f"`{field.encode_name}`",
             _type(field.type),
             "yes" if field.required else "",
-            texts.get(field.name, ""),
+            plain(texts.get(field.name, "")),
         )
         for field in msgspec.structs.fields(message)
     ]
     if rows:
         yield from table(("field", "type", "required", "meaning"), rows)
-
-
-def _texts(message: type) -> Mapping[str, str]:
-    """Return the docstrings of the fields."""
-    [definition] = ast.parse(inspect.getsource(message)).body
-    body = definition.body if isinstance(definition, ast.ClassDef) else []
-    found = {}
-    for field, text in pairwise(body):
-        if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
-            continue
-        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
-            found[field.target.id] = plain(inspect.cleandoc(str(text.value.value)))
-    return found
 
 
 def _type(annotation: object) -> str:

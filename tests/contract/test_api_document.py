@@ -63,6 +63,19 @@ def test_every_route_is_told_and_nothing_else(app: Starlette, document: dict[str
     assert len(routes) == len(found), "two routes have the same path"
 
 
+def test_a_shape_has_the_docstrings_of_its_fields(document: dict[str, Any]) -> None:
+    """Under the names of the message, also beside a reference to another shape."""
+    shapes = document["components"]["schemas"]
+    said = shapes["LeaseAsked"]["properties"]["for_s"]["description"]
+    assert said.startswith("Time limit for the holder's answer to")
+    described = [
+        one for shape in shapes.values() for one in shape.get("properties", {}).values()
+        if "description" in one
+    ]  # fmt: skip
+    assert len(described) > 150
+    assert any("anyOf" in one or "$ref" in one for one in described)
+
+
 def test_every_route_of_the_server_names_its_right(app: Starlette) -> None:
     """Pages, files, calls and sockets alike."""
     without = [one for one in app.routes if not isinstance(one, (ProtectedRoute, ProtectedSocket))]

@@ -4,6 +4,8 @@ Layer 5. The schemas are generated from the types that the server decodes and en
 document matches the server.
 """
 
+import asyncio
+from collections.abc import Iterator
 from functools import cache
 from http import HTTPStatus
 from typing import Any, Final
@@ -14,6 +16,7 @@ from starlette.responses import Response
 
 from urc import __version__
 from urc.web.api.calls import CALLS, JSON, Call
+from urc.web.api.field_texts import field_texts
 from urc.web.serve.replies import Failure
 from urc.web.serve.rights import Right
 
@@ -45,7 +48,9 @@ _ALL: Final = (413, 429, 503)
 async def document(_: Request) -> Response:
     """Return the OpenAPI document as a response."""
     headers = {"cache-control": "no-store"}
-    return Response(api_document(), media_type=JSON, headers=headers)
+    # The first call takes longer than a tick may wait.
+    found = await asyncio.to_thread(api_document)
+    return Response(found, media_type=JSON, headers=headers)
 
 
 @cache
@@ -56,6 +61,8 @@ def api_document() -> bytes:
     _, components = msgspec.json.schema_components(
         list(dict.fromkeys([*kinds, Failure])), ref_template="#/components/schemas/{name}"
     )
+    for kind in _messages(msgspec.Struct):
+        _describe(components.get(kind.__name__, {}), kind)
     paths: dict[str, dict[str, Any]] = {}
     for call in CALLS:
         paths.setdefault(call.path, {})[call.method.lower()] = _operation(call)
@@ -66,6 +73,22 @@ def api_document() -> bytes:
         "components": {"schemas": components, "securitySchemes": _SCHEMES},
     }
     return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"
+
+
+def _messages(base: type[msgspec.Struct]) -> Iterator[type[msgspec.Struct]]:
+    """Yield all message types."""
+    for one in base.__subclasses__():
+        yield one
+        yield from _messages(one)
+
+
+def _describe(schema: dict[str, Any], message: type[msgspec.Struct]) -> None:
+    """Add the docstrings of the fields to the schema of a message type."""
+    texts = field_texts(message)
+    for field in msgspec.structs.fields(message):
+        described = schema.get("properties", {}).get(field.encode_name)
+        if described is not None and field.name in texts:
+            described["description"] = " ".join(texts[field.name].split())
 
 
 def _operation(call: Call) -> dict[str, Any]:

@@ -263,7 +263,7 @@ class LeaseAsked(ApiMessage, frozen=True):
     verb: Verb | Literal["keep"]
     """Requested action; ``keep`` only keeps the session open."""
     for_s: Annotated[float, msgspec.Meta(ge=0, le=600)] = 10.0
-    """Time limit for the holder's answer to ``ask``, 3 to 60 s."""
+    """Time limit for the holder's answer to ``ask``, in seconds; the server uses 3 to 60 s."""
     session: _Word = ""
     """Secret of an open session; "" opens a new session."""
 
