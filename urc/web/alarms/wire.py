@@ -53,6 +53,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     """Value at the last change, as text."""
     unit: str
     cause: str
+    """Probable cause, from the document."""
     action: str
     """Operator action."""
     number: int
@@ -64,11 +65,17 @@ class AlarmInfo(AlarmMessage, frozen=True):
     times: int
     """Number of activations since the alarm was last normal."""
     began_at: float
+    """Time of the activation, in seconds since 1970 (UTC)."""
     returned_at: float
+    """Time of the return to normal, as above; 0 while the alarm is active."""
     acknowledged_at: float
+    """Time of the acknowledgement, as above; 0 for an unacknowledged alarm."""
     acknowledged_by: str
+    """Name of the person or program that acknowledged the alarm, or ""."""
     shelved_until: float
+    """Time at which shelving ends, as above; 0 if the alarm is not shelved."""
     shelved_by: str
+    """Name of the person or program that shelved the alarm, or ""."""
 
 
 class AlarmCount(AlarmMessage, frozen=True):
@@ -91,6 +98,7 @@ class NotificationCount(AlarmMessage, frozen=True):
     """Counts of notifications since the server started."""
 
     sent: int
+    """Number of sent notifications."""
     failed: int
     """Number of notifications for which every attempt failed."""
     lost: int
@@ -120,7 +128,9 @@ class AlarmHistoryEvent(AlarmMessage, frozen=True):
     """One event of the alarm history."""
 
     id: int
+    """Number of the event; newer events have higher numbers."""
     at: float
+    """Time of the event, in seconds since 1970 (UTC)."""
     signal: str
     """Name of the signal; "" for a flood."""
     title: str
@@ -128,6 +138,7 @@ class AlarmHistoryEvent(AlarmMessage, frozen=True):
     condition: str
     priority: str
     value: str
+    """Value at the event, as text."""
     state: str
     """State of the alarm after the event."""
     who: str
@@ -161,6 +172,7 @@ class ShelveAsked(AlarmMessage, frozen=True):
 
     signals: _Signals
     for_s: Annotated[float, msgspec.Meta(ge=1, le=LONGEST_SHELF_S)]
+    """Time until shelving ends, in seconds."""
 
 
 class UnshelveAsked(AlarmMessage, frozen=True):

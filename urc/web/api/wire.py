@@ -55,6 +55,7 @@ class ConnectionInfo(ApiMessage, frozen=True):
     state: Literal["idle", "connecting", "live", "silent", "lost"]
     """``idle`` means that no client needs the robot, so URC is not connected."""
     address: str = ""
+    """Display text of the target, such as ``tcp 192.168.1.5:6789``."""
     detail: str = ""
     """Reason for an abnormal state, as one line of text."""
 
@@ -63,7 +64,9 @@ class BatteryLevel(ApiMessage, frozen=True):
     """The state of charge or the voltage of a robot's battery."""
 
     value: float
+    """Charge or voltage, in `unit`."""
     unit: str
+    """Unit symbol of the signal, such as ``%`` or ``V``."""
     alarm: Alarm = ""
     """Alarm limit that the signal exceeds."""
 
@@ -72,6 +75,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
     """The current alarms of a robot."""
 
     count: int = 0
+    """Number of annunciated alarms: all but the normal, shelved and suppressed ones."""
     worst: str = ""
     """Highest priority of all alarms; "" if there are no alarms."""
 
@@ -119,6 +123,7 @@ class ConfirmInfo(ApiMessage, frozen=True):
     """A question that a person must confirm before a command is sent."""
 
     text: str
+    """Text of the question."""
     level: Literal["normal", "hazardous"]
     two_person: bool
     """Whether a second person must approve; only pages can send such a command."""
@@ -132,11 +137,17 @@ class ArgumentInfo(ApiMessage, frozen=True):
     title: str
     description: str
     unit: str
+    """Unit symbol, such as ``m/s``; "" if the argument has no unit."""
     min: float | None
+    """Minimum, in `unit`; null if there is no minimum."""
     max: float | None
+    """Maximum, in `unit`; null if there is no maximum."""
     choices: tuple[Any, ...]
+    """Permitted values; empty if every value in the range is permitted."""
     default: Any
+    """Value of an omitted argument; null if there is no default."""
     required: bool
+    """Whether the argument must be given."""
     items: str
     """Type of the elements of an array; "" for other types."""
     size: int | None
@@ -171,9 +182,11 @@ class CommandInfo(ApiMessage, frozen=True):
     stops: bool
     """Whether STOP sends the command."""
     sequence: bool
+    """Whether URC runs several steps for the command."""
     hold: HoldInfo | None
     """Timing of a held command, which needs motion requests; null for other commands."""
     confirm: ConfirmInfo | None
+    """Question that a person must confirm; null if there is no question."""
     arguments: tuple[ArgumentInfo, ...]
 
 
@@ -185,15 +198,21 @@ class SignalInfo(ApiMessage, frozen=True):
     title: str
     description: str
     unit: str
+    """Unit symbol, such as ``m/s``; "" if the signal has no unit."""
     min: float | None
+    """Minimum valid value, in `unit`; null if there is no minimum."""
     max: float | None
+    """Maximum valid value, in `unit`; null if there is no maximum."""
     precision: int | None
+    """Number of displayed digits after the decimal point; null if undeclared."""
     states: dict[str, str]
     """Display texts by raw value, for enumerated signals."""
     limits: dict[str, float]
     """Alarm limits by name: ``lolo``, ``low``, ``high``, ``hihi``."""
     stale_after_s: float
+    """Age in seconds after which a value is stale."""
     axes: str
+    """Axis convention of the value, such as ``FLU``; "" if undeclared."""
     items: str
     """Type of the elements of an array; "" for other types."""
 
@@ -239,6 +258,7 @@ class CommandAsked(ApiMessage, frozen=True):
     """A command with its arguments."""
 
     arguments: Arguments = {}
+    """Values by argument; an omitted argument has its default."""
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
     """Longest wait for the reply; null means 30 s for a command and 600 s for a sequence."""
     confirmed: bool = False
@@ -275,6 +295,7 @@ class MotionNotice(ApiMessage, frozen=True):
     about: str
     """Name of the held command or request."""
     message: str
+    """Reason, as one line of text."""
 
 
 class LeaseAnswer(ApiMessage, frozen=True):
@@ -301,13 +322,16 @@ class LeaseAnswer(ApiMessage, frozen=True):
     idle_s: float
     """How long the session stays open after the last request."""
     notices: tuple[MotionNotice, ...] = ()
+    """Notices since the last answer."""
 
 
 class MotionAsked(ApiMessage, frozen=True):
     """The newest input of a held command. A pause longer than the lease stops the robot."""
 
     session: _Word
+    """Session secret from the lease answer."""
     command: _Word
+    """Name of a held command."""
     epoch: _Count
     """Number of the lease, from the lease answer."""
     number: _Count
@@ -315,6 +339,7 @@ class MotionAsked(ApiMessage, frozen=True):
     beat: _Count
     """Newest received heartbeat number, at most 0.4 s old."""
     arguments: Arguments = {}
+    """Values by argument; an omitted argument has its default."""
     release: bool = False
     """Whether the control is released; a release stops the robot immediately."""
 
@@ -323,11 +348,13 @@ class MotionAnswer(ApiMessage, frozen=True):
     """State of the controls after an input."""
 
     epoch: int
+    """Number of the lease; motion requests must repeat it."""
     beat: int | None
     """Newest heartbeat number, for the next motion request."""
     queued: bool
     """Whether the input is delayed by a few milliseconds, because inputs arrive too fast."""
     notices: tuple[MotionNotice, ...] = ()
+    """Notices since the last answer."""
 
 
 class RecordingInfo(ApiMessage, frozen=True):

@@ -81,6 +81,7 @@ class CodeInfo(PeopleMessage, frozen=True):
     roles: tuple[str, ...]
     """Grants, such as ``drive@cart``."""
     ends_at: float
+    """Time at which the code becomes invalid, in seconds since 1970 (UTC)."""
 
 
 class PairRequest(PeopleMessage, frozen=True):
@@ -170,9 +171,13 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     """Number of accounts at identity providers."""
     invited_until: float | None
     sign_ins: int
+    """Number of open sign-ins."""
     used_at: float | None
+    """Last request of an open sign-in, in seconds since 1970 (UTC), or null."""
     created_at: float
+    """Time of the creation, as above."""
     ends_at: float | None
+    """Time at which the access ends, as above; null if it does not end."""
 
 
 class PrincipalList(PeopleMessage, frozen=True):
@@ -194,7 +199,9 @@ class SignInInfo(PeopleMessage, frozen=True):
     place: str
     """Network address at the sign-in."""
     created_at: float
+    """Time of the sign-in, in seconds since 1970 (UTC)."""
     used_at: float
+    """Time of the last request, as above."""
     ends_at: float | None
     """Time at which the sign-in ends if it is not used again."""
     is_own: bool
@@ -251,7 +258,9 @@ class NewToken(PeopleMessage, frozen=True):
 
     name: str
     token: str
+    """Secret of the program; the server shows it only once."""
     ends_at: float | None
+    """Time at which the token becomes invalid, in seconds since 1970 (UTC); null for never."""
 
 
 class GuestRequest(PeopleMessage, frozen=True):
@@ -260,6 +269,7 @@ class GuestRequest(PeopleMessage, frozen=True):
     name: _Short
     robot: _Short
     hours: Annotated[float, msgspec.Meta(gt=0, le=720)] = 24
+    """Time until the access ends, in hours."""
 
 
 class SecretLink(PeopleMessage, frozen=True):
