@@ -4,7 +4,7 @@ import json
 import time
 from typing import Any
 
-from playwright.async_api import Locator, Page
+from playwright.async_api import Locator, Page, WebSocket
 
 from tests.e2e.motion.driving import Fingers
 
@@ -24,16 +24,29 @@ FOCUSED = "(el) => el.contains(document.activeElement)"
 
 
 class Told:
-    """What the server has told a page: newest values by signal, and the lease."""
+    """What a server and its page have told each other.
+
+    These are the newest values by signal, the lease, and the arguments of the newest tick.
+    """
 
     def __init__(self, page: Page) -> None:
         self.values: dict[str, Any] = {}
         self.lease: dict[str, Any] = {}
+        self.wanted: dict[str, Any] = {}
         self._names: list[str] = []
-        page.on("websocket", lambda line: line.on("framereceived", self._take))
+        page.on("websocket", self._watch)
+
+    def _watch(self, line: WebSocket) -> None:
+        line.on("framereceived", self._take)
+        line.on("framesent", self._note)
+
+    def _note(self, frame: str | bytes) -> None:
+        message: dict[str, Any] = json.loads(frame) if isinstance(frame, str) else {"t": "bytes"}
+        if message["t"] == "tick":
+            self.wanted = message["arguments"]
 
     def _take(self, frame: str | bytes) -> None:
-        message = json.loads(frame) if isinstance(frame, str) else {"t": "image"}
+        message: dict[str, Any] = json.loads(frame) if isinstance(frame, str) else {"t": "image"}
         if message["t"] == "hello":
             self._names = message["names"]
         elif message["t"] == "v":

@@ -11,6 +11,7 @@ FULL_PX = 120
 """Push of a stick beyond its rim, in pixels."""
 MOVING, STILL = 0.02, 0.005
 """Speeds of the robot that count as driven and as stopped, in m/s."""
+NEARLY = 0.9
 SKIP = ".urc-skip"
 CARD = "[data-robot-card]:has([data-alarms]:not([hidden])) h2 a"
 STICK, STOP = ".joystick-pad", "[data-stop-button]"
@@ -51,7 +52,8 @@ class Hand:
         """Drive, choose half of the speed while holding, and let go."""
         self.input.begin()
         await self.drive()
-        fast = await self.steady_speed()
+        await until(self.has_reached_its_speed)
+        fast = self.speed()
         await self.choose_slowest()
         await until(lambda: STILL < self.speed() < 0.6 * fast)
         await self.let_go()
@@ -135,19 +137,16 @@ class Hand:
     def has_lease(self) -> bool:
         """Whether this page has the controls."""
         holder = self.told.lease.get("holder")
-        return bool(holder) and holder["id"] == self.told.lease["you"]
+        return holder is not None and holder["id"] == self.told.lease["you"]
 
     async def until_latched(self) -> None:
         """Wait until the server has latched STOP."""
         await until(lambda: bool(self.told.lease.get("latched")))
 
-    async def steady_speed(self) -> float:
-        """Return the speed once it grows no longer."""
-        seen = 0.0
-        while self.speed() > seen + STILL or not self.is_moving():
-            seen = self.speed()
-            await self.page.wait_for_timeout(400)
-        return self.speed()
+    def has_reached_its_speed(self) -> bool:
+        """Whether the robot is nearly as fast as the stick says."""
+        wanted = abs(float(self.told.wanted.get("speed") or 0.0))
+        return wanted > MOVING and self.speed() > NEARLY * wanted
 
 
 class Touch(Hand):
