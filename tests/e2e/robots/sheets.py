@@ -186,12 +186,20 @@ def _uncounted(data: bytes) -> bytes:
 
 def _is_like(found: Envelope, wanted: Envelope) -> bool:
     """Return whether a message is the one that is wanted; a sample may leave attributes out."""
-    given = wanted.attributes
+    came, given = _addressed(found), _addressed(wanted)
     return (
         found.verb == wanted.verb
-        and all(_same(found.attributes.get(name), given[name]) for name in given)
+        and all(_same(came.get(name), given[name]) for name in given)
         and _same(found.body or None, wanted.body or None)
     )
+
+
+def _addressed(message: Envelope) -> Mapping[str, object]:
+    """Return the attributes; the names of ROS 2 and ROS 1 for a type are the same."""
+    attributes = dict(message.attributes)
+    if "type" in attributes:
+        attributes["type"] = str(attributes["type"]).replace("/msg/", "/")
+    return attributes
 
 
 def _same(found: object, wanted: object) -> bool:
