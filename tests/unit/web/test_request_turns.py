@@ -21,7 +21,8 @@ class Crowd:
     def arrive(self, *numbers: int) -> None:
         """Let a request arrive on each connection."""
         for number in numbers:
-            self.turns.take(number, partial(self.read.append, number))
+            is_read = self.turns.take(number, partial(self.read.append, number))
+            assert is_read == (number in self.read)
 
 
 async def test_a_request_alone_is_read_at_once() -> None:

@@ -115,9 +115,8 @@ class HttpConnection(H11Protocol):
         """Read the requests in the received bytes, STOP immediately and others in turn."""
         if self._is_urgent:
             super().handle_events()
-            return
-        self.flow.pause_reading()
-        self._turns.take(self, self._handle_events)
+        elif not self._turns.take(self, self._handle_events):
+            self.flow.pause_reading()  # the turn resumes it
 
     def _handle_events(self) -> None:
         if self.transport.is_closing():

@@ -29,8 +29,10 @@ class RequestTurns:
         self._waiting: dict[object, Callable[[], None]] = {}
         self._is_scheduled = False
 
-    def take(self, connection: object, read: Callable[[], None]) -> None:
+    def take(self, connection: object, read: Callable[[], None]) -> bool:
         """Call `read` now or later, in the order of calls; a waiting connection keeps its place.
+
+        Return whether `read` was called.
 
         Args:
             connection: the connection, which waits for at most one turn.
@@ -38,10 +40,11 @@ class RequestTurns:
         """
         if self._waiting or not self._left:
             self._waiting.setdefault(connection, read)
-            return
+            return False
         self._left -= 1
         self._schedule()
         read()
+        return True
 
     def remove(self, connection: object) -> None:
         """Remove a lost connection."""
