@@ -1,7 +1,8 @@
 """Turns for the requests of all visitors, so that a crowd does not delay the ticks of a page.
 
 Layer 5. The event loop runs everything that is ready before it reads sockets again. Hundreds of
-requests that arrive together would therefore delay a tick by more than a lease.
+requests that arrive together would therefore delay a tick by more than a lease. Decision record:
+docs/decisions/0051-a-crowd-waits-for-turns.md.
 """
 
 import asyncio
