@@ -83,3 +83,33 @@ def test_stops_that_are_enough_for_now_are_not_made_anew() -> None:
     it.tick(speed=0.6)
     it.frames.send()
     assert it.heard() == ["arm drive", "11 drive speed=0.5", "12 drive speed=0.6"]
+
+
+def test_who_loses_the_right_to_drive_loses_the_lease_and_the_motion() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    it.controller.change(Operator("ann", "ann", "watch"))
+    assert it.controller.lease.state.holder is None
+    assert it.heard() != []
+    assert it.tick(speed=0.5) != ""
+
+
+def test_rights_that_still_allow_driving_end_no_motion() -> None:
+    """Neither do the lost rights of another page, nor those of an unknown one."""
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    for client in (
+        Operator("ann", "ann", "maintain"),
+        Operator("bob", "bob", "watch"),
+        Operator("zoe", "zoe", "watch"),
+    ):
+        it.controller.change(client)
+    holder = it.controller.lease.state.holder
+    assert holder is not None
+    assert holder.id == "ann"
+    assert it.heard() == []
+    assert it.tick(speed=0.5) == ""
