@@ -5,10 +5,10 @@ document matches the server.
 """
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Iterable
 from functools import cache
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import msgspec
 from starlette.requests import Request
@@ -61,8 +61,10 @@ def api_document() -> bytes:
     _, components = msgspec.json.schema_components(
         list(dict.fromkeys([*kinds, Failure])), ref_template="#/components/schemas/{name}"
     )
-    for kind in _messages(msgspec.Struct):
-        _describe(components.get(kind.__name__, {}), kind)
+    messages: set[type[msgspec.Struct]] = set()
+    _messages([*kinds, Failure], messages)
+    for message in messages:
+        _describe(components[message.__name__], message)
     paths: dict[str, dict[str, Any]] = {}
     for call in CALLS:
         paths.setdefault(call.path, {})[call.method.lower()] = _operation(call)
@@ -75,11 +77,15 @@ def api_document() -> bytes:
     return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"
 
 
-def _messages(base: type[msgspec.Struct]) -> Iterator[type[msgspec.Struct]]:
-    """Yield all message types."""
-    for one in base.__subclasses__():
-        yield one
-        yield from _messages(one)
+def _messages(annotations: Iterable[object], found: set[type[msgspec.Struct]]) -> None:
+    """Add all message types in `annotations`, and in the fields of these types, to `found`."""
+    for one in annotations:
+        if isinstance(one, type) and issubclass(one, msgspec.Struct):
+            if one not in found:
+                found.add(one)
+                _messages((field.type for field in msgspec.structs.fields(one)), found)
+        else:
+            _messages(get_args(one), found)
 
 
 def _describe(schema: dict[str, Any], message: type[msgspec.Struct]) -> None:

@@ -67,13 +67,13 @@ class AlarmInfo(AlarmMessage, frozen=True):
     began_at: float
     """Time of the activation, in seconds since 1970 (UTC)."""
     returned_at: float
-    """Time of the return to normal, as above; 0 while the alarm is active."""
+    """Time of the return to normal, in seconds since 1970 (UTC); 0 while active."""
     acknowledged_at: float
-    """Time of the acknowledgement, as above; 0 for an unacknowledged alarm."""
+    """Time of the acknowledgement, in seconds since 1970 (UTC); 0 if unacknowledged."""
     acknowledged_by: str
     """Name of the person or program that acknowledged the alarm, or ""."""
     shelved_until: float
-    """Time at which shelving ends, as above; 0 if the alarm is not shelved."""
+    """Time at which shelving ends, in seconds since 1970 (UTC); 0 if unshelved."""
     shelved_by: str
     """Name of the person or program that shelved the alarm, or ""."""
 

@@ -175,9 +175,9 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     used_at: float | None
     """Last request of an open sign-in, in seconds since 1970 (UTC), or null."""
     created_at: float
-    """Time of the creation, as above."""
+    """Time of the creation, in seconds since 1970 (UTC)."""
     ends_at: float | None
-    """Time at which the access ends, as above; null if it does not end."""
+    """Time at which the access ends, in seconds since 1970 (UTC); null for never."""
 
 
 class PrincipalList(PeopleMessage, frozen=True):
@@ -201,7 +201,7 @@ class SignInInfo(PeopleMessage, frozen=True):
     created_at: float
     """Time of the sign-in, in seconds since 1970 (UTC)."""
     used_at: float
-    """Time of the last request, as above."""
+    """Time of the last request, in seconds since 1970 (UTC)."""
     ends_at: float | None
     """Time at which the sign-in ends if it is not used again."""
     is_own: bool
