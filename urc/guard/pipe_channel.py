@@ -64,6 +64,7 @@ class PipeChannel:
         self._pipe: Pipe | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._is_up = asyncio.Event()
+        self._is_heard = asyncio.Event()
         self._is_finishing = False
         self._gone = asyncio.Event()
         self._look: asyncio.TimerHandle | None = None
@@ -97,6 +98,10 @@ class PipeChannel:
         """Return after a guard has been initialised."""
         await self._is_up.wait()
 
+    async def started(self) -> None:
+        """Return after the first message of the first guard."""
+        await self._is_heard.wait()
+
     def now(self) -> float:
         """Return this machine's monotonic time in seconds, shared with the guard process."""
         return time.monotonic()
@@ -104,6 +109,7 @@ class PipeChannel:
     def _handle(self, message: messages.FromGuard) -> None:
         self._silent_looks = self._kept_looks = 0
         self._was_heard = True
+        self._is_heard.set()
         self._has_served |= isinstance(message, messages.LineOpened)
         self._listener.handle(message, 0 if self._pipe is None else self._pipe.taken_bytes)
 

@@ -160,6 +160,9 @@ class FakeRobot:
         finally:
             self.is_open = False
 
+    async def started(self) -> None:
+        """Return at once, because a test has no guard process."""
+
     async def command(
         self,
         name: str,

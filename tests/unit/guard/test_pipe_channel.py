@@ -137,6 +137,19 @@ async def test_guard_is_told_what_there_is(house: House) -> None:
     assert await process.hears(2) == [MAKE, messages.ArmControl("wire", "drive", TERMS)]
 
 
+async def test_guard_has_started_with_its_first_message(house: House) -> None:
+    """Also a guard that ends afterwards has started, so nobody waits for it again."""
+    process = house.begin()
+    starting = asyncio.ensure_future(house.channel.started())
+    await process.hears(1)
+    assert not starting.done()
+    process.pipe.post(messages.Heartbeat(0.0))
+    await starting
+    process.die()
+    await house.nth(2)
+    await house.channel.started()
+
+
 async def test_guard_is_told_what_controls_do(house: House) -> None:
     process = house.begin()
     house.guard.tick("drive", b"nobody armed it")
