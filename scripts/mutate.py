@@ -77,6 +77,7 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
         **os.environ,
         "PYTHONPATH": str(COPY / "mutants"),
         "URC_TEST_TIMEOUT_S": str(_TEST_S),
+        "URC_ALL_CASES": "1",  # a case that is not drawn kills no mutant
     }
     process = subprocess.Popen(command, cwd=COPY, env=environment)
     try:

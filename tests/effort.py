@@ -1,7 +1,8 @@
 """How many examples a property is tried on, and which cases of a large table are tried.
 
 The everyday run is quick; ``URC_THOROUGH=1`` tries twelve times as many examples, and all cases.
-``./dev bench --full tests_thorough`` runs all these tests in this way.
+``./dev bench --full tests_thorough`` runs all these tests in this way. ``URC_ALL_CASES=1`` tries
+all cases with the everyday number of examples; `./dev mutate` sets it.
 """
 
 import os
@@ -15,6 +16,7 @@ from typing import TypeVar
 __all__ = ["IS_THOROUGH", "examples", "sampled", "seed"]
 
 IS_THOROUGH = bool(os.environ.get("URC_THOROUGH"))
+_HAS_ALL_CASES = IS_THOROUGH or bool(os.environ.get("URC_ALL_CASES"))
 
 
 _Case = TypeVar("_Case")
@@ -31,7 +33,7 @@ def sampled(cases: Sequence[_Case], most: int, table: str = "") -> list[_Case]:
     Each commit tries other cases. The same commit tries the same ones on each machine and in each
     process, so a failure can be repeated. Tables with different names have independent samples.
     """
-    if IS_THOROUGH or len(cases) <= most:
+    if _HAS_ALL_CASES or len(cases) <= most:
         return list(cases)
     choose = random.Random(seed() + table)  # noqa: S311 - selects tests
     return [cases[number] for number in sorted(choose.sample(range(len(cases)), most))]

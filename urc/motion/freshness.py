@@ -77,7 +77,7 @@ class Freshness:
             number: number of the release, which shares one count with the inputs; 0 for none.
             of: the released control.
         """
-        self._newest[of] = max(number, self._newest.get(of, -1))
+        self._newest[of] = max(number, self._newest.get(of, 0))
 
 
 class DuplicateElimination:

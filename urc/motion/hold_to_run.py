@@ -198,5 +198,4 @@ class HoldToRun:
     def restored(self, now: float) -> None:
         """Record that the connection is restored; an owed stop is sent first."""
         if self.owes_stop:
-            self.state = "idle"
             self.stop("revoked", now)

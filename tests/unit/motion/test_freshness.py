@@ -46,6 +46,15 @@ def test_no_input_from_before_a_release_counts_after_it() -> None:
     assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.0, "turn") == ""
 
 
+def test_a_release_without_a_number_refuses_no_later_input() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(10.0)
+    fresh.release(0)
+    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.0) == ""
+    fresh.release(4)
+    assert fresh.refusal(ControlInput(3, 4, echo), 3, 10.0) != ""
+
+
 def test_ticks_are_remembered_in_a_bounded_way() -> None:
     fresh = Freshness()
     first = fresh.issue(0.0)
