@@ -41,6 +41,14 @@ _ABOUT: Final = (
     "Programs send `Authorization: Bearer TOKEN` with each request. Times are in seconds. The"
     " WebSocket `/ws` also streams a robot's values, and is better for motion."
 )
+_IN_PATH: Final = {
+    "name": "Name of the robot, as in its document.",
+    "signal": "Name of the signal.",
+    "command": "Name of the command.",
+    "file": "File name of the recording, as in the list of recordings.",
+    "id": "Identifier of the pairing.",
+}
+"""Descriptions of the parameters in paths."""
 _ALL: Final = (413, 429, 503)
 """Failures of every call: an oversized request, or too many requests or connections."""
 
@@ -101,7 +109,14 @@ def _operation(call: Call) -> dict[str, Any]:
     names = [part[1:-1] for part in call.path.split("/") if part.startswith("{")]
     text = {"type": "string", "minLength": 1}
     parameters: list[dict[str, Any]] = [
-        {"name": one, "in": "path", "required": True, "schema": text} for one in names
+        {
+            "name": one,
+            "in": "path",
+            "required": True,
+            "description": _IN_PATH[one],
+            "schema": text,
+        }
+        for one in names
     ]
     parameters += [
         {

@@ -102,6 +102,14 @@ def test_a_release_goes_on_in_the_same_lease() -> None:
     assert it.heard() == ["arm drive", "drive speed=0.5", "release drive", "drive speed=0.2"]
 
 
+def test_a_release_without_a_number_voids_no_later_tick() -> None:
+    """Such as that of a page that lost the robot before it sent a tick."""
+    it = Scene()
+    it.drive("ann", "take")
+    it.controller.release("ann", "drive")
+    assert it.tick(speed=0.2) == "", "this is tick 1"
+
+
 def test_every_change_of_the_holder_goes_through_a_stop() -> None:
     """Handed over, forced, given back, gone: what moved is stopped, the old epoch is void."""
     it = Scene()

@@ -11,10 +11,8 @@ import os
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Final, Protocol, TypeVar
 
-__all__ = ["GUARDS_AT_ONCE", "START_TIMEOUT_S", "SessionStarts"]
+__all__ = ["START_TIMEOUT_S", "SessionStarts"]
 
-GUARDS_AT_ONCE: Final = os.cpu_count() or 1
-"""Maximum number of guards that start at the same time."""
 START_TIMEOUT_S: Final = 2.0
 """Maximum time for which a guard's start delays other starts, in seconds."""
 
@@ -29,16 +27,15 @@ _Session = TypeVar("_Session", bound=_Starting)
 class SessionStarts:
     """The starts of sessions on one server, in the order of requests."""
 
-    def __init__(
-        self, *, at_once: int = GUARDS_AT_ONCE, timeout_s: float = START_TIMEOUT_S
-    ) -> None:
+    def __init__(self, *, at_once: int | None = None, timeout_s: float = START_TIMEOUT_S) -> None:
         """Begin without starts.
 
         Args:
-            at_once: maximum number of guards that start at the same time.
+            at_once: maximum number of guards that start at the same time; None for the number of
+                processors.
             timeout_s: maximum time for which a guard's start delays other starts, in seconds.
         """
-        self._at_once = at_once
+        self._at_once = (os.cpu_count() or 1) if at_once is None else at_once
         self._timeout_s = timeout_s
         self._starting = 0
         """Number of guards that are starting."""
