@@ -33,6 +33,7 @@ def headings(name: str) -> list[str]:
     return re.findall(r"^##+ (.+)$", text_of(name), re.MULTILINE)
 
 
+@pytest.mark.cases(100)
 @pytest.mark.parametrize("name", PAGES)
 def test_page_is_what_the_code_says(name: str) -> None:
     """A schema, an option or a message that was changed needs `python -m scripts.reference`."""
