@@ -13,6 +13,7 @@ from websockets.asyncio.server import ServerConnection, serve
 
 import urc
 from bench.rig.ros_messages import ROS1, ROS2, RandomMessages
+from tests.e2e.transports.authority import Authority
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from urc.client.local import ConnectedRobot
 from urc.problems import UrcError
@@ -104,9 +105,12 @@ def rover() -> Iterator[FoxgloveRobot]:
 
 
 @asynccontextmanager
-async def connected(folder: Path, port: int, bridge: str = "auto") -> AsyncIterator[ConnectedRobot]:
+async def connected(
+    folder: Path, port: int, bridge: str = "auto", tls: str = ""
+) -> AsyncIterator[ConnectedRobot]:
     file = folder / "rover.yaml"
-    file.write_text(ROVER, "utf-8")
+    line = "    version: auto\n"
+    file.write_text(ROVER.replace(line, f"{line}    tls: {tls}\n" if tls else line), "utf-8")
     async with urc.connect(urc.load(file), port=port, bridge=bridge) as robot:
         await until(lambda: robot.session.frames.is_ready("drive"))
         yield robot
@@ -123,6 +127,45 @@ async def until(is_met: Callable[[], object], repeat: Callable[[], object] | Non
             if repeat is not None:
                 repeat()
             await asyncio.sleep(0.05)
+
+
+@pytest.mark.parametrize("bridge", ["auto", "foxglove"])
+async def test_real_server_is_read_and_commanded_over_tls(tmp_path: Path, bridge: str) -> None:
+    authority = Authority(tmp_path)
+    pair = authority.sign("127.0.0.1")
+    certificate, key = Path(pair.cert).read_bytes(), Path(pair.key).read_bytes()
+    rover = FoxgloveRobot(tls_cert=certificate, tls_key=key)
+    odometry = RandomMessages(ROS2, seed=13).message(ODOMETRY)
+    odometry.pose.pose.position.x = 4.5
+    try:
+        trusted = f"{{ ca: '{authority.file}' }}"
+        async with connected(tmp_path, rover.port, bridge, trusted) as robot:
+            await until(
+                lambda: value(robot, "x") == 4.5,
+                lambda: rover.publish("/odom", ODOMETRY, odometry),
+            )
+            await robot.command("say", text="over TLS")
+            await until(lambda: any(topic == "/say" for topic, _ in rover.heard))
+    finally:
+        rover.close()
+
+
+async def test_real_server_of_an_unknown_authority_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    authority, other = Authority(tmp_path), Authority(tmp_path / "other")
+    pair = other.sign("127.0.0.1")
+    certificate, key = Path(pair.cert).read_bytes(), Path(pair.key).read_bytes()
+    rover = FoxgloveRobot(tls_cert=certificate, tls_key=key)
+    file = tmp_path / "rover.yaml"
+    line = "    version: auto\n"
+    file.write_text(ROVER.replace(line, f"{line}    tls: {{ ca: '{authority.file}' }}\n"), "utf-8")
+    try:
+        async with urc.connect(urc.load(file), port=rover.port, bridge="foxglove") as robot:
+            links = robot.session.hub.links
+            await until(lambda: "unknown authority" in links["ros"].detail)
+            assert rover.advertised == [], "no message leaves before the certificate is checked"
+    finally:
+        rover.close()
 
 
 @pytest.mark.parametrize("bridge", ["auto", "foxglove"])
