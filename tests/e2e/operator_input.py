@@ -26,13 +26,15 @@ FOCUSED = "(el) => el.contains(document.activeElement)"
 class Told:
     """What a server and its page have told each other.
 
-    These are the newest values by signal, the lease, and the arguments of the newest tick.
+    These are the newest values by signal, the lease, the arguments of the newest tick, and the
+    number of ticks.
     """
 
     def __init__(self, page: Page) -> None:
         self.values: dict[str, Any] = {}
         self.lease: dict[str, Any] = {}
         self.wanted: dict[str, Any] = {}
+        self.ticks = 0
         self._names: list[str] = []
         page.on("websocket", self._watch)
 
@@ -44,6 +46,7 @@ class Told:
         message: dict[str, Any] = json.loads(frame) if isinstance(frame, str) else {"t": "bytes"}
         if message["t"] == "tick":
             self.wanted = message["arguments"]
+            self.ticks += 1
 
     def _take(self, frame: str | bytes) -> None:
         message: dict[str, Any] = json.loads(frame) if isinstance(frame, str) else {"t": "image"}

@@ -12,6 +12,8 @@ FULL_PX = 120
 MOVING, STILL = 0.02, 0.005
 """Speeds of the robot that count as driven and as stopped, in m/s."""
 NEARLY = 0.9
+PUSHED_TICKS = 10
+"""Number of ticks after which all ticks on their way show the whole push, not its first half."""
 SKIP = ".urc-skip"
 CARD = "[data-robot-card]:has([data-alarms]:not([hidden])) h2 a"
 STICK, STOP = ".joystick-pad", "[data-stop-button]"
@@ -52,7 +54,8 @@ class Hand:
         """Drive, choose half of the speed while holding, and let go."""
         self.input.begin()
         await self.drive()
-        await until(self.has_reached_its_speed)
+        pushed = self.told.ticks + PUSHED_TICKS
+        await until(lambda: self.told.ticks > pushed and self.has_reached_its_speed())
         fast = self.speed()
         await self.choose_slowest()
         await until(lambda: STILL < self.speed() < 0.6 * fast)
