@@ -112,3 +112,19 @@ async def test_start_that_is_given_up_in_its_turn_gives_it_back() -> None:
         first.guard.set()
         assert await tasks[2] is third
         assert not second.is_open
+
+
+async def test_turn_of_a_start_that_was_just_given_up_goes_to_the_next() -> None:
+    starts, (first, second, third) = SessionStarts(at_once=1), (Starting(), Starting(), Starting())
+    async with AsyncExitStack() as stack:
+        tasks = await begin(stack, starts, first, second, third)
+        tasks[1].cancel()
+        starts.hurry(second)
+        first.guard.set()
+        assert await tasks[2] is third
+        assert not second.is_open
+        fourth = asyncio.create_task(starts.enter(stack, (other := Starting()).open(), other))
+        await settle()
+        assert not fourth.done(), "the third guard is still starting"
+        third.guard.set()
+        assert await fourth is other

@@ -78,7 +78,7 @@ class SessionStarts:
     def hurry(self, robot: object) -> None:
         """Start a waiting robot's session now; for any other robot, do nothing."""
         turn = self._waiting.pop(robot, None)
-        if turn is not None:
+        if turn is not None and not turn.cancelled():
             self._starting += 1
             turn.set_result(None)
 
@@ -90,8 +90,9 @@ class SessionStarts:
         try:
             await turn
         except asyncio.CancelledError:
-            if self._waiting.pop(robot, None) is None:
-                self._end_turn()  # granted in the moment of the cancellation
+            self._waiting.pop(robot, None)
+            if not turn.cancelled():  # granted in the moment of the cancellation
+                self._end_turn()
             raise
 
     def _end_turn(self) -> None:
