@@ -117,6 +117,14 @@ def test_a_cut_line_gets_the_stop_first_and_nothing_old() -> None:
     assert held.due(9.0, is_clear=True) is None
 
 
+def test_a_control_whose_line_is_cut_is_idle_and_waits_for_no_time() -> None:
+    held = hold_to_run()
+    held.tick(b"go", 1.0)
+    held.cut()
+    assert held.state == "idle"
+    assert held.deadline is None
+
+
 def test_a_line_that_is_cut_while_idle_gets_nothing() -> None:
     held = hold_to_run()
     held.cut()
