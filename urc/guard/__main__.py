@@ -72,7 +72,13 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
         due_s = loop.time() + BEAT_S
         loop.call_at(due_s, heartbeat)
 
-    heartbeat()
+    def begin() -> None:
+        priority.request()  # after a refusal the priority is ordinary: see `urc doctor`
+        heartbeat()
+
+    # A timer runs after the first messages have been read, which load the transports. Loading
+    # takes longer than real-time priority allows, and the first heartbeat ends the guard's turn.
+    loop.call_later(0.0, begin)
     await over.wait()
     with suppress(TimeoutError):
         async with asyncio.timeout(FINISH_S + _GRACE_S):
@@ -101,9 +107,7 @@ def main() -> None:
     OWN_DOORS.learn(sys.argv[2:])
     gc.collect()
     gc.freeze()  # excludes all loaded modules from later collections
-    priority = RealTimePriority()
-    priority.request()  # after a refusal the priority is ordinary: see `urc doctor`
-    run(_guard(line, priority))
+    run(_guard(line, RealTimePriority()))
 
 
 if __name__ == "__main__":

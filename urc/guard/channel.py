@@ -75,8 +75,5 @@ class Channel(Protocol):
     async def ready(self) -> None:
         """Return once a guard is ready."""
 
-    async def started(self) -> None:
-        """Return once a guard has sent its first message."""
-
     def now(self) -> float:
         """Return the guard's time, in seconds."""

@@ -106,10 +106,6 @@ class GuardClient:
         """Start the guard; requires a running event loop."""
         self.channel.start()
 
-    async def started(self) -> None:
-        """Return after the guard has sent its first message."""
-        await self.channel.started()
-
     async def finish(self) -> None:
         """Stop all commands that may be moving, close every connection, and end the guard."""
         await self.channel.finish()

@@ -52,9 +52,6 @@ class LocalChannel:
     async def ready(self) -> None:
         """Return at once."""
 
-    async def started(self) -> None:
-        """Return at once."""
-
     def now(self) -> float:
         """Return the clock's current time, in seconds."""
         return self._clock.now()

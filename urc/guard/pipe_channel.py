@@ -4,6 +4,9 @@ Theory of operation. The guard sends a heartbeat ten times a second. A guard tha
 been silent for half a second, is killed and replaced immediately. A guard that waits for processor
 time is not replaced, because a new guard would also wait. A new guard has no state, so the client
 initialises it first.
+
+The first guard waits for its turn (`urc.guard.start_turns`), unless a stop must be sent. A guard
+that replaces another guard does not wait.
 """
 
 import asyncio
@@ -19,6 +22,7 @@ from urc.guard import messages
 from urc.guard.channel import ChannelListener
 from urc.guard.pipe import Pipe
 from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState, launch, reap, standing
+from urc.guard.start_turns import StartTurns, start_turns
 
 __all__ = ["CAN_GUARD", "PipeChannel"]
 
@@ -63,8 +67,8 @@ class PipeChannel:
         self._decoder = messages.decoder_of_server()
         self._pipe: Pipe | None = None
         self._process: subprocess.Popen[bytes] | None = None
+        self._turns: StartTurns | None = None
         self._is_up = asyncio.Event()
-        self._is_heard = asyncio.Event()
         self._is_finishing = False
         self._gone = asyncio.Event()
         self._look: asyncio.TimerHandle | None = None
@@ -88,6 +92,8 @@ class PipeChannel:
         """Send a message; without a guard, drop the message. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
+        elif is_urgent and self._turns is not None:
+            self._turns.hurry(self)  # the first messages to the new guard contain the stop
 
     def drop(self, slot: str) -> None:
         """Discard a slot's unsent message."""
@@ -98,25 +104,30 @@ class PipeChannel:
         """Return after a guard has been initialised."""
         await self._is_up.wait()
 
-    async def started(self) -> None:
-        """Return after the first message of the first guard."""
-        await self._is_heard.wait()
-
     def now(self) -> float:
         """Return this machine's monotonic time in seconds, shared with the guard process."""
         return time.monotonic()
 
     def _handle(self, message: messages.FromGuard) -> None:
         self._silent_looks = self._kept_looks = 0
-        self._was_heard = True
-        self._is_heard.set()
+        if not self._was_heard:
+            self._was_heard = True
+            self._end_turn()
         self._has_served |= isinstance(message, messages.LineOpened)
         self._listener.handle(message, 0 if self._pipe is None else self._pipe.taken_bytes)
 
     # -- from start to end
 
     def start(self) -> None:
-        """Start and initialise the guard process; requires a running event loop."""
+        """Start and initialise the guard process in its turn; requires a running event loop."""
+        self._turns = start_turns()
+        self._turns.take(self, self._launch)
+
+    def _end_turn(self) -> None:
+        if self._turns is not None:
+            self._turns.end(self)
+
+    def _launch(self) -> None:
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
@@ -124,7 +135,8 @@ class PipeChannel:
         except OSError as fault:
             log.error("the guard cannot be started (%s)", fault)
             self._is_up.clear()
-            self._look = loop.call_later(_AGAIN_S, self.start)
+            self._look = loop.call_later(_AGAIN_S, self._launch)
+            loop.call_soon(self._end_turn)  # later, because the next start may fail too
             return
         self._was_heard = self._has_served = False
         self._silent_looks = self._kept_looks = 0
@@ -168,6 +180,7 @@ class PipeChannel:
         await asyncio.shield(self._ending)
 
     async def _end(self) -> None:
+        self._end_turn()
         if self._look is not None:
             self._look.cancel()
         if self._entering is not None and not self._entering.done():
@@ -238,10 +251,10 @@ class PipeChannel:
         self._short_lives = self._short_lives + 1 if is_short else 0
         self._gone.clear()
         if self._short_lives < _AT_ONCE:
-            self.start()
+            self._launch()
         else:
             self._is_up.clear()
-            self._look = loop.call_later(_AGAIN_S, self.start)
+            self._look = loop.call_later(_AGAIN_S, self._launch)
         self._listener.lost(_DIED)
 
     def _bury(self) -> None:

@@ -286,11 +286,6 @@ class Session:
             return outcome._replace(values=self._redactor.value(outcome.values))
         return outcome
 
-    async def started(self) -> None:
-        """Return after the guard process has started; without a guard process, return at once."""
-        if self.backend is not None:
-            await self.backend.started()
-
     async def settle(self) -> str:
         """Wait until all sent data has arrived; call this method before closing the session.
 

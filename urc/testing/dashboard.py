@@ -160,9 +160,6 @@ class FakeRobot:
         finally:
             self.is_open = False
 
-    async def started(self) -> None:
-        """Return at once, because a test has no guard process."""
-
     async def command(
         self,
         name: str,

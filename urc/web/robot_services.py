@@ -1,5 +1,6 @@
 """The services of all robots on a server, with stored latches, alarms and audit entries."""
 
+import asyncio
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -18,7 +19,6 @@ from urc.web.alarms.notifier import AlarmNotifier
 from urc.web.alarms.routes import alarm_key
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robots import Robot, RobotService
-from urc.web.fleet.session_starts import SessionStarts
 
 __all__ = ["Stores", "fleet_of", "latch_of"]
 
@@ -36,7 +36,7 @@ class Stores(NamedTuple):
 
 def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fleet:
     """Return the fleet; each robot stays connected for `linger_s` after its last page."""
-    starts = SessionStarts()
+    start_lock = asyncio.Lock()
     return Fleet(
         robots,
         lambda name, robot: RobotService(
@@ -44,7 +44,7 @@ def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fl
             linger_s=linger_s,
             latch=latch_of(stores.data, robot),
             recorder=_recorder(stores.audit, name, robot),
-            starts=starts,
+            start_lock=start_lock,
             alarms=_alarms(stores, name, robot),
         ),
     )

@@ -38,9 +38,6 @@ class FakeChannel:
     def drop(self, slot: str) -> None:
         pass
 
-    async def started(self) -> None:
-        self.told.append("started")
-
     async def ready(self) -> None:
         pass
 
@@ -72,14 +69,12 @@ def told(guard: GuardClient) -> list[object]:
 
 async def test_control_is_armed_on_its_line(guard: GuardClient) -> None:
     guard.start()
-    await guard.started()
     guard.arm("drive", TERMS)
     guard.arm("lift", TERMS)
     guard.release("drive")
     await guard.finish()
     assert told(guard) == [
         "start",
-        "started",
         messages.ArmControl("wire", "drive", TERMS),
         messages.ArmControl("air", "lift", TERMS),
         messages.ReleaseControl("drive"),

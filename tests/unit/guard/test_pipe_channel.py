@@ -14,6 +14,7 @@ from urc.guard.guard_client import GuardClient
 from urc.guard.pipe import Pipe
 from urc.guard.pipe_channel import PipeChannel
 from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState
+from urc.guard.start_turns import StartTurns
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
 
@@ -137,17 +138,70 @@ async def test_guard_is_told_what_there_is(house: House) -> None:
     assert await process.hears(2) == [MAKE, messages.ArmControl("wire", "drive", TERMS)]
 
 
-async def test_guard_has_started_with_its_first_message(house: House) -> None:
-    """Also a guard that ends afterwards has started, so nobody waits for it again."""
-    process = house.begin()
-    starting = asyncio.ensure_future(house.channel.started())
+@pytest.fixture
+async def turns(monkeypatch: pytest.MonkeyPatch) -> StartTurns:
+    """One turn, which another guard has."""
+    made = StartTurns(1)
+    made.take("other", lambda: None)
+    monkeypatch.setattr(pipe_channel, "start_turns", lambda: made)
+    return made
+
+
+async def test_guard_starts_in_its_turn_and_keeps_it_until_its_first_message(
+    house: House, turns: StartTurns
+) -> None:
+    house.guard.start()
+    assert house.started == []
+    turns.end("other")
+    process = await house.nth(1)
+    later: list[str] = []
+    turns.take("later", lambda: later.append("launched"))
     await process.hears(1)
-    assert not starting.done()
+    assert later == []
     process.pipe.post(messages.Heartbeat(0.0))
-    await starting
+    await house.until(lambda: later)
+
+
+async def test_guard_that_must_stop_its_robot_waits_for_no_turn(
+    house: House, turns: StartTurns
+) -> None:
+    house.guard.start()
+    house.guard.arm("drive", TERMS)
+    assert house.started == []
+    house.guard.stop({"drive": STOP})
+    process = await house.nth(1)
+    assert await process.hears(2) == [
+        MAKE,
+        messages.RecoverStop("wire", "drive", TERMS._replace(stop=STOP)),
+    ]
+
+
+async def test_guard_that_is_not_needed_any_more_is_never_started(
+    house: House, turns: StartTurns
+) -> None:
+    house.guard.start()
+    await house.guard.finish()
+    turns.end("other")
+    await settle()
+    assert house.started == []
+
+
+async def test_guard_that_cannot_be_launched_or_has_ended_gives_its_turn_back(
+    house: House, turns: StartTurns
+) -> None:
+    later: list[str] = []
+    house.fault = OSError("no process")
+    house.guard.start()
+    turns.take("second", lambda: later.append("second"))
+    turns.end("other")
+    await house.until(lambda: later == ["second"])
+    house.fault = None
+    process = await house.nth(1)
+    turns.take("third", lambda: later.append("third"))
+    turns.end("second")
+    assert later == ["second", "third"], "the retry has no turn"
     process.die()
     await house.nth(2)
-    await house.channel.started()
 
 
 async def test_guard_is_told_what_controls_do(house: House) -> None:

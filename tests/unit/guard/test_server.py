@@ -141,11 +141,17 @@ class Ran:
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
         self.looks = 0
+        self.begun: list[str] = []
         self.ended: list[int] = []
         self.task = asyncio.ensure_future(program._guard(theirs, self))  # type: ignore[arg-type]
         self.server = Server(ours)
 
+    def request(self) -> str:
+        self.begun.append("precedence")
+        return ""
+
     def retry(self) -> None:
+        self.begun.append("beat")
         self.looks += 1
 
     async def over(self) -> None:
@@ -160,9 +166,14 @@ async def ran(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ran]:
     monkeypatch.setattr(program.logging, "shutdown", lambda: None)
     monkeypatch.setattr(program, "BEAT_S", 0.01)
     yield made
-    made.server.pipe.end()
-    await made.over()
-    made.server.pipe.close()
+    await ended(made)
+
+
+async def ended(ran: Ran) -> None:
+    """End the guard by its pipe."""
+    ran.server.pipe.end()
+    await ran.over()
+    ran.server.pipe.close()
     for name in (signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().remove_signal_handler(name)
 
@@ -174,6 +185,23 @@ async def test_guard_beats_and_looks_at_its_precedence(ran: Ran) -> None:
     assert beats[0].late_s < 1.0
     assert all(-0.001 <= heartbeat.late_s < BOUND_S for heartbeat in beats)
     assert ran.looks >= 5
+
+
+async def test_guard_loads_its_transports_before_it_asks_for_precedence_and_beats(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Loading takes longer than the precedence allows, and the first beat says that it is over."""
+    begun: list[str] = []
+    monkeypatch.setattr(GuardServer, "_make", lambda self, made: begun.append("load"))
+    monkeypatch.setattr(program.os, "_exit", lambda code: None)
+    monkeypatch.setattr(program.logging, "shutdown", lambda: None)
+    ran = Ran()
+    ran.begun = begun
+    ran.server.pipe.post(MAKE)
+    ran.server.pipe.post(MAKE)
+    await ran.server.hears(messages.Heartbeat)
+    assert begun[:4] == ["load", "load", "precedence", "beat"]
+    await ended(ran)
 
 
 async def drive(ran: Ran) -> CountedWire:
@@ -272,7 +300,7 @@ def test_guard_says_its_word_at_the_door(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C is for the server; what is loaded stays; then precedence is asked for."""
+    """Ctrl-C is for the server; what is loaded stays."""
     ours, theirs = socket.socketpair()
     done: list[object] = []
     monkeypatch.setattr(sys, "argv", ["guard", str(theirs.detach()), "a door of ours"])
@@ -280,7 +308,6 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(signal, "signal", lambda *told: done.append(told))
     monkeypatch.setattr(logging, "basicConfig", lambda **told: done.append(told["level"]))
     monkeypatch.setattr(gc, "freeze", lambda: done.append("freeze"))
-    monkeypatch.setattr(RealTimePriority, "request", lambda self: done.append("ask"))
 
     async def guard(line: socket.socket, priority: RealTimePriority) -> None:
         line.sendall(b"here")
@@ -294,7 +321,7 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
         assert ours.recv(10) == b"here"
     assert done == [
         (signal.SIGINT, signal.SIG_IGN), logging.WARNING,
-        "a door of ours", "freeze", "ask", RealTimePriority,
+        "a door of ours", "freeze", RealTimePriority,
     ]  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import pytest
 
-from urc.model.driver import Command, Hold, WriteSpec
 from urc.model.profile import Setting
 from urc.model.values import Signal
 from urc.problems import UrcError
@@ -17,21 +16,20 @@ from urc.runtime.clock import Timer
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.fleet.robots import LINGER_S, Robot, RobotService, SessionFailed, missing_settings
-from urc.web.fleet.session_starts import SessionStarts
 
 pytestmark = pytest.mark.anyio
 
 
 @asynccontextmanager
 async def stationed(
-    robot: FakeRobot, clock: FakeClock, opener: object = None, starts: SessionStarts | None = None
+    robot: FakeRobot, clock: FakeClock, opener: object = None, turn: asyncio.Lock | None = None
 ) -> AsyncIterator[RobotService]:
     """Run a service for the fake robot."""
     open_session = opener or robot.open
     service = RobotService(
         Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
         clock=clock,
-        starts=starts,
+        start_lock=turn,
     )
     task = asyncio.create_task(service.run())
     try:
@@ -63,7 +61,7 @@ async def test_the_session_lives_from_the_first_client_to_the_last() -> None:
 
 async def test_sessions_that_start_together_leave_room_for_input_between_two() -> None:
     """The start of a session blocks the loop; a robot that is driven waits for one at most."""
-    starts, seen = SessionStarts(at_once=3), list[str]()
+    turn, seen = asyncio.Lock(), []
     clock = FakeClock()
 
     @asynccontextmanager
@@ -82,15 +80,15 @@ async def test_sessions_that_start_together_leave_room_for_input_between_two() -
         for number in range(3):
             robot = FakeRobot(dashboard_profile(), clock)
             service = await stack.enter_async_context(
-                stationed(robot, clock, partial(opened, number), starts)
+                stationed(robot, clock, partial(opened, number), turn)
             )
             stack.enter_context(service.visit())
         driving = asyncio.create_task(drive())
         await settle()
         driving.cancel()
-    began = [at for at, what in enumerate(seen) if what != "input"]
-    assert len(began) == 3
-    assert all("input" in seen[one:other] for one, other in pairwise(began))
+    starts = [at for at, what in enumerate(seen) if what != "input"]
+    assert len(starts) == 3
+    assert all("input" in seen[one:other] for one, other in pairwise(starts))
 
 
 async def test_a_reload_keeps_the_session() -> None:
@@ -291,26 +289,3 @@ async def test_a_robot_without_alarms_or_settings_is_not_monitored() -> None:
             service.replace(replace(service.robot, is_monitored=True))
             await clock.advance(5)
             assert (robot.opened, robot.is_open) == (0, False)
-
-
-async def test_robot_that_is_stopped_while_it_waits_for_its_turn_connects_at_once() -> None:
-    starts, clock = SessionStarts(at_once=0), FakeClock()
-    robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock, starts=starts) as service:
-        with service.visit():
-            await settle()
-            assert robot.opened == 0
-            service.controls.stop("anna")
-            await settle()
-            assert robot.opened == 1
-
-
-async def test_robot_that_owes_a_stop_connects_without_a_turn() -> None:
-    starts, clock = SessionStarts(at_once=0), FakeClock()
-    drive = Command("drive", "wire", WriteSpec("text", {}), hold=Hold(0.05, {}, 0.25))
-    robot = FakeRobot(dashboard_profile(commands={"drive": drive}), clock)
-    async with stationed(robot, clock, starts=starts) as service:
-        service.controls.stop("anna")
-        with service.visit():
-            await settle()
-            assert robot.opened == 1

@@ -276,9 +276,6 @@ class PlaybackSession:
         self.backend: MotionBackend | None = None
         self.on_motion: Callable[[MotionEvent], None] | None = None
 
-    async def started(self) -> None:
-        """Return at once, because a recording has no guard."""
-
     async def command(
         self,
         name: str,

@@ -38,7 +38,6 @@ from urc.web.drive.two_person import TwoPersonRule
 from urc.web.feed.alarm_feed import AlarmFeed
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.feed.fanout import Fanout
-from urc.web.fleet.session_starts import SessionStarts
 
 __all__ = [
     "Glimpse",
@@ -109,9 +108,6 @@ class SessionLike(MotionSession, Protocol):
     @property
     def hub(self) -> Hub:
         """The latest values and link states."""
-
-    async def started(self) -> None:
-        """Return after the guard process has started; without a guard process, return at once."""
 
     async def command(
         self,
@@ -211,7 +207,7 @@ class RobotService:
         clock: Clock | None = None,
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
-        starts: SessionStarts | None = None,
+        start_lock: asyncio.Lock | None = None,
         alarms: RobotAlarms | None = None,
     ) -> None:
         """Prepare the service; the session opens for the first client.
@@ -222,19 +218,19 @@ class RobotService:
             clock: the clock.
             latch: store that preserves a latched STOP across restarts; None stores no latch.
             recorder: receives the audit events; None records no events.
-            starts: turns shared by all of a server's robots; None if the robot is alone.
+            start_lock: lock shared by all of a server's robots, so that sessions start one by one.
             alarms: the robot's alarms; None creates alarms that are not stored.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
         self.controls = ControlService(robot.profile.driver, self.clock, latch, recorder)
         self.consent = TwoPersonRule(lambda: self.controls.operators, self.clock)
-        self.controls.once.on_stopped = self._prepare_stop
+        self.controls.once.on_stopped = self.consent.stop
         self.commands = CommandRunner(self.controls, self.consent, self.clock)
         self.alarms = alarms or RobotAlarms(robot.profile.driver, self.clock, time.time)
         self.alarm_feed = AlarmFeed(self.alarms, self.clock)
         self._linger_s = linger_s
-        self._starts = starts or SessionStarts()
+        self._start_lock = start_lock or asyncio.Lock()
         self._visitors = 0
         self._operators: Counter[str] = Counter()
         self._changed = asyncio.Event()
@@ -313,10 +309,6 @@ class RobotService:
         seen = _view(hub)
         if isinstance(seen, bytes):
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
-
-    def _prepare_stop(self) -> None:
-        self.consent.stop()
-        self._starts.hurry(self)
 
     async def deliver_stop(self) -> bool:
         """Connect if necessary, and wait briefly; return whether the robot received the stop."""
@@ -408,10 +400,12 @@ class RobotService:
     @asynccontextmanager
     async def _opened(self) -> AsyncIterator[SessionLike]:
         async with AsyncExitStack() as stack:
-            owes_stop = not self.controls.controller.is_confirmed
-            yield await self._starts.enter(
-                stack, self.robot.open_session(), self, is_urgent=owes_stop
-            )
+            # The start of a session compiles the driver and launches the guard, which blocks the
+            # loop for up to 40 ms. The pause lets in the input of driven robots between two starts.
+            async with self._start_lock:
+                session = await stack.enter_async_context(self.robot.open_session())
+                await asyncio.sleep(0)
+            yield session
 
     async def _serve(self, session: SessionLike) -> None:
         each = keep_all_signals(self.robot.profile)

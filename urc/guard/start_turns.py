@@ -1,0 +1,74 @@
+"""Turns in which the guards of one event loop start.
+
+A guard needs a processor for 0.1 to 0.4 s to load its modules. Twenty guards that start together
+leave the server too little processor time for the ticks of driven robots. Decision record:
+docs/decisions/0052-guards-start-in-turns.md.
+"""
+
+import asyncio
+import os
+from collections.abc import Callable
+from typing import Final
+from weakref import WeakKeyDictionary
+
+__all__ = ["START_TIMEOUT_S", "StartTurns", "start_turns"]
+
+START_TIMEOUT_S: Final = 2.0
+"""Maximum time for which a guard without a heartbeat keeps its turn, in seconds."""
+_MOST: Final = 4
+"""Maximum number of guards that start at the same time. A container may have fewer processors than
+it sees, so the number of processors alone is no limit."""
+
+
+class StartTurns:
+    """The starting guards, and those that wait for their turn, oldest first."""
+
+    def __init__(self, at_once: int) -> None:
+        """Begin without starts.
+
+        Args:
+            at_once: maximum number of guards that start at the same time.
+        """
+        self._at_once = at_once
+        self._starting: dict[object, asyncio.TimerHandle] = {}
+        self._waiting: dict[object, Callable[[], None]] = {}
+
+    def take(self, guard: object, launch: Callable[[], None]) -> None:
+        """Call `launch` now, or when it is the guard's turn; requires a running event loop."""
+        self._waiting[guard] = launch
+        self._launch_next()
+
+    def hurry(self, guard: object) -> None:
+        """Launch a waiting guard now, without a turn; do nothing for any other guard."""
+        launch = self._waiting.pop(guard, None)
+        if launch is not None:
+            loop = asyncio.get_running_loop()
+            self._starting[guard] = loop.call_later(START_TIMEOUT_S, self.end, guard)
+            launch()
+
+    def end(self, guard: object) -> None:
+        """End a guard's turn or wait, because it has started, failed or is not needed."""
+        self._waiting.pop(guard, None)
+        timer = self._starting.pop(guard, None)
+        if timer is not None:
+            timer.cancel()
+            self._launch_next()
+
+    def _launch_next(self) -> None:
+        while self._waiting and len(self._starting) < self._at_once:
+            self.hurry(next(iter(self._waiting)))
+
+
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, StartTurns] = WeakKeyDictionary()
+
+
+def start_turns() -> StartTurns:
+    """Return the turns of the running event loop: one for each processor, at most four."""
+    loop = asyncio.get_running_loop()
+    return _turns.setdefault(loop, StartTurns(min(_processors(), _MOST)))
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
