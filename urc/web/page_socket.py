@@ -34,6 +34,9 @@ TICKS_PER_S = 2000
 ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
 """First bytes of a page's tick; decoding ticks in any other form takes longer."""
+EARLY_MESSAGES = 100
+"""Maximum number of messages that wait while the robot's session opens; ticks are dropped, and STOP
+does not wait."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 STALL_S = 15.0
@@ -62,6 +65,8 @@ class BrowserClient:
         self._news = asyncio.Event()
         self._answers: deque[str] = deque()
         self._pong = ""
+        self._early: deque[Message] = deque()
+        """Messages that arrived before the session was open."""
         self._place = Place()
         self._alarm_place = AlarmPlace()
         self._live: LiveSession | None = None
@@ -100,34 +105,61 @@ class BrowserClient:
             self._close(wire.CLOSE_NOT_LET_IN, SIGNED_OUT)
 
     async def _visit(self) -> None:
-        opening = asyncio.ensure_future(self._service.live())
-        leaving = asyncio.ensure_future(self._line.receive())
-        # A page that leaves while the session is still opening must not count as a client.
+        controls = self._service.controls
+        self._operator = controls.add_page(self._peer, self._news.set)
         try:
-            await asyncio.wait((opening, leaving), return_when=asyncio.FIRST_COMPLETED)
-            if leaving.done() and leaving.result()["type"] == "websocket.disconnect":
-                return
-            live = await opening
+            live = await self._opened()
+            if live is not None:
+                await self._converse(live, self._operator)
         except SessionFailed as error:
             await self._refuse(wire.CLOSE_FAILED, str(error))
-            return
+        finally:
+            controls.remove_page(self._operator)
+
+    async def _opened(self) -> LiveSession | None:
+        """Return the robot's open session; None if the page leaves or sends too much before."""
+        opening = asyncio.ensure_future(self._service.live())
+        reading = asyncio.ensure_future(self._read_early())
+        # A page that leaves while the session is still opening must not count as a client.
+        try:
+            await asyncio.wait((opening, reading), return_when=asyncio.FIRST_COMPLETED)
+            if not reading.done():
+                return await opening
         finally:
             opening.cancel()
-            if not leaving.done():
-                leaving.cancel()
-        first = leaving.result() if leaving.done() and not leaving.cancelled() else None
-        await self._converse(live, first)
+            reading.cancel()
+        if reading.result():
+            await self._refuse(wire.CLOSE_TOO_FAST, reading.result())
+        return None
 
-    async def _converse(self, live: LiveSession, first: Message | None) -> None:
+    async def _read_early(self) -> str:
+        """Read while the session opens; return why the page must close, or "" if the page left.
+
+        STOP is handled immediately. Ticks are dropped, because they would be outdated. All other
+        messages wait for the session.
+        """
+        while len(self._early) < EARLY_MESSAGES:
+            message = await self._line.receive()
+            if message["type"] == "websocket.disconnect":
+                return ""
+            try:
+                asked = wire.decode(_body(message))
+            except wire.BadMessage:
+                asked = None  # `_handle` reports it
+            if isinstance(asked, Stop):
+                self._drive(asked)
+            elif not isinstance(asked, Tick):
+                self._early.append(message)
+        return f"more than {EARLY_MESSAGES} messages before hello"
+
+    async def _converse(self, live: LiveSession, operator: OperatorSession) -> None:
         self._place = live.fanout.join(self._flushed)
         self._alarm_place = self._service.alarm_feed.join(self._news.set)
-        controls = self._service.controls
         try:
-            self._operator = controls.add_page(self._peer, self._news.set)
-            self._service.consent.welcome(self._operator)
+            self._service.consent.welcome(operator)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
-                reading = group.create_task(self._read(live, group, first))
+                reading = group.create_task(self._read(live, group))
                 await asyncio.wait((writing, reading), return_when=asyncio.FIRST_COMPLETED)
                 if self._closing and not writing.done():
                     await asyncio.wait((writing,), timeout=GOODBYE_S)
@@ -139,8 +171,6 @@ class BrowserClient:
             log.warning("a client read nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
-            if self._operator is not None:
-                controls.remove_page(self._operator)
             live.fanout.leave(self._flushed)
             self._service.alarm_feed.leave(self._news.set)
 
@@ -208,16 +238,17 @@ class BrowserClient:
 
     # Reading
 
-    async def _read(
-        self, live: LiveSession, group: asyncio.TaskGroup, first: Message | None
-    ) -> None:
+    async def _read(self, live: LiveSession, group: asyncio.TaskGroup) -> None:
         self._flow.listen(self._offered)
         if self._operator is not None:
             self._operator.hold_back = self._flow.hold_back
-        message = first or await self._listen()
-        while message["type"] != "websocket.disconnect" and not self._closing:
-            self._handle(message, live, group)
+        while self._early and not self._closing:
+            self._handle(self._early.popleft(), live, group)
+        while not self._closing:
             message = await self._listen()
+            if message["type"] == "websocket.disconnect":
+                return
+            self._handle(message, live, group)
 
     async def _listen(self) -> Message:
         self._is_listening = True
@@ -242,7 +273,7 @@ class BrowserClient:
         asked: wire.Inbound | None = None
         fault = ""
         try:
-            asked = wire.decode(message.get("text") or message.get("bytes") or "")
+            asked = wire.decode(_body(message))
         except wire.BadMessage as error:
             fault = str(error)
         self.recheck()
@@ -345,3 +376,9 @@ class BrowserClient:
         """Send the reply to a command."""
         values, code, message = outcome.values, outcome.code, outcome.message
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
+
+
+def _body(message: Message) -> str | bytes:
+    """Return the text or bytes of a received message."""
+    body: str | bytes = message.get("text") or message.get("bytes") or ""
+    return body

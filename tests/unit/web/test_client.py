@@ -22,6 +22,7 @@ from urc.web.feed.client_socket import FixedRights, SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.page_socket import (
     BAD_MESSAGES,
+    EARLY_MESSAGES,
     MESSAGES_PER_S,
     TICKS_PER_S,
     BrowserClient,
@@ -129,13 +130,16 @@ async def scene(
     *,
     commands: dict[str, Command] | None = None,
     role: Role = "drive",
+    start_lock: asyncio.Lock | None = None,
 ) -> AsyncIterator[Scene]:
     """Serve one client; it and the service are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(settings=settings, commands=commands), clock)
     audit: list[AuditEntry] = []
     recorder = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
-    service = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, recorder=recorder)
+    service = RobotService(
+        Robot(robot.profile, {}, robot.open), clock=clock, recorder=recorder, start_lock=start_lock
+    )
     running = asyncio.create_task(service.run())
     made = Scene(service, robot, clock, role)
     made.audit = audit
@@ -338,6 +342,50 @@ async def test_a_stop_is_taken_however_much_else_was_said() -> None:
         await settle()
         assert it.line.closed is None
         assert it.service.controls.controller.lease.state.latched_by == "screen 1"
+
+
+async def test_stop_does_not_wait_for_the_session() -> None:
+    turn = asyncio.Lock()
+    await turn.acquire()
+    async with scene(start_lock=turn) as it:
+        it.line.say({"t": "ping", "c": 7.0})
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
+        assert it.robot.opened == 0
+        assert not it.line.sent
+        turn.release()
+        await settle()
+        assert [told["c"] for told in it.line.of_type("pong")] == [7.0]
+
+
+async def test_page_that_floods_a_closed_session_is_closed_and_its_stop_counts() -> None:
+    turn = asyncio.Lock()
+    await turn.acquire()
+    async with scene(start_lock=turn) as it:
+        it.line.say({"t": "stop"})
+        for _ in range(EARLY_MESSAGES):
+            it.line.say(json.dumps({"t": "tick", "command": "move", "args": {}}))
+            it.line.say("{")
+        await settle()
+        assert it.line.closed == (
+            CLOSE_TOO_FAST,
+            f"more than {EARLY_MESSAGES} messages before hello",
+        )
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
+        assert it.service.controls.operators == ()
+
+
+async def test_page_that_leaves_before_the_session_opens_leaves_no_operator() -> None:
+    turn = asyncio.Lock()
+    await turn.acquire()
+    async with scene(start_lock=turn) as it:
+        await settle()
+        assert len(it.service.controls.operators) == 1
+        it.line.leave()
+        await settle()
+        assert it.service.controls.operators == ()
+        assert not it.service.is_used
 
 
 async def test_a_stop_beyond_every_limit_still_stops() -> None:
