@@ -19,6 +19,9 @@ from urc.transports.base import ConnectFailed, PeerClosed, TransportError
 __all__ = ["GuardedTransport"]
 
 _CLOSED: Final = "the connection is closed"
+START_S: Final = 60.0
+"""Maximum wait of a connection for the guard's start, in seconds. With many robots, guards start in
+turns."""
 _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4
@@ -99,6 +102,18 @@ class GuardedTransport:
     def is_open(self) -> bool:
         """Whether the transport is connected, as last reported by the guard."""
         return self._is_open
+
+    async def ready(self) -> None:
+        """Wait for the guard, which may have to wait for its turn to start.
+
+        Raises:
+            ConnectFailed: no guard has started in time.
+        """
+        try:
+            async with asyncio.timeout(START_S):
+                await self._ready()
+        except TimeoutError as late:
+            raise ConnectFailed("the guard has not started; see the server's log") from late
 
     async def open(self, timeout_s: float) -> None:
         """Connect; raise `ConnectFailed` after a refusal, or after about `timeout_s` seconds."""

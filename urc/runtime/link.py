@@ -31,7 +31,14 @@ from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import NOTHING_YET, Hub, LinkState
 from urc.runtime.link_report import LinkReport
 from urc.runtime.output_buffer import STUCK_S, OutputBuffer
-from urc.transports.base import NOTICE, Prompt, SupportsSettle, Transport, TransportError
+from urc.transports.base import (
+    NOTICE,
+    Prompt,
+    SupportsReady,
+    SupportsSettle,
+    Transport,
+    TransportError,
+)
 
 __all__ = ["Link"]
 
@@ -276,6 +283,8 @@ class Link:
         """Open the transport; return the reason for a failure, or "" on success."""
         limit_s = self._spec.timeouts.connect_s
         try:
+            if isinstance(self._transport, SupportsReady):
+                await self._transport.ready()
             async with within(self._clock, limit_s + _GRACE_S):
                 await self._transport.open(limit_s)
         except TransportError as refused:

@@ -27,6 +27,7 @@ __all__ = [
     "SupportsForget",
     "SupportsOffer",
     "SupportsProbe",
+    "SupportsReady",
     "SupportsReset",
     "SupportsSettle",
     "SupportsUnsent",
@@ -138,6 +139,14 @@ class TransportSetup(NamedTuple):
 
 # Optional capabilities. Callers check for each capability once with `isinstance`, and also work
 # without it.
+
+
+@runtime_checkable
+class SupportsReady(Protocol):
+    """A transport that needs preparation by URC, which does not count as connecting."""
+
+    async def ready(self) -> None:
+        """Wait until the transport can connect; raise `ConnectFailed` if it cannot be prepared."""
 
 
 @runtime_checkable

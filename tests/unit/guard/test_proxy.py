@@ -63,6 +63,13 @@ async def test_refusal_is_told_in_the_robots_words() -> None:
         await opening
 
 
+async def test_guard_that_does_not_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("urc.guard.proxy.START_S", 0.01)
+    await Guard().line.ready()
+    with pytest.raises(ConnectFailed, match="the guard has not started; see the server's log"):
+        await Guard(is_there=False).line.ready()
+
+
 async def test_opening_ends_in_its_time_without_a_guard(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urc.guard.proxy._OPEN_GRACE_S", 0.01)
     guard = Guard(is_there=False)

@@ -105,6 +105,25 @@ async def test_waits_have_jitter() -> None:
         assert line.opens == 2
 
 
+async def test_wait_for_the_guard_is_not_taken_for_a_silent_robot() -> None:
+    """The limit for a connection attempt begins when the transport is ready."""
+
+    class Waiting(MemoryTransport):
+        is_ready = asyncio.Event()
+
+        async def ready(self) -> None:
+            await self.is_ready.wait()
+
+    clock, line = FakeClock(), Waiting(answer=says_42)
+    async with opened(line, clock, line_profile(timeouts=Timeouts(connect_s=3.0))) as session:
+        await clock.advance(30)
+        assert state_of(session) == ("connecting", "")
+        line.is_ready.set()
+        await clock.advance(0)
+        assert state_of(session) == ("live", "")
+        assert [note.text for note in session.hub.notes] == ["connecting to memory", "live"]
+
+
 @pytest.mark.parametrize("is_per_request", [False, True])
 async def test_robot_that_closes_at_once_is_not_hammered(is_per_request: bool) -> None:
     """To be accepted is no success: only a good frame resets the waits."""
