@@ -63,9 +63,12 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, StartTurns] = WeakKeyDictio
 
 
 def start_turns() -> StartTurns:
-    """Return the turns of the running event loop: one for each processor, at most four."""
+    """Return the turns of the running event loop: one for each processor but one, at most four.
+
+    The remaining processor serves the driven robots.
+    """
     loop = asyncio.get_running_loop()
-    return _turns.setdefault(loop, StartTurns(min(_processors(), _MOST)))
+    return _turns.setdefault(loop, StartTurns(min(max(_processors() - 1, 1), _MOST)))
 
 
 def _processors() -> int:
