@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.async_api import CDPSession, Locator, Page
 
-from tests.e2e.browser import PLAIN_HOST
+from tests.e2e.browser import PLAIN_HOST, SIZES
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import WAIT_S, until
 from urc.model.driver import Argument, Command
@@ -184,7 +184,8 @@ async def drawn(page: Page) -> None:
 class Fingers:
     """Several fingers on one screen."""
 
-    def __init__(self, session: CDPSession) -> None:
+    def __init__(self, page: Page, session: CDPSession) -> None:
+        self._page = page
         self._session = session
         self._down: dict[int, tuple[float, float]] = {}
 
@@ -198,6 +199,24 @@ class Fingers:
         """Lift a finger."""
         await self._send("touchEnd", {finger: self._down.pop(finger)})
 
+    async def turn(self, *, is_landscape: bool) -> None:
+        """Turn a phone with its fingers on it; return after the page has its new size."""
+        width, height = sorted(SIZES["phone"], reverse=is_landscape)
+        orientation = {"type": "landscapePrimary", "angle": 90} if is_landscape else {
+            "type": "portraitPrimary", "angle": 0
+        }  # fmt: skip
+        await self._session.send(
+            "Emulation.setDeviceMetricsOverride",
+            {
+                "width": width,
+                "height": height,
+                "deviceScaleFactor": 0,
+                "mobile": False,
+                "screenOrientation": orientation,
+            },
+        )
+        await self._page.wait_for_function("(width) => innerWidth === width", arg=width)
+
     async def _send(self, kind: str, which: Mapping[int, tuple[float, float]]) -> None:
         points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in which.items()]
         await self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
@@ -205,7 +224,7 @@ class Fingers:
 
 async def fingers_on(page: Page) -> Fingers:
     """Return fingers for a page."""
-    return Fingers(await page.context.new_cdp_session(page))
+    return Fingers(page, await page.context.new_cdp_session(page))
 
 
 def text_of(page: Page, selector: str) -> Locator:

@@ -144,6 +144,32 @@ async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker
         await stays_still(robot)
 
 
+async def test_turning_the_device_stops_and_new_fingers_drive_again(new_page: PageMaker) -> None:
+    """The layout changes under two thumbs: they move nothing until they are put down anew."""
+    async with calmly_driven() as (robot, address):
+        page = await opened(new_page, address, "phone")
+        hands = await fingers_on(page)
+        for is_landscape in (True, False):
+            for finger, selector in enumerate((LEFT, RIGHT)):
+                x, y = await centre(page, selector)
+                await hands.put(finger, x, y)
+                await hands.put(finger, x, y - 40)
+            await robot.until_moving()
+            await hands.turn(is_landscape=is_landscape)
+            await robot.until_stopped()
+            assert "expired" not in robot.line.reasons, "it did not wait for the lease to run out"
+            count = len(robot.line.written)
+            for finger in (0, 1):
+                await hands.put(finger, 100, 100 + 50 * finger)
+            await stays_still(robot)
+            assert len(robot.line.written) == count
+            note = text_of(page, "[data-cell='0'] .joystick-note")
+            assert "the screen was rotated" in (await note.text_content() or "")
+            for finger in (0, 1):
+                await hands.lift(finger)
+        await stays_still(robot)
+
+
 async def test_arrow_keys_hold_a_stick_that_has_the_focus(new_page: PageMaker) -> None:
     """Pressed it runs, let go it stops; a key that repeats is one press."""
     async with calmly_driven() as (robot, address):

@@ -55,7 +55,13 @@ export class Input {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
     addEventListener("blur", all(t("the window lost focus")));
     addEventListener("pagehide", all(t("the page was left")));
-    addEventListener("resize", all(t("the window was resized")));
+    // A rotation resizes the window, too, and some browsers report that first.
+    let { angle } = screen.orientation ?? {};
+    addEventListener("resize", () => {
+      const isRotated = angle !== screen.orientation?.angle;
+      angle = screen.orientation?.angle;
+      this.letGo(isRotated ? t("the screen was rotated") : t("the window was resized"));
+    });
     addEventListener("orientationchange", all(t("the screen was rotated")));
     screen.orientation?.addEventListener("change", all(t("the screen was rotated")));
     addEventListener("gamepaddisconnected", all(t("the gamepad was disconnected")));
