@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Final
 
-from urc.client.program_controls import STOP_REASONS, ProgramControls
+from urc.client.program_controls import ProgramControls
 from urc.client.stick import MotionEnded
 from urc.model.values import Reading
 from urc.motion.freshness import ControlInput
@@ -178,8 +178,8 @@ class LocalMotion(ProgramControls):
         while True:
             for command, reason in await backend.stops():
                 self.controller.stopped(command, reason)
-                if reason not in ("released", "stopped") and command in self.sticks:
-                    self.sticks[command].end(STOP_REASONS[reason])
+                if reason not in ("released", "stopped"):
+                    self.stopped(command, reason)
 
     def _changed(self, state: LeaseState) -> None:
         if state.latched_by:

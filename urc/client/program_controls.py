@@ -5,6 +5,7 @@ release is sent before any wait, even after an exception or a cancellation.
 """
 
 import asyncio
+import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -12,18 +13,17 @@ from typing import Final
 
 from urc.client.stick import MotionEnded, Stick, checked_validity, sample_stick
 from urc.model.values import Reading
-from urc.motion.hold_to_run import Reason
 from urc.problems import UrcError
 
 __all__ = ["STOP_REASONS", "ProgramControls", "only_control"]
 
-STOP_REASONS: Final[Mapping[Reason, str]] = {
+STOP_REASONS: Final[Mapping[str, str]] = {
     "released": "the control was released",
     "expired": "the input arrived too late",
     "stopped": "STOP was pressed",
     "revoked": "the connection to the robot was cut",
 }
-"""Text that explains why a motion ended, by the reason that the guard reports."""
+"""Text that explains why a motion ended, by the `Reason` that the guard reports."""
 _LEFT: Final = "the drive context has ended"
 
 
@@ -102,6 +102,17 @@ class ProgramControls(ABC):
             raise fault
         if early:
             raise MotionEnded(early)
+
+    def stopped(self, command: str, reason: str) -> None:
+        """End a command's motion because the guard stopped it; "" stands for all commands."""
+        text = STOP_REASONS.get(reason, reason)
+        for name, stick in self.sticks.items():
+            if command not in ("", name):
+                continue
+            if reason == "expired":
+                stick.expire(text, time.monotonic())
+            else:
+                stick.end(text)
 
     def end_all(self, reason: str) -> None:
         """End the motion of all sticks."""

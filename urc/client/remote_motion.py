@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Final
 
-from urc.client.program_controls import STOP_REASONS, ProgramControls
+from urc.client.program_controls import ProgramControls
 from urc.client.robot_socket import RobotSocket
 from urc.client.stick import MotionEnded
 from urc.model.values import Reading
@@ -83,7 +83,7 @@ class RemoteMotion(ProgramControls):
             case HeartbeatMessage(n):
                 self._beat, self._beat_s = n, time.monotonic()
             case StoppedMessage(command, reason):
-                self._end(command, STOP_REASONS.get(reason, reason))  # type: ignore[call-overload]
+                self.stopped(command, reason)
             case RefusedMessage(about, text, command):
                 if about == "tick":
                     self._end(command, text)

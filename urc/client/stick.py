@@ -70,6 +70,7 @@ class Stick:
         self.ended = ""
         """Reason why motion ended; "" while the stick works."""
         self._input: tuple[Mapping[str, Reading], float] | None = None
+        self._moved_s: float | None = None
         self._changed = asyncio.Event()
 
     def __call__(self, /, **arguments: Reading) -> None:
@@ -132,6 +133,28 @@ class Stick:
         self._input = None
         self.wake()
 
+    def expire(self, reason: str, now_s: float) -> None:
+        """End all motion because the guard received no input in time.
+
+        After a block of this program, the guard's report may be handled before the sampler runs.
+        The block is then the reason.
+
+        Args:
+            reason: the reason if this program was not blocked.
+            now_s: time of the sampler's clock, in seconds.
+        """
+        self.end(self.block_since_sample(now_s) or reason)
+
+    def block_since_sample(self, now_s: float) -> str:
+        """Return the reason to end motion after a long sampling gap; "" for a short gap."""
+        if self._moved_s is None or now_s - self._moved_s <= HELD_UP_S:
+            return ""
+        return f"this program was blocked for {(now_s - self._moved_s) * 1000:.0f} ms"
+
+    def sampled(self, now_s: float, *, is_moving: bool) -> None:
+        """Record the time of a sample; a program that moves nothing may be blocked."""
+        self._moved_s = now_s if is_moving else None
+
     def sample(self) -> tuple[Mapping[str, Reading], float] | None:
         """Return the last call's arguments and time; None without input."""
         self._changed.clear()
@@ -148,14 +171,14 @@ async def sample_stick(
     stick: Stick, line: MotionLine, now: Callable[[], float] = time.monotonic
 ) -> None:
     """Send the input of `stick` as ticks until the stick ends or this task is cancelled."""
-    is_moving, sampled_s = False, now()
+    is_moving = False
     while not stick.ended:
         at_s = now()
-        held_up_s, sampled_s = at_s - sampled_s, at_s
-        if is_moving and held_up_s > HELD_UP_S:
-            stick.end(f"this program was blocked for {held_up_s * 1000:.0f} ms")
+        if blocked := stick.block_since_sample(at_s):
+            stick.end(blocked)
             break
         given = stick.sample()
+        stick.sampled(at_s, is_moving=given is not None)
         if given is None:
             if is_moving:
                 line.release(stick.command)

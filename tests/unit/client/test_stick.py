@@ -115,6 +115,32 @@ async def test_a_pause_of_the_process_ends_the_motion(stick: Stick) -> None:
     assert len(line.releases) == 1
 
 
+async def test_guards_report_of_a_pause_names_the_pause(stick: Stick) -> None:
+    """After a pause, the report that the lease has expired may be read before the next sample."""
+    stick.valid_s = 1.0
+    line = Line(clock := Clock())
+    stick(speed=0.5)
+    task = asyncio.create_task(sample_stick(stick, line, line.now))
+    await asyncio.sleep(0.02)
+    stick.expire("the input arrived too late", clock() + HELD_UP_S + 0.1)
+    await task
+    assert stick.ended.startswith("this program was blocked for 3")
+
+
+async def test_lease_that_expires_without_a_pause_is_the_reason(stick: Stick) -> None:
+    """The network was slow; so it was not this program."""
+    stick.expire("the input arrived too late", 1e9)
+    assert stick.ended == "the input arrived too late", "no input was sampled before"
+    other = Stick("drive", 1.0)
+    line = Line(clock := Clock())
+    other(speed=0.5)
+    task = asyncio.create_task(sample_stick(other, line, line.now))
+    await asyncio.sleep(0.02)
+    other.expire("the input arrived too late", clock())
+    await task
+    assert other.ended == "the input arrived too late"
+
+
 async def test_a_pause_before_the_first_input_ends_nothing(stick: Stick) -> None:
     """A program may wait in its block for as long as it likes."""
     line = Line(clock := Clock())
