@@ -70,6 +70,14 @@
   const sticks = [...document.querySelectorAll(".joystick-face")].filter(isShown).map(boxOf);
   const sizes = sticks.map(({ width, height }) => Math.min(width, height));
   if (Math.max(0, ...sizes) - Math.min(...sizes) > SLACK) faults.push(`sticks of different sizes: ${sizes.join(", ")}`);
+  // On a phone in portrait, the sticks are above STOP until the page is scrolled, except with large text.
+  const stop = document.querySelector(".urc-stop-button");
+  const isUpright = matchMedia("(width < 37.5rem) and (height >= 40rem)").matches;
+  const isUsual = parseFloat(getComputedStyle(document.documentElement).fontSize) <= 16;
+  for (const { bottom } of stop && isUpright && isUsual && stage.scrollTop === 0 ? sticks : []) {
+    const under = bottom - boxOf(stop).top;
+    if (under > SLACK) faults.push(`a stick is ${Math.round(under)} px under STOP`);
+  }
   // A finger must reach the whole stick without scrolling, unless the widgets are below the background.
   const isOver = document.querySelector('[data-place="ground"]') !== null && matchMedia("(width >= 37.5rem)").matches;
   for (const { bottom } of isOver ? sticks : []) {

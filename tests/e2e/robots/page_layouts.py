@@ -18,6 +18,7 @@ __all__ = ["LANGUAGES", "NAMES", "SCREENS", "TEXT_PX", "Variant", "measured"]
 NAMES = sorted(file.stem for file in FOLDER.glob("*.yaml"))
 SCREENS = {
     "small phone": (320, 568),
+    "low phone": (360, 640),
     "phone": (390, 844),
     "phone, landscape": (844, 390),
     "tablet": (820, 1180),

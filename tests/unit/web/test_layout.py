@@ -150,6 +150,16 @@ def test_a_phone_in_portrait_has_the_background_above_the_widgets() -> None:
     assert '[data-place="1"]{display:grid;grid-area:2/1/3/2;' in phone
 
 
+def test_on_a_phone_in_portrait_only_the_background_grows() -> None:
+    """A growing row of sticks would make the background as high as the sticks, and hide them."""
+    slots = (Slot("a", 0, 0), Slot("lift", 1, 0, 2, 1), Slot("move", 1, 1, 2, 1))
+    phone = over(Layout(3, 2, slots), "a", "lift", "move", lift="stick", move="stick").split(
+        "@media (max-width: 37.499rem)"
+    )[1]
+    rows = phone.split("grid-template-rows:")[1].split(";")[0]
+    assert rows == "minmax(var(--urc-ground-height),1fr) auto auto auto"
+
+
 def test_a_stick_in_a_lower_corner_reaches_down_next_to_stop() -> None:
     """STOP is between the sticks."""
     slots = (Slot("lift", 1, 0), Slot("move", 1, 2), Slot("a", 0, 1))
@@ -199,6 +209,16 @@ def test_views_give_way_to_sticks_on_a_phone_in_landscape() -> None:
     css = over(Layout(3, 3, slots), "map", "move", map="view", move="stick")
     low = css.split("@media (max-height: 29.999rem)")[1]
     assert "grid-template-rows:minmax(3.625rem,max-content) " in low
+
+
+def test_rows_of_values_and_buttons_are_low_on_a_phone_in_portrait() -> None:
+    """Sticks below them are then above STOP; a map keeps its height."""
+    slots = (Slot("a", 0, 0), Slot("b", 1, 0), Slot("move", 1, 1, 2, 1), Slot("map", 3, 0, 1, 2))
+    feet: dict[str, Footprint] = {"a": "value", "b": "button", "move": "stick", "map": "view"}
+    css = grid_css(Interface("i", layouts={"landscape": Layout(4, 2, slots)}), tuple(feet), feet)
+    phone = css.split("@media (max-width: 37.499rem)")[1]
+    low = "minmax(6.5rem,1fr)"
+    assert f"grid-template-rows:{low} {low} {low} {ROW};" in phone
 
 
 def test_only_a_background_lets_a_button_reach_down_next_to_stop() -> None:

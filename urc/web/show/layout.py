@@ -38,12 +38,10 @@ LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
-"""Row height on a phone in landscape; two such rows fit on the screen."""
+"""Row height on a phone in landscape, where two such rows fit on the screen. A phone in portrait
+uses it for rows of values and buttons, so that a stick next to two of them is above STOP."""
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
 """Sizes of rows and columns over a background: with a widget, and empty."""
-_PHONE_WINDOW = "minmax(min-content,.01fr)"
-"""Size of an empty or growing row on a phone in portrait. The background fills nearly all of the
-space."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _LOW_OVER = ("stick", "lever", "button", "value")
@@ -176,12 +174,14 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
         column = _USED_COLUMN if screen == PHONE else _OVER
     used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
-    if canvas.background and len(used_rows) == grid.rows:
+    if canvas.background and screen != PHONE and len(used_rows) == grid.rows:
         used_rows = used_rows - {grid.rows // 2}  # no row is empty, so the middle row grows
     sizes = _tracks(grid.rows, used_rows, row, empty_row)
     if canvas.background:
-        window = _PHONE_WINDOW if screen == PHONE else empty_row
-        sizes = _over_rows(grid, canvas, screen, _tracks(grid.rows, used_rows, row, window))
+        sizes = _over_rows(grid, canvas, screen, sizes)
+    elif screen == PHONE:
+        is_low = [_kinds(place, grid, canvas) <= _HEIGHTS.keys() for place in range(grid.rows)]
+        sizes = [_LOW_ROW if low else size for low, size in zip(is_low, sizes, strict=True)]
     if canvas.background and screen == PHONE:
         sizes = [_GROUND_ROW, *sizes]
     rows = " ".join(sizes) or "none"
@@ -201,15 +201,20 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
     for place, size in enumerate(sizes):
         if screen == SHORT and size == _OVER and place not in firm:
             size = _SOFT
-        kinds = {
-            canvas.footprints.get(slot.name, "")
-            for slot in grid.slots
-            if slot.row_span == 1 and slot.row == place
-        }
+        kinds = _kinds(place, grid, canvas)
         if place in lower and kinds and kinds <= _HEIGHTS.keys():
             size = "max(" + ",".join(_HEIGHTS[kind] for kind in sorted(kinds)) + ")"
         rows.append(size)
     return rows
+
+
+def _kinds(row: int, grid: Layout, canvas: _Canvas) -> set[str]:
+    """Return the footprints of the widgets that have only this row."""
+    return {
+        canvas.footprints.get(slot.name, "")
+        for slot in grid.slots
+        if slot.row_span == 1 and slot.row == row
+    }
 
 
 def _is_firm(slot: Slot, canvas: _Canvas) -> bool:
