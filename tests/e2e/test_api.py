@@ -67,12 +67,21 @@ def motion(lease: dict[str, Any], number: int, beat: int, **more: object) -> dic
 
 
 async def driven(client: httpx2.AsyncClient, lease: dict[str, Any], seconds: float) -> int:
-    """Drive for some time; return the number of inputs."""
+    """Drive for some time without a pause; return the number of inputs.
+
+    After a pause of a busy machine, the input is refused. The controls are then taken again.
+    """
     beat, number = lease["beat"], 0
-    until = time.monotonic() + seconds
+    began = time.monotonic()
+    until = began + seconds
     while time.monotonic() < until:
         number += 1
         answer = await client.post("robots/cart/motion", json=motion(lease, number, beat))
+        if answer.status_code == 409 and until < began + UNHURRIED_S:
+            take = {"verb": "take", "session": lease["session"]}
+            answer = await client.post("robots/cart/lease", json=take)
+            lease.update(answer.json())
+            until = time.monotonic() + seconds
         assert answer.status_code == 200, answer.text
         beat = answer.json()["beat"]
         await asyncio.sleep(0.04)
