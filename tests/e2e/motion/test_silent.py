@@ -138,6 +138,7 @@ async def test_a_robot_that_is_lost_is_the_reason_that_the_stick_gives(
         for line in list(robot.lines):
             line.transport.abort()
         await until_text(page, "[data-badge-text]", "Robot lost")
+        await until_text(page, "[data-badge-trip]", "")
         await page.wait_for_function(
             "() => /Lost contact while driving|the robot is not connected/"
             f".test(document.querySelector('{NOTE}').textContent)"

@@ -37,7 +37,8 @@ export class Badge {
     if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")];
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
     write(this.text, text);
-    const [quality, figure] = tripOf(socket.tripMs);
+    // Next to “Robot lost”, a short delay to URC would look like a good connection.
+    const [quality, figure] = tripOf(sign === "bad" ? null : socket.tripMs);
     if (this.trip.dataset["trip"] !== quality) this.trip.dataset["trip"] = quality;
     write(this.trip, figure);
   }
