@@ -133,6 +133,7 @@ class Chart {
   addButtons(hasWay) {
     const row = document.createElement("div");
     row.className = "map-tools";
+    row.dataset["floats"] = "";
     const add = (/** @type {string} */ sign, /** @type {string} */ name, /** @type {() => void} */ press) => {
       const made = button("map-button", sign, press, { signal: this.signal, label: name });
       row.append(made);

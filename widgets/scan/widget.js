@@ -112,6 +112,7 @@ class Scan {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "scan-view urc-scene-view";
+    button.dataset["floats"] = "";
     const label = () => {
       write(button, this.t(NAMES[this.view]));
       attribute(button, "aria-label", this.t("View: {name}. Change it.", { name: this.t(NAMES[this.view]) }));

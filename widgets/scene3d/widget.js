@@ -103,6 +103,7 @@ class Scene {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "scene3d-view urc-scene-view";
+    button.dataset["floats"] = "";
     const label = () => {
       const name = this.t(NAMES[this.stage?.view ?? "orbit"]);
       write(button, name);

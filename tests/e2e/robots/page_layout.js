@@ -27,7 +27,10 @@
   const dock = [...document.querySelectorAll(".urc-stop-button, .urc-who, .urc-verbs > *")].filter(isShown);
   const name = (el) => (el.dataset.config ? JSON.parse(el.dataset.config).slot : el.className);
   const scrolls = stage.scrollHeight > stage.clientHeight + SLACK;
-  const pairs = [...cells, ...dock].flatMap((one, index, all) => all.slice(index + 1).map((other) => [one, other]));
+  // Captions and buttons of the background are above the widgets on a phone in portrait.
+  const isAbove = matchMedia("(width < 37.5rem)").matches;
+  const floats = isAbove ? [] : [...document.querySelectorAll('[data-place="ground"] [data-floats]')].filter((el) => isShown(el) && el.textContent.trim());
+  const pairs = [...cells, ...floats, ...dock].flatMap((one, index, all) => all.slice(index + 1).map((other) => [one, other]));
   for (const [one, other] of pairs) {
     // A cell may scroll below STOP.
     if (scrolls && dock.includes(other) && !dock.includes(one)) continue;

@@ -12,6 +12,7 @@
  * @property {() => void} wake
  */
 import { part } from "./badge.js";
+import { keepFloatsFree } from "./floats.js";
 import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
 import { tabsOf } from "./tabs.js";
@@ -27,6 +28,8 @@ export class ViewSwitch {
     this.el = part(root, "[data-stage]");
     /** @type {Debug | null} */
     this.debug = null;
+    /** Ends with the current interface. */
+    this.ends = new AbortController();
     this.enter();
     new Interfaces(root, {
       letGo: (reason) => doors.input.letGo(reason),
@@ -58,6 +61,8 @@ export class ViewSwitch {
     const { host, input, wake } = this.doors;
     swapViews(this.el);
     host.mountAll(this.el);
+    this.ends = new AbortController();
+    keepFloatsFree(this.el, this.ends.signal);
     tabsOf(this.el, () => input.letGo(t("another page was opened")));
     const el = this.el.querySelector("[data-debug]");
     if (el instanceof HTMLElement) void this.search(el);
@@ -75,6 +80,7 @@ export class ViewSwitch {
   /** End the current interface. */
   leave() {
     const { host } = this.doors;
+    this.ends.abort();
     this.debug?.end();
     this.debug = null;
     host.unmountAll(this.el);
