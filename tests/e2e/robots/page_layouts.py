@@ -35,8 +35,9 @@ TEXT_PX = (16, 24)
 """Sizes of normal text in the browser's settings: usual, and large."""
 LAYOUT = (Path(__file__).parent / "page_layout.js").read_text("utf-8")
 DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-SETTLE_S = 0.15
-"""Time for widgets that lay themselves out after a change of their size."""
+SETTLE_S = 0.3
+"""Time for widgets that lay themselves out, and for the floats of the background, after a change of
+size."""
 
 
 class Variant(NamedTuple):

@@ -19,14 +19,16 @@ const DOCK = ".urc-stop-button, .urc-who, .urc-verbs > *";
  */
 export function keepFloatsFree(stage, signal) {
   let timer = 0;
+  let placedMs = -Infinity;
   const sizes = new ResizeObserver(() => later());
   const place = () => {
     timer = 0;
+    placedMs = performance.now();
     placeFloats(stage);
     for (const el of stage.querySelectorAll(".urc-cell, [data-floats]")) sizes.observe(el);
   };
   const later = () => {
-    timer ||= setTimeout(place, SOONEST_MS);
+    timer ||= setTimeout(place, Math.max(0, placedMs + SOONEST_MS - performance.now()));
   };
   const changes = new MutationObserver(later);
   sizes.observe(stage);
