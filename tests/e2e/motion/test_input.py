@@ -165,6 +165,8 @@ async def test_turning_the_device_stops_and_new_fingers_drive_again(new_page: Pa
             assert len(robot.line.written) == count
             note = text_of(page, "[data-cell='0'] .joystick-note")
             assert "the screen was rotated" in (await note.text_content() or "")
+            thumb = page.locator("[data-cell='0'] .joystick-thumb")
+            assert await thumb.get_attribute("transform") == "translate(0.0 0.0)", "it is at rest"
             for finger in (0, 1):
                 await hands.lift(finger)
         await stays_still(robot)

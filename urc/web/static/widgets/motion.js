@@ -151,7 +151,9 @@ export class Motion {
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
-    this.own.draw({ phase: isLocked ? "locked" : phase, push: this.at, values: sent ?? {} });
+    // A stopped or refused gesture moves nothing, so the control is drawn at rest under the finger.
+    const push = phase === "spent" ? null : this.at;
+    this.own.draw({ phase: isLocked ? "locked" : phase, push, values: sent ?? {} });
   }
 }
 
