@@ -10,6 +10,8 @@ import { solid } from "./angles.js";
 
 /** Units per degree: 84 degrees are visible from top to bottom. */
 const PER_DEGREE = 2;
+/** Rungs further from the middle, in degrees, have the class `attitude-far`: they reach the roll scale. */
+const FAR = 31;
 const BANKS = [-60, -45, -30, -20, -10, 0, 10, 20, 30, 45, 60];
 /** Ends of the bars of the axes, in degrees. */
 const ENDS = { bank: 90, nose: 90, turn: 180 };
@@ -45,19 +47,21 @@ class Horizon {
     this.world = drawing(el, ".attitude-world");
     this.symbol = drawing(el, ".attitude-symbol");
     this.pointer = drawing(el, ".attitude-pointer");
-    const rungs = [];
+    /** Rungs and their labels, with their pitch. @type {[SVGElement, number][]} */
+    this.rungs = [];
     for (let degrees = -90; degrees <= 90; degrees += 5) {
       if (degrees === 0) continue;
       const [y, half] = [-degrees * PER_DEGREE, degrees % 10 === 0 ? 26 : 12];
-      rungs.push(svg("path", { d: `M${-half} ${y}H${half}`, class: "attitude-rung", "stroke-dasharray": degrees < 0 ? "5 3" : "none" }));
+      const dashes = degrees < 0 ? "5 3" : "none";
+      this.rungs.push([svg("path", { d: `M${-half} ${y}H${half}`, class: "attitude-rung", "stroke-dasharray": dashes }), degrees]);
       if (degrees % 10 !== 0) continue;
       for (const x of [-36, 36]) {
         const label = svg("text", { x, y, class: "attitude-degree" });
         label.textContent = String(Math.abs(degrees));
-        rungs.push(label);
+        this.rungs.push([label, degrees]);
       }
     }
-    drawing(el, ".attitude-ladder").replaceChildren(...rungs);
+    drawing(el, ".attitude-ladder").replaceChildren(...this.rungs.map(([el]) => el));
     const index = BANKS.map((degrees) =>
       svg("path", { class: "attitude-tick", d: `M0 -84V${degrees % 30 === 0 ? -98 : -92}`, transform: `rotate(${degrees})` }),
     );
@@ -67,6 +71,7 @@ class Horizon {
   /** @param {Lean} lean */
   show({ bank, nose }) {
     const side = (this.isVehicle ? (bank ?? 0) : -(bank ?? 0)).toFixed(2);
+    for (const [el, degrees] of this.rungs) el.classList.toggle("attitude-far", Math.abs(degrees - (nose ?? 0)) > FAR);
     style(this.world, "transform", `translateY(${((nose ?? 0) * PER_DEGREE).toFixed(2)}px)`);
     style(this.isVehicle ? this.symbol : this.sphere, "transform", `rotate(${side}deg)`);
     style(this.pointer, "transform", `rotate(${side}deg)`);

@@ -86,6 +86,15 @@
   for (const { bottom } of isOver ? sticks : []) {
     if (bottom > Math.min(innerHeight, room.bottom) + SLACK) faults.push(`a stick is ${Math.round(bottom - innerHeight)} px below the screen`);
   }
+  // The horizon must not cover the aircraft's symbol.
+  const symbol = document.querySelector('[data-place="ground"] .attitude-symbol');
+  if (symbol && isShown(symbol)) {
+    const { left, top } = boxOf(symbol);
+    const layers = document.elementsFromPoint(left + 4, top);
+    const world = layers.findIndex((el) => el.closest(".attitude-world"));
+    const front = layers.indexOf(symbol);
+    if (front < 0 || (world >= 0 && world < front)) faults.push("the horizon covers the aircraft's symbol");
+  }
   const edges = sticks.map(({ left, right }) => Math.min(left, innerWidth - right));
   const gap = sticks.length > 1 ? Math.max(...sticks.map(({ left }) => left)) - Math.min(...sticks.map(({ right }) => right)) : null;
   const isOverGround = document.querySelector('[data-place="ground"]') !== null;
