@@ -100,6 +100,9 @@ async def cart(
         yield robot, door, f"{address}robots/cart/"
     finally:
         door.close()
+        for line in list(robot.lines):
+            line.transport.abort()
+        await until(lambda: not robot.lines)
 
 
 async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
