@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from bench.harness import Result
+from bench.kept import Kept
 from bench.rig.engine import ENGINE_DEATHS, EngineRig
 from bench.trials import repeated, said
 
@@ -23,6 +24,7 @@ BIN_MS = 10
 def run(*, full: bool) -> Sequence[Result]:
     """Disturb the server; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
+    kept = Kept(f"motion_engine-{wanted}")
     results: list[Result] = []
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -30,6 +32,7 @@ def run(*, full: bool) -> Sequence[Result]:
     ):
         rig.bout("close")  # starts the guards
         for death in ENGINE_DEATHS:
-            trials = repeated(partial(rig.engine_bout, death), wanted, ROBOTS)
+            trials = repeated(death, partial(rig.engine_bout, death), wanted, ROBOTS, kept)
             results.append(said("motion_engine", death, trials, wanted, BIN_MS))
+    kept.end()
     return results

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.harness import Result
+from bench.kept import Kept
 from bench.rig.engine import EngineRig
 from bench.trials import repeated, said
 
@@ -21,10 +22,12 @@ BIN_MS = 50
 def run(*, full: bool) -> Sequence[Result]:
     """Kill guards; compare the slowest stop with the limit."""
     wanted = KILLED_IF_FULL if full else KILLED
+    kept = Kept(f"motion_guard-{wanted}")
     with (
         tempfile.TemporaryDirectory() as folder,
         EngineRig(Path(folder), robot_count=ROBOTS) as rig,
     ):
         rig.bout("close")
-        trials = repeated(rig.guard_bout, wanted, ROBOTS)
+        trials = repeated("guard-killed", rig.guard_bout, wanted, ROBOTS, kept)
+    kept.end()
     return [said("motion_guard", "guard-killed", trials, wanted, BIN_MS)]

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from bench.harness import Result
+from bench.kept import Kept
 from bench.rig.revocations import REVOCATIONS, RevocationRig
 from bench.trials import repeated, said
 
@@ -23,6 +24,7 @@ BIN_MS = 20
 def run(*, full: bool) -> Sequence[Result]:
     """Revoke rights of every kind; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
+    kept = Kept(f"motion_revoked-{wanted}")
     results: list[Result] = []
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -30,6 +32,7 @@ def run(*, full: bool) -> Sequence[Result]:
     ):
         rig.bout("person")  # starts the guards
         for kind in REVOCATIONS:
-            trials = repeated(partial(rig.bout, kind), wanted, ROBOTS)
+            trials = repeated(kind, partial(rig.bout, kind), wanted, ROBOTS, kept)
             results.append(said("motion_revoked", f"revoked {kind}", trials, wanted, BIN_MS))
+    kept.end()
     return results

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from bench.harness import Result
+from bench.kept import Kept
 from bench.rig.deaths import DEATHS, LINK_DEATHS, Rig
 from bench.rig.programs import can_relay
 from bench.trials import repeated, said
@@ -27,6 +28,7 @@ BIN_MS = 10
 def run(*, full: bool) -> Sequence[Result]:
     """Make pages vanish in every way; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
+    kept = Kept(f"motion_stop-{wanted}")
     results: list[Result] = []
     has_relay = can_relay()
     with (
@@ -38,6 +40,7 @@ def run(*, full: bool) -> Sequence[Result]:
             if death in LINK_DEATHS and not has_relay:
                 print(json.dumps({"left_out": f"motion_stop {death}: needs root and /dev/net/tun"}))
                 continue
-            trials = repeated(partial(rig.bout, death), wanted, ROBOTS)
+            trials = repeated(death, partial(rig.bout, death), wanted, ROBOTS, kept)
             results.append(said("motion_stop", death, trials, wanted, BIN_MS))
+    kept.end()
     return results

@@ -5,6 +5,7 @@ from math import inf
 
 from bench.figures import distribution, tell
 from bench.harness import Result
+from bench.kept import Kept
 from bench.rig.deaths import Trial
 
 __all__ = ["repeated", "said"]
@@ -13,13 +14,25 @@ MOST_BOUTS = 3
 """Maximum number of trial rounds on a busy machine, as a multiple of the required number."""
 
 
-def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:
-    """Repeat rounds until enough trials are valid, or the maximum number of rounds is reached."""
-    trials: list[Trial] = []
-    for _ in range(MOST_BOUTS * wanted // robot_count):
-        trials += bout()
+def repeated(
+    death: str, bout: Callable[[], list[Trial]], wanted: int, robot_count: int, kept: Kept
+) -> list[Trial]:
+    """Repeat rounds until enough trials are valid, or the maximum number of rounds is reached.
+
+    Args:
+        death: cause of the stops.
+        bout: function that runs one round with all robots.
+        wanted: required number of valid trials.
+        robot_count: number of trials in one round.
+        kept: store of the trials, so that an interrupted run continues.
+    """
+    trials = [trial for row in kept.rows if (trial := Trial.of(row)).death == death]
+    while len(trials) < MOST_BOUTS * wanted:
         if sum(not one.is_excused for one in trials) >= wanted:
             break
+        for trial in bout():
+            kept.add(trial._asdict())
+            trials.append(trial)
     return trials
 
 

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from bench.rig.operator_process import Plan
 from bench.rig.programs import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
@@ -73,6 +73,11 @@ class Trial(NamedTuple):
     bound_ms: float = BOUND_MS
     has_moved: bool = True
     """Whether the robot moved before the failure; if False, the trial is invalid."""
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Self:
+        """Return the trial with the fields of a stored row."""
+        return cls(**row)
 
     @property
     def is_good(self) -> bool:
