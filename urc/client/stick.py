@@ -71,6 +71,7 @@ class Stick:
         """Reason why motion ended; "" while the stick works."""
         self._input: tuple[Mapping[str, Reading], float] | None = None
         self._moved_s: float | None = None
+        """Time of the last sample if the stick had input, in seconds; otherwise None."""
         self._changed = asyncio.Event()
 
     def __call__(self, /, **arguments: Reading) -> None:

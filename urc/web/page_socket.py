@@ -135,19 +135,21 @@ class BrowserClient:
     async def _read_early(self) -> str:
         """Read while the session opens; return why the page must close, or "" if the page left.
 
-        STOP is handled immediately. Ticks are dropped, because they would be outdated. All other
+        STOP is handled immediately, and cancels the waiting requests about the lease: an earlier
+        reset must not undo it. Ticks are dropped, because they would be outdated. All other
         messages wait for the session.
         """
         while len(self._early) < EARLY_MESSAGES:
             message = await self._line.receive()
             if message["type"] == "websocket.disconnect":
                 return ""
-            try:
-                asked = wire.decode(_body(message))
-            except wire.BadMessage:
-                asked = None  # `_handle` reports it
+            asked = _decoded(message)
             if isinstance(asked, Stop):
                 self._drive(asked)
+                kept = (one for one in self._early if not isinstance(_decoded(one), Drive))
+                self._early = deque(kept)
+            elif not self._ticks.allow(self._service.clock.now()):
+                return f"more than {TICKS_PER_S} messages a second"
             elif not isinstance(asked, Tick):
                 self._early.append(message)
         return f"more than {EARLY_MESSAGES} messages before hello"
@@ -376,6 +378,14 @@ class BrowserClient:
         """Send the reply to a command."""
         values, code, message = outcome.values, outcome.code, outcome.message
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
+
+
+def _decoded(message: Message) -> wire.Inbound | None:
+    """Return the decoded message; None for an invalid message."""
+    try:
+        return wire.decode(_body(message))
+    except wire.BadMessage:
+        return None
 
 
 def _body(message: Message) -> str | bytes:

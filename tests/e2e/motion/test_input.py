@@ -145,7 +145,7 @@ async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker
 
 
 async def test_turning_the_device_stops_and_new_fingers_drive_again(new_page: PageMaker) -> None:
-    """The layout changes under two thumbs: they move nothing until they are put down anew."""
+    """A rotation changes the layout under two thumbs. Only new touches drive the robot."""
     async with calmly_driven() as (robot, address):
         page = await opened(new_page, address, "phone")
         hands = await fingers_on(page)

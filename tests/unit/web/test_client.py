@@ -365,7 +365,7 @@ async def test_page_that_floods_a_closed_session_is_closed_and_its_stop_counts()
     async with scene(start_lock=turn) as it:
         it.line.say({"t": "stop"})
         for _ in range(EARLY_MESSAGES):
-            it.line.say(json.dumps({"t": "tick", "command": "move", "args": {}}))
+            it.line.say({"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1})
             it.line.say("{")
         await settle()
         assert it.line.closed == (
@@ -374,6 +374,31 @@ async def test_page_that_floods_a_closed_session_is_closed_and_its_stop_counts()
         )
         assert it.service.controls.controller.lease.state.latched_by == "screen 1"
         assert it.service.controls.operators == ()
+
+
+async def test_reset_that_was_sent_before_stop_does_not_undo_it() -> None:
+    """STOP overtakes the messages that wait, so an earlier reset must not be handled after it."""
+    turn = asyncio.Lock()
+    await turn.acquire()
+    async with scene(start_lock=turn) as it:
+        it.line.say({"t": "drive", "verb": "reset"})
+        it.line.say({"t": "stop"})
+        await settle()
+        turn.release()
+        await settle()
+        assert it.line.of_type("hello")
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
+
+
+async def test_page_that_ticks_too_fast_before_hello_is_closed() -> None:
+    turn = asyncio.Lock()
+    await turn.acquire()
+    async with scene(start_lock=turn) as it:
+        for _ in range(TICKS_PER_S + 1):
+            it.line.say({"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1})
+        await settle()
+        assert it.line.closed is not None
+        assert it.line.closed[0] == CLOSE_TOO_FAST
 
 
 async def test_page_that_leaves_before_the_session_opens_leaves_no_operator() -> None:

@@ -62,7 +62,7 @@ function placeFloats(stage) {
 }
 
 /**
- * Return the shortest vertical shift of a box that makes it free; 0 if there is none.
+ * Return the shortest vertical shift to a free place for a box; 0 without a free place.
  *
  * @param {Box} box
  * @param {readonly Box[]} taken the boxes that must stay visible
