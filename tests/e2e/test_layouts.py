@@ -21,6 +21,8 @@ from tests.e2e.dashboards import (
 from tests.e2e.dev_pages import served
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
+    LEFT,
+    UP,
     USES,
     Wire,
     centre,
@@ -201,6 +203,40 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
         await robot.until_stopped()
         assert await box(page, "[data-stop-button]") == place
         assert await is_on_top(page, "[data-stop-button]")
+
+
+async def test_a_button_leads_to_the_widgets_that_a_small_screen_lacks(
+    new_page: PageMaker,
+) -> None:
+    """It is only on screens that lack widgets; each way, what is held is let go."""
+    grids = {"landscape": row("left", "right", "up"), "phone_landscape": row("left")}
+    async with driven(robot=steered(Interface("x", "X", grids))) as (robot, address):
+        page = await opened(new_page, address)
+        more = page.get_by_role("button", name="More widgets")
+        await expect(more).to_be_hidden()
+        await turned(page, PHONE_LYING)
+        await expect(page.locator(UP)).to_be_hidden()
+        await expect(more).to_have_attribute("aria-pressed", "false")
+        await push(page)
+        await robot.until_moving()
+        await more.focus()
+        await page.keyboard.press("Enter")
+        await robot.until_stopped()
+        await page.mouse.up()
+        await expect(more).to_have_attribute("aria-pressed", "true")
+        await expect(page.locator(LEFT)).to_be_hidden()
+        await page.locator(UP).hover()
+        await page.mouse.down()
+        await robot.until_moving("lift")
+        await more.focus()
+        await page.keyboard.press("Enter")
+        await robot.until_stopped("lift")
+        await page.mouse.up()
+        await expect(page.locator(UP)).to_be_hidden()
+        await push(page)
+        await robot.until_moving()
+        await page.mouse.up()
+        await robot.until_stopped()
 
 
 async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> None:

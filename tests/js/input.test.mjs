@@ -112,7 +112,7 @@ test("what is given once is locked on a page that only watches, and what moves a
   const free = { epoch: 1, latched: "", drives: true, holder: null };
   assert.deepEqual(locks(null), ["", "no connection to URC"]);
   assert.deepEqual(locks(free), ["", ""]);
-  assert.deepEqual(locks({ ...free, latched: "ann" }), ["", "Stopped by ann. Reset to drive again."]);
+  assert.deepEqual(locks({ ...free, latched: "ann" }), ["", "Reset STOP first."]);
   const taken = { ...free, holder: { id: "s1", name: "bob" } };
   assert.deepEqual(locks(taken), ["", "bob has the controls"]);
   assert.deepEqual(locks(taken, true), ["", ""]);

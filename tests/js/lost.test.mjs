@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { lossOf, wordsOf } from "../../urc/web/static/live/lost_card.js";
+import { lossOf, triesWords, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -68,4 +68,17 @@ test("an unknown cause keeps the transport's own words", () => {
 test("an address is shown without the type of its transport", () => {
   assert.equal(placeOf("serial /dev/ttyUSB0"), "/dev/ttyUSB0");
   assert.equal(placeOf("memory"), "memory");
+});
+
+test("the card counts the failed attempts and the time since the loss", () => {
+  const store = robot({ wire: "lost" });
+  const loss = lossOf(store, socket());
+  assert.ok(loss);
+  assert.equal(triesWords(loss, store, 0, 0), "1 failed attempt · URC keeps trying");
+  assert.equal(triesWords(loss, store, 0, 7000), "1 failed attempt · for 7 s · URC keeps trying");
+});
+
+test("without the server it is the page that keeps trying", () => {
+  const store = new Store();
+  assert.equal(triesWords({ of: "server", detail: "" }, store, 0, 65_000), "for 1 min · This page keeps trying");
 });

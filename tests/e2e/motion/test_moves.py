@@ -46,7 +46,7 @@ interfaces:
   default: { grid: fold beep show }
 """
 FOLD, BEEP, SHOW = (f"[data-cell='{place}'] .button-main" for place in range(3))
-LOCKED = "◆ Stopped. Reset to drive again."
+LOCKED = "◆ Reset STOP first."
 WATCHES = "◆ this page only watches"
 
 
@@ -107,7 +107,7 @@ async def test_stop_holds_back_what_moves_by_itself_and_ends_sequences(
         before = list(heard)  # the next step, B, may have come before the stop
         assert "C" not in before
         await expect(page.locator(note(0))).to_have_text(LOCKED)
-        await expect(page.locator(note(2))).to_contain_text("Reset to drive again")
+        await expect(page.locator(note(2))).to_contain_text("Reset STOP first")
         await page.click(FOLD, force=True)
         await page.click(BEEP)
         await until(lambda: "BEEP" in heard)

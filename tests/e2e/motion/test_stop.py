@@ -117,7 +117,7 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
         count = len(robot.line.written)
         await push(driver)
         note = "[data-cell='0'] .joystick-note"
-        await until_text(driver, note, "◆ Stopped by screen 2. Reset to drive again.")
+        await until_text(driver, note, "◆ Reset STOP first.")
         await driver.mouse.up()
         assert robot.after(count) == []
 

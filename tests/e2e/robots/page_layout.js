@@ -7,7 +7,7 @@
   const isShown = (el) => el.checkVisibility() && boxOf(el).width > 0;
   const stage = document.querySelector("[data-stage]");
   const room = boxOf(stage);
-  // An alarm or a latched STOP is a band below the bar, for as long as it lasts.
+  // An alarm is a band below the bar, for as long as it lasts.
   const bands = document.querySelector(".urc-bands");
   const band = bands ? boxOf(bands) : new DOMRect();
   let [ground, inside, bars] = [0, 0, 0];

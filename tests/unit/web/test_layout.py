@@ -262,8 +262,51 @@ def test_the_hint_to_turn_is_for_the_pages_that_need_it() -> None:
     drawn = Tab(name="two", layouts={"landscape": wide, "phone_portrait": wide})
     both = Interface("i", tabs={"one": Tab(name="one", layouts={"landscape": wide}), "two": drawn})
     rules = grid_css(both, ("a", "b", "c"))
-    hidden = '.urc-stage:has(> .urc-grid[data-page="{}"])>.urc-turn{{display:none}}'
+    pages = '.urc-grid[data-page="{0}"],.urc-grid[data-page="{0}-rest"]'
+    hidden = f".urc-stage:has(> :is({pages}))>.urc-turn{{{{display:none}}}}"
     assert hidden.format(1) in rules
     assert hidden.format(0) not in rules
     alone = Interface("i", tabs={"two": drawn})
     assert "urc-turn" not in grid_css(alone, ("a", "b", "c"))
+
+
+REST = '.urc-grid[data-page="0-rest"]'
+
+
+def test_widgets_that_a_screen_lacks_are_on_a_second_page_of_that_screen() -> None:
+    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+    low = Layout(1, 1, (Slot("b", 0, 0),))
+    text = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b", "c"))
+    short = text.split(REST, 1)[1].split("@media (max-height: 29.999rem)", 1)[1].split("@media")[0]
+    assert f'{REST} [data-place="0"]{{display:grid;grid-area:1/1/2/2;' in short
+    assert f'{REST} [data-place="1"]{{display:none}}' in short
+    assert f'{REST} [data-place="2"]{{display:grid;grid-area:1/2/2/3;' in short
+
+
+def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    low = Layout(1, 1, (Slot("b", 0, 0),))
+    text = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b"))
+    shown = [
+        part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
+    ]
+    assert set(shown) == {"(max-height: 29.999rem)"}
+    assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
+
+
+def test_a_complete_screen_stays_as_it_is_on_the_second_page() -> None:
+    """The device may be turned meanwhile."""
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    low = Layout(1, 1, (Slot("b", 0, 0),))
+    text = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b"))
+    rules = [part.split("@media")[0] for part in text.split(f'{REST} [data-place="1"]')[1:]]
+    assert "grid-area:1/2/2/3" in rules[0]
+
+
+def test_a_grid_for_the_left_hand_may_lack_widgets_of_its_own() -> None:
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    own = Layout(1, 1, (Slot("b", 0, 0),))
+    drawn = Interface("i", layouts={"landscape": wide}, left_handed={"phone_landscape": own})
+    left = grid_css(drawn, ("a", "b")).split(REST, 1)[1].split(LEFT_HAND)
+    assert not any("inline-flex" in part for part in left if not part.startswith(" .urc-robot"))
+    assert sum("inline-flex" in part for part in left) == 1

@@ -17,6 +17,9 @@ STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks i
 extend down next to it. Over a background, columns of buttons and values in the corners also extend
 down, but rows of buttons and values do not.
 
+A screen's grid can lack slots of the wide grid. A button then switches to a second page with these
+slots.
+
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
 """
@@ -34,6 +37,9 @@ PHONE = "(max-width: 37.499rem)"
 SHORT = "(max-height: 29.999rem)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
+REST_COLUMNS = 3
+REST = "-rest"
+"""End of ``data-page`` while a small screen shows the slots that its grid lacks."""
 LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
@@ -72,13 +78,17 @@ def grid_css(
     turned = [needs_turning(page, slots) for page in interface.pages]
     for number, page in enumerate(interface.pages):
         place = f'.urc-grid[data-page="{number}"]'
+        rest = f'.urc-grid[data-page="{number}{REST}"]'
         if any(turned) and not turned[number]:
-            css += f".urc-stage:has(> {place})>.urc-turn{{display:none}}"
+            css += f".urc-stage:has(> :is({place},{rest}))>.urc-turn{{display:none}}"
         right = _placed(page.layouts, canvas)
-        css += _screens(place, right, canvas)
         left = _left_hand(page, right, canvas)
-        if left != right:
-            css += _screens(place, left, canvas, f"{LEFT_HAND} ")
+        css += _both_hands(place, right, left, canvas)
+        if any(_missing(grids, screen) for grids in (right, left) for screen in grids):
+            css += _both_hands(rest, _rest(right, canvas), _rest(left, canvas), canvas)
+            css += "".join(_button(f":is({place},{rest})", right))
+            if left != right:
+                css += "".join(_button(f":is({place},{rest})", left, f"{LEFT_HAND} "))
     return css
 
 
@@ -89,6 +99,43 @@ class _Canvas(NamedTuple):
     background: str = ""
     """Slot behind all other slots, for example with a camera; "" if there is no background."""
     footprints: Mapping[str, Footprint] = NOTHING
+
+
+def _both_hands(
+    place: str, right: Mapping[str, Layout], left: Mapping[str, Layout], canvas: _Canvas
+) -> str:
+    css = _screens(place, right, canvas)
+    return css if left == right else css + _screens(place, left, canvas, f"{LEFT_HAND} ")
+
+
+def _missing(grids: Mapping[str, Layout], screen: str) -> list[Slot]:
+    """Return the slots of the base grid that a screen's grid lacks, in reading order."""
+    names = {slot.name for slot in grids[screen].slots}
+    missing = [slot for slot in grids["base"].slots if slot.name not in names]
+    return sorted(missing, key=lambda slot: (slot.row, slot.column))
+
+
+def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
+    """Return grids with the missing slots of each screen; a complete grid stays unchanged."""
+    rest = dict(grids)
+    for screen in grids:
+        columns = PHONE_COLUMNS if screen == PHONE else REST_COLUMNS
+        slots = tuple(
+            Slot(slot.name, place // columns, place % columns)
+            for place, slot in enumerate(_missing(grids, screen))
+        )
+        if slots:
+            free = int(bool(canvas.background) and screen != PHONE)
+            rest[screen] = Layout(slots[-1].row + 1 + free, columns, slots)
+    return rest
+
+
+def _button(place: str, grids: Mapping[str, Layout], hand: str = "") -> Iterator[str]:
+    """Yield the rules that show the button for the missing slots; `hand` as for `_screens`."""
+    for screen in grids:
+        shown = "inline-flex" if _missing(grids, screen) else "none"
+        rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{display:{shown}}}"
+        yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:

@@ -135,7 +135,7 @@ export class Controls {
     return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
   }
 
-  /** Return the text of the band of a latched STOP. */
+  /** Return the text in the bar for a latched STOP. */
   stoppedWords() {
     const { lease, posted } = this.drive;
     const by = lease?.latched || posted?.latched || "";

@@ -176,8 +176,7 @@ export class Input {
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
-    if (lease.latched && lease.latched === lease.name) return t("Stopped. Reset to drive again.");
-    if (lease.latched) return t("Stopped by {name}. Reset to drive again.", { name: said(lease.latched) });
+    if (lease.latched) return t("Reset STOP first."); // the bar names the operator
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return "";

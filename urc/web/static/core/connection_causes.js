@@ -3,6 +3,7 @@
  * Causes of failed connections in the user's language, each with a hint. The server determines the
  * cause; see `urc.runtime.connection_cause`.
  */
+import { ageText } from "./formatting.js";
 import { mark, t } from "./words.js";
 
 /**
@@ -84,4 +85,15 @@ function typeOf(address) {
 export function placeOf(address) {
   const blank = address.indexOf(" ");
   return blank > 0 ? address.slice(blank + 1) : address;
+}
+
+/** @param {number} attempts failed attempts to connect */
+export function attemptsText(attempts) {
+  if (attempts === 1) return t("1 failed attempt");
+  return attempts > 0 ? t("{n} failed attempts", { n: attempts }) : "";
+}
+
+/** @param {number} lostMs duration of the loss; no text below 1 s */
+export function lostForText(lostMs) {
+  return lostMs >= 1000 ? t("for {age}", { age: ageText(lostMs / 1000) }) : "";
 }

@@ -7,7 +7,7 @@
  * @typedef {import("./store.js").Store} Store
  */
 import { part } from "./badge.js";
-import { causeWords } from "../core/connection_causes.js";
+import { attemptsText, causeWords, lostForText } from "../core/connection_causes.js";
 import { said, t } from "../core/words.js";
 
 /** Time from the loss of a good connection until the card covers the page. */
@@ -29,6 +29,7 @@ export class LostCard {
     this.title = part(el, "[data-lost-title]");
     this.cause = part(el, "[data-lost-cause]");
     this.step = part(el, "[data-lost-step]");
+    this.tries = part(el, "[data-lost-tries]");
     this.again = part(el, "[data-lost-again]");
     this.shown = "";
     /** Transports that only commands open. @type {string[]} */
@@ -37,6 +38,9 @@ export class LostCard {
     this.wasGood = false;
     /** Time of the current loss; 0 without a loss. */
     this.lostMs = 0;
+    /** Kind of the current loss, and the time since which it is of this kind. @type {Loss["of"] | undefined} */
+    this.lostOf = undefined;
+    this.partMs = 0;
     this.again.addEventListener("click", () => {
       tryNow();
       this.again.setAttribute("disabled", "");
@@ -56,7 +60,11 @@ export class LostCard {
     if (!loss) this.wasGood ||= store.isUp && [...store.links.values()].some(isConnected);
     if (!loss) this.lostMs = 0;
     else if (this.lostMs === 0) this.lostMs = nowMs;
+    if (loss?.of !== this.lostOf) this.partMs = nowMs;
+    this.lostOf = loss?.of;
     const isShown = loss !== null && (!this.wasGood || nowMs - this.lostMs >= GRACE_MS);
+    const tries = isShown ? triesWords(loss, store, this.partMs, nowMs) : "";
+    if (this.tries.textContent !== tries) this.tries.textContent = tries;
     const key = isShown ? JSON.stringify(loss) : "";
     if (key === this.shown) return;
     this.shown = key;
@@ -104,6 +112,22 @@ export function wordsOf(loss, title) {
     case "server":
       return { heading: t("No connection to URC"), cause: "", step: t("Is the server running? Is this device on its network?"), isForeign: false };
   }
+}
+
+/**
+ * Return the number of failed attempts and the duration of the loss. They change every second, so
+ * screen readers do not announce them.
+ *
+ * @param {Loss} loss
+ * @param {Store} store
+ * @param {number} lostMs time at which the page noticed the loss
+ * @param {number} nowMs
+ */
+export function triesWords(loss, store, lostMs, nowMs) {
+  if (loss.of !== "robot") return [lostForText(nowMs - lostMs), t("This page keeps trying")].filter(Boolean).join(" · ");
+  const attempts = store.links.get(loss.transport)?.attempts ?? 0;
+  const lostFor = lostForText(nowMs - (store.downMs.get(loss.transport) ?? lostMs));
+  return [attemptsText(attempts), lostFor, t("URC keeps trying")].filter(Boolean).join(" · ");
 }
 
 /**

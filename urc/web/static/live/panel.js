@@ -9,8 +9,8 @@
  * @typedef {import("./store.js").Store} Store
  */
 import { part } from "./badge.js";
+import { attemptsText, lostForText } from "../core/connection_causes.js";
 import { clock } from "../widgets/kit.js";
-import { ageText } from "./store.js";
 import { said, t } from "../core/words.js";
 
 const LINES_KEPT = 200;
@@ -93,9 +93,9 @@ function linkElement(link) {
   el.append(element("span", "urc-link-more", link.address));
   if (link.detail) el.append(element("span", "urc-link-more", link.detail));
   const counts = [
-    link.attempts === 1 ? t("1 failed attempt") : link.attempts > 0 ? t("{n} failed attempts", { n: link.attempts }) : "",
+    attemptsText(link.attempts),
     link.faults === 1 ? t("1 fault") : link.faults > 0 ? t("{n} faults", { n: link.faults }) : "",
-    link.state === "lost" && link.since >= 1000 ? t("for {age}", { age: ageText(link.since / 1000) }) : "",
+    link.state === "lost" ? lostForText(link.since) : "",
   ].filter(Boolean);
   if (counts.length > 0) el.append(element("span", "urc-link-more", counts.join(" · ")));
   return el;

@@ -15,6 +15,7 @@ import { part } from "./badge.js";
 import { keepFloatsFree } from "./floats.js";
 import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
+import { watchRest } from "./rest_page.js";
 import { tabsOf } from "./tabs.js";
 import { said, t } from "../core/words.js";
 
@@ -25,6 +26,7 @@ export class ViewSwitch {
    */
   constructor(root, doors) {
     this.doors = doors;
+    this.root = root;
     this.el = part(root, "[data-stage]");
     /** @type {Debug | null} */
     this.debug = null;
@@ -63,7 +65,9 @@ export class ViewSwitch {
     host.mountAll(this.el);
     this.ends = new AbortController();
     keepFloatsFree(this.el, this.ends.signal);
-    tabsOf(this.el, () => input.letGo(t("another page was opened")));
+    const letGo = () => input.letGo(t("another page was opened"));
+    tabsOf(this.el, letGo);
+    watchRest(this.root, this.el, letGo, this.ends.signal);
     const el = this.el.querySelector("[data-debug]");
     if (el instanceof HTMLElement) void this.search(el);
     wake();

@@ -1,0 +1,37 @@
+// @ts-check
+/**
+ * The button for widgets that a small screen's grid lacks.
+ *
+ * The end of the grid's page number selects them. The grid's rules place the cells, and show the
+ * button only on screens that lack widgets: see `urc.web.show.layout`.
+ */
+import { part } from "./badge.js";
+
+const REST = "-rest";
+
+/**
+ * @param {ParentNode} root
+ * @param {ParentNode} stage
+ * @param {() => void} leave called before each change of the page
+ * @param {AbortSignal} signal
+ */
+export function watchRest(root, stage, leave, signal) {
+  const button = part(root, "[data-rest]");
+  const grid = stage.querySelector(".urc-grid");
+  if (!(grid instanceof HTMLElement)) return; // the debug interface
+  const isRest = () => (grid.dataset["page"] ?? "").endsWith(REST);
+  const show = () => button.setAttribute("aria-pressed", String(isRest()));
+  button.addEventListener(
+    "click",
+    () => {
+      leave();
+      const number = (grid.dataset["page"] ?? "0").replace(REST, "");
+      grid.dataset["page"] = isRest() ? number : number + REST;
+    },
+    { signal },
+  );
+  const changes = new MutationObserver(show); // a tab changes the page, too
+  changes.observe(grid, { attributeFilter: ["data-page"] });
+  signal.addEventListener("abort", () => changes.disconnect());
+  show();
+}
