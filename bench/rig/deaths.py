@@ -275,6 +275,6 @@ class Rig:
 
 
 def _order(heard: Sequence[Heard]) -> str:
-    """Return a message if a value is older than an earlier value, otherwise ""."""
+    """Return a message if a value is older than one received before it, otherwise ""."""
     sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
     return "" if sent == sorted(sent) else "an older value arrived after a newer value"

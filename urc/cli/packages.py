@@ -171,7 +171,7 @@ def add_waivers(parser: argparse.ArgumentParser) -> None:
 
 
 def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
-    """Return the plan with the waivers of `--allow-unsigned`; raise `PackageError` on failure."""
+    """Return the plan with the waivers that `--allow-unsigned` grants; raise `PackageError`."""
     from urc.packages.names import parse_requirement
 
     words = [parse_requirement(word) for word in arguments.allow_unsigned]

@@ -10,8 +10,8 @@ would override other sources of motion.
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
 are refused. The operator must release the control and press it again to rearm it.
 
-If the connection is lost while the robot may be moving, the control owes a stop. This stop is the
-first frame sent on the restored connection. All other unsent values are dropped.
+If the connection is lost while the robot may be moving, a stop is still due. This stop is the first
+frame sent on the restored connection. All other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple

@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the accepted types of host keys, with the types of known keys before other types."""
+    """Return the accepted host key types, the types of known keys first."""
     familiar = [
         name.decode("ascii")
         for key in known

@@ -135,8 +135,8 @@ class BrowserClient:
     async def _read_early(self) -> str:
         """Read while the session opens; return why the page must close, or "" if the page left.
 
-        STOP is handled immediately, and cancels the waiting requests about the lease: an earlier
-        reset must not undo it. Ticks are dropped, because they would be outdated. All other
+        STOP is handled immediately, and cancels waiting requests about the lease, so that an
+        earlier reset cannot undo it. Ticks are dropped, because they would be outdated. All other
         messages wait for the session.
         """
         while len(self._early) < EARLY_MESSAGES:

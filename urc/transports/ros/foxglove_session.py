@@ -1,7 +1,7 @@
 """The state of one open connection of the Foxglove protocol: channels, subscriptions, calls.
 
-The session does no I/O. It writes frames to a list, and the transport sends these frames. Objects
-serve only one connection, so no state is carried over to the next connection.
+The session does no I/O. It writes frames to a list, and the transport sends these frames. Each
+object serves a single connection, so no state is carried over to the next.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
 only to the driver's topics. The bridge sends every message, so the session itself drops messages
