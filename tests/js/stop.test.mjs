@@ -60,3 +60,14 @@ test("what waits to be given is forgotten then, and questions are", async () => 
   giver.become("");
   assert.deepEqual([given, forgotten], [[{ value: 1 }], 1]);
 });
+
+test("STOP is sent even if a widget throws an exception", () => {
+  const { drive, stop } = scene();
+  let sent = 0;
+  drive.stop = () => void (sent += 1);
+  stop.input.spendAll = () => {
+    throw new Error("a bug of a widget");
+  };
+  assert.throws(() => stop.press());
+  assert.equal(sent, 1);
+});

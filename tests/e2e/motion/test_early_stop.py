@@ -88,6 +88,27 @@ async def test_the_modules_repeat_an_early_stop_that_did_not_arrive(new_page: Pa
         assert set(robot.line.texts) == set(BOTH_STOPPED)
 
 
+async def test_the_modules_repeat_an_early_stop_that_is_still_on_its_way(
+    new_page: PageMaker,
+) -> None:
+    """Its connection may have lost a packet; the modules have another one."""
+    held = asyncio.Event()
+
+    async def hold(route: Route) -> None:
+        await held.wait()
+        await route.abort()
+
+    async with without_modules(new_page) as (robot, page, released):
+        new_page.allow(page, lambda text: "STOP" in text or "ERR_FAILED" in text)
+        await page.route(STOP_URL, hold, times=1)
+        await touch(page)
+        await until_attribute(page, STOP, "data-phase", "sending")
+        released.set()
+        await until(lambda: set(robot.line.texts) == set(BOTH_STOPPED))
+        await until_text(page, NOTE, DONE)
+        held.set()
+
+
 async def test_the_stop_widget_acts_before_it_is_mounted(new_page: PageMaker) -> None:
     wire = Wire(WidgetUse("up", "stop", {}, {}, {}), lease_s=CALM_LEASE_S)
     async with without_modules(new_page, wire) as (robot, page, released):

@@ -72,13 +72,13 @@ export class StopButton {
   }
 
   press() {
+    this.drive.stop(); // first: `spendAll` calls widgets
     this.input.spendAll("STOP");
-    this.drive.stop();
     this.heard();
   }
 
   /**
-   * Take over presses from `early_stop.js`, and repeat a press that it could not deliver.
+   * Take over presses from `early_stop.js`, and repeat a press that it has not delivered yet.
    *
    * @param {HTMLElement} root the element with the URL of STOP
    */
@@ -87,7 +87,7 @@ export class StopButton {
       event.preventDefault();
       this.press();
     });
-    if (root.dataset["stopSent"] === "fault") this.press();
+    if (["sending", "fault"].includes(root.dataset["stopSent"] ?? "")) this.press();
   }
 
   /**

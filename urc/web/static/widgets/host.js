@@ -81,6 +81,8 @@ export class Host {
    * @param {HTMLElement} el
    */
   async mountForeign(el) {
+    // Before the first await: until the dead-man control has loaded, nothing can be driven.
+    if (JSON.parse(el.dataset["config"] ?? "{}").deadMan) this.doors.input.gated.add(el);
     const { FrameHost } = await import("../frame/frame_host.js"); // most pages do not need it
     if (el.isConnected && !this.cells.has(el)) await this.mount(new FrameHost(el, this.doors));
   }
@@ -97,9 +99,9 @@ export class Host {
       this.sight.unobserve(el);
       this.sizes.unobserve(el);
       this.waiting.delete(cell);
-      this.doors.input.gated.delete(cell.el);
       cell.unmount();
     }
+    for (const el of this.doors.input.gated) if (root.contains(el)) this.doors.input.gated.delete(el);
   }
 
   /** Whether any widget has a signal as its input. @param {string} name */
