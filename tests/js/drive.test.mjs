@@ -56,14 +56,14 @@ test("STOP that nobody could be told is told as soon as URC is back", async () =
   const socket = { unsent: 0, tripMs: 2, send: (/** @type {any} */ { t }) => isUp && sent.push(t) > 0 };
   const drive = new Drive(/** @type {any} */ (socket), "http://127.0.0.1:1/stop", () => {});
   globalThis.fetch = () => Promise.reject(new Error("there is nobody"));
-  const lease = { you: "s1", epoch: 3, holder: null, asker: null, latched: "", confirmed: false, drives: true, left: 0 };
+  const lease = { you: "s1", epoch: 3, holder: null, asker: null, latched: "", confirmed: false, drives: true, left: 0, stops: 0 };
   drive.stop();
   await new Promise(setImmediate);
   assert.equal(drive.phase, "failed");
   isUp = true;
   drive.setLease(/** @type {any} */ (lease), nowMs);
   assert.deepEqual([sent, drive.phase], [["stop"], "sent"]);
-  drive.setLease(/** @type {any} */ ({ ...lease, epoch: 4, latched: "screen 1" }), nowMs);
+  drive.setLease(/** @type {any} */ ({ ...lease, epoch: 4, latched: "screen 1", stops: 1 }), nowMs);
   assert.deepEqual([sent, drive.phase, drive.isLatched], [["stop"], "", true]);
 });
 
@@ -77,4 +77,35 @@ test("a stop is told by how often it was pressed, also when it was reset before 
   assert.equal(set({ epoch: 5, stops: 5, latched: "ann" }), true);
   assert.equal(set({ epoch: 6, stops: 5 }), false, "reset");
   assert.equal(set({ epoch: 9, stops: 6 }), true, "stopped and reset");
+});
+
+test("a latch from before the press is no answer to STOP", async () => {
+  let posts = 0;
+  globalThis.fetch = (url) => {
+    posts += Number(url === "http://127.0.0.1:1/newer"); // timers of other tests may post, too
+    return Promise.reject(new Error("the link is down"));
+  };
+  const socket = { unsent: 0, tripMs: 2, send: () => true };
+  const drive = new Drive(/** @type {any} */ (socket), "http://127.0.0.1:1/newer", () => {});
+  const lease = { you: "s1", epoch: 3, holder: null, asker: null, latched: "", confirmed: false, drives: true, left: 0, stops: 5 };
+  drive.setLease(/** @type {any} */ (lease), nowMs);
+  drive.stop();
+  drive.setLease(/** @type {any} */ ({ ...lease, latched: "bob" }), nowMs); // sent before the press
+  assert.equal(drive.phase, "sent");
+  await new Promise((done) => setTimeout(done, 400));
+  assert.equal(posts, 1);
+  drive.setLease(/** @type {any} */ ({ ...lease, latched: "bob", stops: 6 }), nowMs);
+  assert.equal(drive.phase, "");
+});
+
+test("a reset names the STOPs that its page knows", () => {
+  /** @type {any[]} */
+  const sent = [];
+  const socket = { unsent: 0, tripMs: 2, send: (/** @type {any} */ message) => sent.push(message) > 0 };
+  const drive = new Drive(/** @type {any} */ (socket), "", () => {});
+  const lease = { you: "s1", epoch: 3, holder: null, asker: null, latched: "bob", confirmed: true, drives: true, left: 0, stops: 5 };
+  drive.setLease(/** @type {any} */ (lease), nowMs);
+  drive.say("reset");
+  drive.say("take");
+  assert.deepEqual(sent, [{ t: "drive", verb: "reset", stops: 5 }, { t: "drive", verb: "take" }]);
 });

@@ -178,7 +178,7 @@ class LocalMotion(ProgramControls):
         while True:
             for command, reason in await backend.stops():
                 self.controller.stopped(command, reason)
-                if reason not in ("released", "stopped"):
+                if reason not in ("released", "stopped", "lost"):
                     self.stopped(command, reason)
 
     def _changed(self, state: LeaseState) -> None:

@@ -214,7 +214,8 @@ class RemoteMotion(ProgramControls):
     async def _ask(self, verb: Verb, is_done: Callable[[], bool]) -> str:
         """Send a request about the controls; return the reason for a failure, or ""."""
         self._refusals.pop(verb, None)
-        if not self._socket.send(Drive(verb)):
+        stops = self.lease.stops if verb == "reset" and self.lease is not None else None
+        if not self._socket.send(Drive(verb, stops=stops)):
             return _CUT
 
         def is_over() -> bool:

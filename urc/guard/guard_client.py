@@ -8,8 +8,9 @@ of other armed commands. For each pending stop, the guard opens the connection a
 first. Motion never resumes automatically.
 
 A control's state *may be moving* begins with its first tick or stop request. The state ends when
-the guard reports that it has written the stop after the newest tick. A pending stop is therefore
-not lost when the guard process dies.
+the guard reports that it has written the stop after the newest tick. It begins again if the guard
+reports that this stop may be lost with the connection. A pending stop is therefore not lost when
+the guard process dies.
 """
 
 import asyncio
@@ -22,7 +23,7 @@ from urc.guard import messages
 from urc.guard.channel import Channel, ChannelListener, GuardedLineSpec
 from urc.guard.proxy import GuardedTransport, Stands
 from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
-from urc.motion.hold_to_run import STOP_FOR_S, HoldTerms, HoldToRun, Reason
+from urc.motion.hold_to_run import STOP_FOR_S, HoldTerms, HoldToRun, StopReport
 from urc.problems import UrcError
 
 __all__ = ["GuardClient", "HeldSpec"]
@@ -99,7 +100,7 @@ class GuardClient:
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
         """Table of all commands that are armed or may be moving."""
-        self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
+        self._stops: deque[tuple[str, StopReport]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
     def start(self) -> None:
@@ -152,6 +153,11 @@ class GuardClient:
             renewal = messages.ReplaceStop(command, terms.stop, terms.stops)
             self.channel.post(renewal, slot=f"{command} stop")
 
+    def is_armed(self, command: str) -> bool:
+        """Return whether the guard accepts ticks of `command`."""
+        control = self._controls.get(command)
+        return control is not None and control.is_armed
+
     def release(self, command: str) -> None:
         """Stop `command` because its control was released."""
         self._discard_tick(command)
@@ -195,12 +201,17 @@ class GuardClient:
         since_s = self.channel.now() - control.stopped_s
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
+    def owes_stop(self, command: str) -> bool:
+        """Return whether `command` may be moving, because no stop is known to have been sent."""
+        control = self._controls.get(command)
+        return control is not None and control.may_move
+
     def is_open(self, command: str) -> bool:
         """Return whether the guard last reported the connection of `command` as open."""
         return self.transports[self._held[command].line].is_open
 
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for written stops; return the command and the reason for each stop.
+    async def stops(self) -> Sequence[tuple[str, StopReport]]:
+        """Wait for written or lost stops; return the command and the report for each stop.
 
         Cancelling loses none.
         """
@@ -236,9 +247,9 @@ class GuardClient:
         for spec in self.lines:
             yield spec.make
         for command, control in self._controls.items():
+            control.number = 0
             if control.may_move:
                 control.is_armed = False
-                control.number = 0
                 yield messages.RecoverStop(control.line, command, control.terms)
             elif control.is_armed:
                 yield messages.ArmControl(control.line, command, control.terms)
@@ -247,8 +258,12 @@ class GuardClient:
         """Handle a message from the guard; `size` is its size in bytes for flow control."""
         if isinstance(message, messages.StopWritten):
             self._record_stop(message)
+        elif isinstance(message, messages.StopDue):
+            self._record_due(message.control)
         elif not isinstance(message, messages.Heartbeat):
             self.transports[message.line].handle(message, size)
+            if isinstance(message, messages.LineLost | messages.LineClosed):
+                self._disarm(message.line)
             if isinstance(message, messages.CountersAdvanced):
                 self._tick_again(message)
 
@@ -282,7 +297,24 @@ class GuardClient:
             if stopped.reason != "released":
                 control.is_armed = False
                 control.counted = None
-        self._stops.append((stopped.control, stopped.reason))
+        self._report(stopped.control, stopped.reason)
+
+    def _record_due(self, command: str) -> None:
+        """Record that the stop of `command` may be lost, although it was reported as written."""
+        control = self._controls.get(command)
+        if control is not None and not control.may_move:
+            control.may_move = True
+            control.is_armed = False
+            self._report(command, "lost")
+
+    def _disarm(self, line: str) -> None:
+        """Record that the guard has disarmed the controls of a closed connection."""
+        for control in self._controls.values():
+            if control.line == line:
+                control.is_armed = False
+
+    def _report(self, command: str, report: StopReport) -> None:
+        self._stops.append((command, report))
         self._stopped.set()
 
 

@@ -19,7 +19,7 @@ from urc.guard import messages
 from urc.guard.liveness_watch import LivenessWatch
 from urc.guard.motion_scheduler import MotionScheduler
 from urc.guard.pipe import UNFIT
-from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, why_broken
+from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, tolerant, why_broken
 from urc.guard.sent_counters import SentCounters
 from urc.model.payload import Payload
 from urc.transports.base import (
@@ -100,7 +100,9 @@ class GuardedConnection:
             is_moving=lambda: self.scheduler.is_moving,
             failed=self._stall,
         )
-        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._offer = None
+        if isinstance(transport, SupportsOffer):
+            self._offer = tolerant(transport.offer, False, self._stall)
         self._prompt = transport if isinstance(transport, Prompt) else None
         self._abort = transport.abort if isinstance(transport, SupportsAbort) else None
         self._queue: SendQueue[int] = SendQueue(
@@ -353,7 +355,8 @@ class GuardedConnection:
     def _cut(self, reason: str) -> None:
         self._is_open = False
         self._liveness.end()
-        self.scheduler.cut()
+        for control in self.scheduler.cut():
+            self._emit(messages.StopDue(control))
         self._queue.end()
         if self._is_handed:
             self._is_handed = False

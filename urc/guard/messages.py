@@ -34,6 +34,7 @@ __all__ = [
     "SendBytes",
     "SendDone",
     "SendStale",
+    "StopDue",
     "StopMotion",
     "StopWritten",
     "RenewLease",
@@ -224,6 +225,12 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
     """Number of the newest tick when the stop was written."""
 
 
+class StopDue(msgspec.Struct, array_like=True, frozen=True, tag=32):
+    """A control's stop may be lost with the connection; the guard writes the stop again first."""
+
+    control: str
+
+
 class Heartbeat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """Periodic proof that the guard is alive."""
 
@@ -277,6 +284,7 @@ FromGuard = (
     | LineLost
     | LineClosed
     | StopWritten
+    | StopDue
     | Heartbeat
     | CountersAdvanced
     | SendStale

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle
+from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, tolerant
 from urc.guard.sent_counters import SentCounters
 from urc.model.payload import Count, Numbered, Payload
 from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
@@ -68,9 +68,13 @@ class MotionScheduler:
                 obsolete tick.
         """
         self._clock = clock
-        self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
-        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
-        self._forget = transport.forget if isinstance(transport, SupportsForget) else None
+        self._unsent = self._offer = self._forget = None
+        if isinstance(transport, SupportsUnsent):
+            self._unsent = tolerant(transport.unsent, 1, failed)  # 1: it stays in doubt
+        if isinstance(transport, SupportsOffer):
+            self._offer = tolerant(transport.offer, False, failed)
+        if isinstance(transport, SupportsForget):
+            self._forget = tolerant(transport.forget, None, failed)
         self._is_strict = is_strict or self._forget is not None
         self._told = told
         self._failed = failed
@@ -195,18 +199,27 @@ class MotionScheduler:
             hold_to_run.restored(now)
         self.write_due()
 
-    def cut(self) -> None:
-        """Record that the connection is closed, and drop all unsent frames."""
+    def cut(self) -> list[str]:
+        """Record that the connection is closed, and drop all unsent frames.
+
+        Returns:
+            Controls whose stops were reported as written, and may be lost with the connection.
+        """
         self._is_open = False
         for control, is_stop in self.queue.end():
             if is_stop:
                 self._doubtful.add(control)
+        lost: list[str] = []
         for control, hold_to_run in self._holds.items():
+            is_reported = hold_to_run.state != "moving" and hold_to_run.is_told
             hold_to_run.cut(is_doubtful=control in self._doubtful)
+            if is_reported and hold_to_run.owes_stop:
+                lost.append(control)
         self._all_arrived()
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
+        return lost
 
     def write_due(self) -> None:
         """Write all due frames."""

@@ -4,16 +4,18 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, ParamSpec, Protocol, TypeVar
 
 from urc.model.payload import Payload
 from urc.transports.base import PeerClosed, TransportError
 
-__all__ = ["LaneClock", "SendQueue", "TimerHandle", "why_broken"]
+__all__ = ["LaneClock", "SendQueue", "TimerHandle", "tolerant", "why_broken"]
 
 log = logging.getLogger(__name__)
 
 _Tag = TypeVar("_Tag")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
 class TimerHandle(Protocol):
@@ -145,3 +147,21 @@ def why_broken(bug: Exception) -> str:
     """Log an unexpected error of a transport; return an error message for people."""
     log.error("a transport failed in an unexpected way", exc_info=bug)
     return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"
+
+
+def tolerant(
+    call: Callable[_P, _R], instead: _R, failed: Callable[[str], None]
+) -> Callable[_P, _R]:
+    """Return `call` without exceptions: a failure is passed to `failed`, and `instead` returned.
+
+    A third-party transport may raise anything. An exception must not end the timer of a lease.
+    """
+
+    def tried(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        try:
+            return call(*args, **kwargs)
+        except Exception as bug:  # supervisor, as described
+            failed(why_broken(bug))
+            return instead
+
+    return tried

@@ -19,7 +19,14 @@ from typing import Final, Literal, NamedTuple
 from urc.model.payload import FrameVariants, Numbered, Payload
 from urc.motion.rate_limiter import RateLimiter
 
-__all__ = ["LEASE_S", "LONGEST_LEASE_S", "SHORTEST_LEASE_S", "HoldToRun", "HoldTerms"]
+__all__ = [
+    "LEASE_S",
+    "LONGEST_LEASE_S",
+    "SHORTEST_LEASE_S",
+    "HoldTerms",
+    "HoldToRun",
+    "StopReport",
+]
 
 SHORTEST_LEASE_S: Final = 0.1
 LEASE_S: Final = 0.25
@@ -30,6 +37,8 @@ STOP_FOR_S: Final = 0.5
 """Duration of the repeated stops, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
+StopReport = Reason | Literal["lost"]
+"""Report about a stop: written for a reason, or written and then lost with the connection."""
 
 
 class HoldTerms(NamedTuple):

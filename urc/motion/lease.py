@@ -201,15 +201,18 @@ class Lease:
         self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
         return LeaseChanged(self.state, must_stop=True)
 
-    def reset(self, client: Operator) -> LeaseChanged | LeaseRefused:
+    def reset(self, client: Operator, stops: int | None = None) -> LeaseChanged | LeaseRefused:
         """Reset the latch, so that operators can drive the robot again.
 
-        A reset does not start motion.
+        A reset does not start motion, and does not undo a newer STOP. `stops` is the number of
+        STOPs that `client` knew. None means the current number.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("viewers can stop the robot, but cannot reset it")
         if not self.state.latched_by:
             return LeaseRefused("nothing is stopped")
+        if stops is not None and stops != self.state.stops:
+            return LeaseRefused("STOP was pressed again: reset it again")
         self.state = self._next()
         return LeaseChanged(self.state, must_stop=False)
 

@@ -8,7 +8,7 @@ from urc.model.driver import Command, Driver
 from urc.model.exchange import Hold
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
-from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.motion.hold_to_run import HoldTerms, StopReport
 from urc.motion.slew_rate import SlewRateLimiter
 from urc.motion.stall import STALLED_S
 from urc.protocol.events import MotionEvent
@@ -57,8 +57,14 @@ class MotionBackend(Protocol):
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame of `command` without arming the command."""
 
+    def is_armed(self, command: str) -> bool:
+        """Return whether ticks of `command` are accepted; a lost connection disarms the command."""
+
     def is_stopping(self, command: str) -> bool:
         """Return whether `command` may still be moving, or its stop may still be repeated."""
+
+    def owes_stop(self, command: str) -> bool:
+        """Return whether `command` may be moving, because no stop is known to have been sent."""
 
     def is_open(self, command: str) -> bool:
         """Return whether the transport of `command` is connected, as last reported."""
@@ -69,8 +75,8 @@ class MotionBackend(Protocol):
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop all motion immediately; `stops` maps each held command to its stop frame."""
 
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for written stop frames; return the command and the stop reason of each frame.
+    async def stops(self) -> Sequence[tuple[str, StopReport]]:
+        """Wait for written or lost stop frames; return the command and the report of each frame.
 
         The returned list is in order and never empty. Cancelling the wait loses no stop. After the
         transport has accepted the stop frame, a control that was stopped by `stop` is reported as

@@ -25,7 +25,7 @@ from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.role import includes
 from urc.model.values import Reading
 from urc.motion.freshness import ControlInput, Freshness
-from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.motion.hold_to_run import HoldTerms, StopReport
 from urc.motion.lease import REQUEST_S, Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
 from urc.problems import UrcError
 from urc.protocol.events import MotionEvent, MotionReady, MotionRefused, NumbersUsed
@@ -83,6 +83,8 @@ class MotionController:
         self._moves = any(one.moves for one in driver.commands.values())
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
+        self._due: set[str] = set()
+        """Held commands whose stops the previous session could not deliver."""
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after a stop is confirmed."""
         self.on_moved: Moved = _unseen
@@ -126,6 +128,13 @@ class MotionController:
         return not self._unconfirmed
 
     @property
+    def is_stop_due(self) -> bool:
+        """Whether a STOP or the stop of a held command has not reached the robot yet."""
+        backend = self._backend
+        is_owing = backend is not None and any(map(backend.owes_stop, self._holds))
+        return bool(self._unconfirmed or self._due) or is_owing
+
+    @property
     def deadline(self) -> float | None:
         """Time of the next call to `expire`, or None."""
         return self.lease.deadline
@@ -140,11 +149,21 @@ class MotionController:
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle
         backend = self._backend
-        if backend is not None and not self._unconfirmed.isdisjoint(self._holds):
-            backend.stop(self._stop_frames(self._holds))
+        due = [name for name in self._holds if name in self._due]
+        if not self._unconfirmed.isdisjoint(self._holds):
+            due = list(self._holds)
+        if backend is not None and due:
+            backend.stop(self._stop_frames(due))
+            self._due.clear()
 
     def detach(self) -> None:
-        """Detach the session: the backend stops all motion, and every control is disarmed."""
+        """Detach the session: the backend stops all motion, and every control is disarmed.
+
+        Stops that have not reached the robot are sent first in the next session.
+        """
+        backend = self._backend
+        if backend is not None:
+            self._due.update(filter(backend.owes_stop, self._holds))
         self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
@@ -179,8 +198,18 @@ class MotionController:
 
     # -- the lease
 
-    def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
-        """Apply a page's lease request; return the reason for a refusal, or ""."""
+    def drive(
+        self,
+        client: str,
+        verb: Verb,
+        now: float,
+        for_s: float = REQUEST_S,
+        stops: int | None = None,
+    ) -> str:
+        """Apply a page's lease request; return the reason for a refusal, or "".
+
+        `stops` is the number of STOPs that the page knew at a reset; see `Lease.reset`.
+        """
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
             outcome: LeaseChanged | LeaseRefused | None = lease.acquire(who, now)
@@ -193,7 +222,7 @@ class MotionController:
         elif verb == "leave":
             outcome = lease.leave(client)
         elif verb == "reset":
-            outcome = lease.reset(who)
+            outcome = lease.reset(who, stops)
         else:
             return f"unknown lease request {verb!r}"
         if isinstance(outcome, LeaseRefused):
@@ -261,7 +290,7 @@ class MotionController:
             arguments = control.limited(arguments, now)
         try:
             data = frames.motion_frame(command, arguments, now)
-            if not control.is_armed:
+            if not (control.is_armed and backend.is_armed(command)):
                 backend.arm(command, self._terms(command, frames))
                 control.is_armed, control.is_lasting = True, frames.is_lasting(command)
             elif not control.is_lasting:
@@ -326,10 +355,13 @@ class MotionController:
         self._abandon(command, control, backend, why)
         self.on_refused(command, why)
 
-    def stopped(self, command: str, reason: Reason) -> None:
-        """Handle the backend's report that the stop of a control was written."""
+    def stopped(self, command: str, reason: StopReport) -> None:
+        """Handle the backend's report that the stop of a control was written or lost."""
         control = self._controls.get(command)
         if control is None:
+            return
+        if reason == "lost":
+            self._lose_stop(command, control)
             return
         if control.motion_state == "ending":  # otherwise, it already moves again
             control.motion_state = "rest"
@@ -340,6 +372,17 @@ class MotionController:
             return
         if reason != "released":
             self.given(command)
+
+    def _lose_stop(self, command: str, control: HeldControl) -> None:
+        """Record that a written stop may not have reached the robot; the backend writes it again.
+
+        While STOP is latched, it is no longer confirmed.
+        """
+        if control.motion_state == "rest":
+            control.motion_state = "ending"
+        if self.lease.latched:
+            self._unconfirmed.add(command)
+            self.on_change(self.lease.state)
 
     # -- renewed stops
 
@@ -426,6 +469,8 @@ class MotionController:
             except UrcError:  # reported by `urc validate`
                 if control.is_armed and control.stop is not None:
                     made[name] = control.stop  # rendered when it was armed
+                else:
+                    control.is_owed_again = True  # once the connection steps have read its values
         return made
 
 

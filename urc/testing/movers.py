@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from urc.model.driver import Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
-from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
+from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason, StopReport
 from urc.problems import UrcError
 from urc.protocol.events import MotionEvent, NumbersUsed
 from urc.protocol.requests.encode import check_arguments
@@ -110,7 +110,7 @@ class FakeMotionBackend:
         self._write = write
         self._backend: dict[str, HoldToRun] = {}
         self._alarm: Timer | None = None
-        self._stops: asyncio.Queue[tuple[str, Reason]] = asyncio.Queue()
+        self._stops: asyncio.Queue[tuple[str, StopReport]] = asyncio.Queue()
 
     @property
     def texts(self) -> list[str]:
@@ -123,6 +123,10 @@ class FakeMotionBackend:
         if hold_to_run is None or hold_to_run.state == "idle":
             hold_to_run = self._backend[command] = HoldToRun(terms)
         hold_to_run.arm()
+
+    def is_armed(self, command: str) -> bool:
+        """Return whether ticks of the command are accepted."""
+        return command in self._backend and self._backend[command].is_armed
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease."""
@@ -139,6 +143,10 @@ class FakeMotionBackend:
     def is_stopping(self, command: str) -> bool:
         """Return whether the command is moving the robot or must still stop it."""
         return command in self._backend and self._backend[command].state != "idle"
+
+    def owes_stop(self, command: str) -> bool:
+        """Return whether the command is moving the robot or its stop is not written yet."""
+        return self.is_stopping(command)
 
     def is_open(self, command: str) -> bool:
         """Return whether the command's transport is connected."""
@@ -158,7 +166,7 @@ class FakeMotionBackend:
             hold_to_run.stop("stopped", self._clock.now())
         self.write_due()
 
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
+    async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait until stops are written, and return them."""
         return [await self._stops.get()]
 

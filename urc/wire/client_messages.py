@@ -125,10 +125,14 @@ class Reconnect(
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
-    """A request about the lease; `for_s` is the time for the holder's answer, in seconds."""
+    """A request about the lease."""
 
     verb: Verb
     for_s: float = REQUEST_S
+    """Time for the holder's answer, in seconds."""
+    stops: int | None = None
+    """Number of STOPs in the lease that the operator saw. A reset is refused if STOP was pressed
+    again meanwhile; null means the current number."""
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):

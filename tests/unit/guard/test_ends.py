@@ -124,3 +124,48 @@ async def test_log_says_why_a_line_could_not_be_closed(caplog: pytest.LogCapture
     await bench.open()
     await finish(bench)
     assert "no such handle" in caplog.text
+
+
+class Faulty(CountedWire):
+    """One with a bug in what it tells of its bytes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_faulty = False
+
+    def unsent(self) -> int:
+        if self.is_faulty:
+            raise RuntimeError("no such socket")
+        return super().unsent()
+
+    def offer(self, data: bytes) -> bool:
+        if self.is_faulty:
+            raise RuntimeError("no such socket")
+        return super().offer(data)
+
+    async def abort(self) -> None:
+        self.is_faulty = False
+        await super().abort()
+
+
+async def test_bug_of_a_transport_ends_no_lease_timer(benches: list[Bench]) -> None:
+    """Its line is reset, and the stop is the first on the next one."""
+    robot = Faulty()
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    robot.is_faulty = True
+    await bench.clock.advance(0.5)
+    assert robot.written == [b"go 1", STOP]
+    assert robot.opens == 2
+
+
+async def test_bug_of_a_transport_at_the_release_loses_no_stop(benches: list[Bench]) -> None:
+    robot = Faulty()
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    await bench.clock.advance(0.05)
+    robot.is_faulty = True
+    bench.tell(messages.ReleaseControl("drive"))
+    await bench.clock.advance(0.2)
+    assert robot.written[:2] == [b"go 1", STOP]
+    assert set(robot.written[1:]) == {STOP}, "the queue took it, and it comes first again"

@@ -446,3 +446,19 @@ async def test_tick_whose_number_was_used_up_is_not_made_again_after_the_guards_
     rig.guard.handle(messages.StopWritten("drive", "expired", 2), 0)
     rig.guard.handle(messages.CountersAdvanced("wire", 1, 0, {}, [("drive", 2)]), 0)
     assert caught == []
+
+
+async def test_line_that_is_lost_disarms_also_what_is_at_rest(rig: Rig) -> None:
+    """Else the engine would count ticks as motion that the guard drops."""
+    await rig.drive()
+    rig.guard.release("drive")
+    await rig.clock.advance(0.1)
+    assert rig.guard.is_armed("drive")
+    rig.robot.cut()
+    await rig.clock.advance(0.1)
+    assert not rig.guard.is_armed("drive")
+    await rig.transport.open(1.0)
+    rig.guard.arm("drive", TERMS)
+    rig.tick(b"go 2")
+    await settle()
+    assert rig.robot.written == [b"go 1", STOP, b"go 2"]

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, ScatteredWire, SlowWire
+from urc.guard import messages
 from urc.model.payload import Envelope, Payload
 from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STALLED_S, STOP_WITHIN_S
 from urc.testing.clock import settle
@@ -268,3 +269,34 @@ async def test_message_of_unknown_length_makes_what_is_unsent_no_younger(
     assert robot.opens == 1
     await rig.clock.advance(0.02)
     assert robot.opens == 2
+
+
+async def test_stop_that_a_reset_of_the_line_discards_is_due_again(rig: Rig) -> None:
+    """It was reported as written: the engine must know, should this guard die or be ended."""
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    await rig.drive()
+    await rig.clock.advance(0.05)
+    robot.is_stuck = True
+    robot.refusal = "nothing listens"
+    rig.guard.release("drive")
+    await settle()
+    assert await rig.stops() == [("drive", "released")]
+    assert not rig.guard.owes_stop("drive")
+    await rig.clock.advance(0.3)
+    assert robot.aborts == 1
+    assert await rig.stops() == [("drive", "lost")]
+    assert rig.guard.owes_stop("drive")
+    assert any(isinstance(one, messages.RecoverStop) for one in rig.guard.briefing())
+
+
+async def test_stop_that_was_due_again_is_reported_when_it_is_written(rig: Rig) -> None:
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    await rig.drive()
+    await rig.clock.advance(0.05)
+    robot.is_stuck = True
+    rig.guard.release("drive")
+    await rig.clock.advance(0.5)
+    assert await rig.stops() == [("drive", "released"), ("drive", "lost"), ("drive", "revoked")]
+    assert not rig.guard.owes_stop("drive")

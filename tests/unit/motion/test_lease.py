@@ -288,3 +288,14 @@ ThreeClients.TestCase.settings = settings(
     max_examples=examples(200), stateful_step_count=50, deadline=None
 )
 TestThreeClients = ThreeClients.TestCase
+
+
+def test_reset_that_was_sent_before_a_newer_stop_does_not_undo_it() -> None:
+    lease = Lease()
+    lease.stop("ann")
+    seen = lease.state.stops
+    lease.stop("bob")
+    refused = lease.reset(Operator("ann", "ann", "drive"), seen)
+    assert refused == LeaseRefused("STOP was pressed again: reset it again")
+    assert lease.state.latched_by == "ann"
+    assert isinstance(lease.reset(Operator("ann", "ann", "drive"), seen + 1), LeaseChanged)

@@ -8,7 +8,7 @@ from urc.model.exchange import Hold
 from urc.model.payload import Payload, WriteSpec
 from urc.model.values import Reading
 from urc.motion.freshness import ControlInput
-from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.motion.hold_to_run import HoldTerms, StopReport
 from urc.motion.lease import LeaseState, Operator
 from urc.runtime.motion_controller import MotionController
 from urc.testing.movers import FakeFrames, FakeSession
@@ -46,6 +46,9 @@ class Movers:
         self.told.append(f"arm {command}")
         self.terms[command] = terms
 
+    def is_armed(self, command: str) -> bool:
+        return self.is_up
+
     def tick(self, command: str, data: Payload) -> None:
         assert isinstance(data, bytes)
         self.told.append(data.decode())
@@ -58,6 +61,9 @@ class Movers:
     def is_stopping(self, command: str) -> bool:
         return False
 
+    def owes_stop(self, command: str) -> bool:
+        return False
+
     def is_open(self, command: str) -> bool:
         assert command
         return self.is_up
@@ -68,7 +74,7 @@ class Movers:
     def stop(self, stops: Mapping[str, Payload]) -> None:
         self.told.append(f"stop {' '.join(stops)}")
 
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
+    async def stops(self) -> Sequence[tuple[str, StopReport]]:
         raise NotImplementedError
 
 

@@ -60,6 +60,9 @@ class Line:
     def arm(self, command: str, terms: HoldTerms) -> None:
         self._hold_to_run(command, terms).arm()
 
+    def is_armed(self, command: str) -> bool:
+        return command in self.backend and self.backend[command].is_armed
+
     def tick(self, command: str, data: Payload) -> None:
         self.backend[command].tick(data, self.now)
 
@@ -69,6 +72,9 @@ class Line:
 
     def is_stopping(self, command: str) -> bool:
         return command in self.backend and self.backend[command].state != "idle"
+
+    def owes_stop(self, command: str) -> bool:
+        return self.is_stopping(command)
 
     def is_open(self, command: str) -> bool:
         return self.is_up

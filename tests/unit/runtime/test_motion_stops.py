@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from tests.unit.runtime.desks import DRIVER, Scene, held
+from tests.unit.runtime.desks import DRIVER, Movers, Scene, held
 from urc.model.payload import Payload
 from urc.model.values import Reading
 from urc.problems import UrcError
-from urc.protocol.events import MotionRefused
+from urc.protocol.events import MotionReady, MotionRefused
 from urc.testing.movers import FakeSession
 
 
@@ -94,3 +94,76 @@ def test_refusal_ends_the_motion_also_without_a_listener() -> None:
     it.heard()
     it.controller.handle(MotionRefused("wire", "drive", "too steep"))
     assert it.heard() == ["release drive"]
+
+
+def test_stop_that_is_lost_with_the_line_is_no_longer_confirmed() -> None:
+    """It was written, and the reset of the line discarded it."""
+    it = Scene()
+    kept: list[bool] = []
+    it.controller.stop("ann")
+    it.controller.stopped("drive", "stopped")
+    it.controller.stopped("lift", "stopped")
+    it.controller.on_change = lambda state: kept.append(it.controller.is_confirmed)
+    assert it.controller.is_confirmed
+    it.controller.stopped("drive", "lost")
+    assert not it.controller.is_confirmed
+    assert it.controller.is_stop_due
+    it.controller.stopped("drive", "revoked")
+    assert it.controller.is_confirmed
+    assert kept == [False, True]
+
+
+def test_stop_of_a_released_control_that_is_lost_is_due_but_no_stop_of_an_operator() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.controller.release("ann", "drive")
+    it.controller.stopped("drive", "released")
+    assert it.controller.rests("drive")
+    it.controller.stopped("drive", "lost")
+    assert it.controller.is_confirmed, "nobody has pressed STOP"
+    assert not it.controller.rests("drive")
+    it.controller.stopped("drive", "revoked")
+    assert it.controller.rests("drive")
+
+
+def test_stop_that_a_session_could_not_deliver_is_the_first_of_the_next_session() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    assert it.controller.is_stop_due
+    it.heard()
+    it.controller.detach()
+    assert it.controller.is_stop_due
+    next_backend = Movers()
+    it.controller.attach(FakeSession(it.frames, next_backend))
+    assert next_backend.told == ["stop drive"]
+    assert not it.controller.is_stop_due, "the backend has it now"
+
+
+def test_stop_that_needs_a_value_of_the_login_is_sent_after_the_login() -> None:
+    """It could not be rendered when STOP was pressed, and no report about it will come."""
+    it = Scene()
+    stop_frame = it.frames.stop_frame
+
+    def broken(command: str) -> Payload:
+        raise UrcError("the login has not sent the session number yet")
+
+    it.frames.stop_frame = broken  # type: ignore[method-assign]
+    it.controller.stop("ann")
+    it.heard()
+    it.frames.stop_frame = stop_frame  # type: ignore[method-assign]
+    it.controller.handle(MotionReady("wire"))
+    assert it.heard() == ["stop drive"]
+
+
+def test_control_that_its_line_has_disarmed_is_armed_again_by_the_next_gesture() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.controller.release("ann", "drive")
+    it.heard()
+    it.backend.is_armed = lambda command: False  # type: ignore[method-assign]
+    assert it.tick(speed=0.5) == ""
+    assert it.heard()[0] == "arm drive"

@@ -15,7 +15,14 @@ from urc.problems import UrcError
 from urc.runtime.clock import Timer
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.fleet.robots import LINGER_S, Robot, RobotService, SessionFailed, missing_settings
+from urc.web.fleet.robots import (
+    LINGER_S,
+    STOP_DUE_S,
+    Robot,
+    RobotService,
+    SessionFailed,
+    missing_settings,
+)
 
 pytestmark = pytest.mark.anyio
 
@@ -89,6 +96,35 @@ async def test_sessions_that_start_together_leave_room_for_input_between_two() -
     starts = [at for at, what in enumerate(seen) if what != "input"]
     assert len(starts) == 3
     assert all("input" in seen[one:other] for one, other in pairwise(starts))
+
+
+async def test_the_session_stays_until_the_robot_has_received_the_stop() -> None:
+    """STOP is pressed without a page, and the robot can be reached only later."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as service:
+        controller = service.controls.controller
+        controller._unconfirmed = {"halt"}
+        with service.visit():
+            await service.live()
+        await clock.advance(60.0)
+        assert robot.is_open
+        controller.given("halt")
+        await clock.advance(0.2)
+        assert not robot.is_open
+
+
+async def test_the_session_does_not_stay_for_ever_for_a_robot_that_is_off() -> None:
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as service:
+        service.controls.controller._unconfirmed = {"halt"}
+        with service.visit():
+            await service.live()
+        await clock.advance(LINGER_S + STOP_DUE_S - 1.0)
+        assert robot.is_open
+        await clock.advance(2.0)
+        assert not robot.is_open
 
 
 async def test_a_reload_keeps_the_session() -> None:

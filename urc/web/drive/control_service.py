@@ -13,7 +13,7 @@ from typing import Literal
 from urc.model.driver import Driver
 from urc.model.role import Role, includes
 from urc.motion.freshness import ControlInput
-from urc.motion.hold_to_run import Reason
+from urc.motion.hold_to_run import StopReport
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
 from urc.problems import printable
@@ -327,7 +327,9 @@ class ControlService:
         reason = self._scope_refusal(operator, said.verb)
         if not reason:
             with self.recorder.caused_by(operator.client):
-                reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
+                reason = self.controller.drive(
+                    operator.client.id, said.verb, now, said.for_s, said.stops
+                )
         if reason:
             operator.notice(said.verb, wire.encode_refused(said.verb, "", reason))
             self.recorder.refused(operator.client, said.verb, reason, now)
@@ -414,8 +416,10 @@ class ControlService:
 
     # -- effects
 
-    def _stopped(self, command: str, reason: Reason) -> None:
+    def _stopped(self, command: str, reason: StopReport) -> None:
         self.controller.stopped(command, reason)
+        if reason == "lost":
+            return  # it is written again, and then reported
         self.recorder.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the operator released the control, or the lease message reports the stop

@@ -95,7 +95,10 @@ CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
 """Maximum wait for a robot to receive a STOP requested over HTTP, in seconds."""
+STOP_DUE_S = 600.0
+"""Maximum time for which a session without clients tries to deliver a stop, in seconds."""
 _LOOK_S = 0.01
+_SELDOM_S = 0.1
 PICTURE_BYTES = 256 * 1024
 """Maximum size of the image that is stored after a session ends, in bytes."""
 
@@ -330,7 +333,7 @@ class RobotService:
     def is_at_rest(self) -> bool:
         """Whether no operator drives the robot, and the robot has received every stop."""
         controller = self.controls.controller
-        return controller.lease.state.holder is None and controller.is_confirmed
+        return controller.lease.state.holder is None and not controller.is_stop_due
 
     @property
     def is_open(self) -> bool:
@@ -450,8 +453,17 @@ class RobotService:
                 self._changed.clear()
                 await self._changed.wait()
             alarm.cancel()
+            await self._until_stopped()
             if not self._has_clients or self._is_unwanted:
                 return
+
+    async def _until_stopped(self) -> None:
+        """Wait while a stop has not reached the robot, for at most `STOP_DUE_S`."""
+        end_s = self.clock.now() + STOP_DUE_S
+        while self.controls.controller.is_stop_due and self.clock.now() < end_s:
+            if self._has_clients or self._is_unwanted:
+                return
+            await self.clock.sleep(_SELDOM_S)
 
     @property
     def _is_unwanted(self) -> bool:

@@ -61,6 +61,8 @@ export class Drive {
     this.posted = null;
     /** Reason for refusing the last request about the controls. */
     this.refusal = "";
+    /** Number of STOPs that the page knew at its own last press; null if it knew none. @type {number | null} */
+    this.pressed = null;
     /** Time at which the asking page gets the controls, on this page's clock. */
     this.handedMs = 0;
     /** @type {number | undefined} */
@@ -92,8 +94,10 @@ export class Drive {
     this.handedMs = nowMs + lease.left;
     if (!this.isMine) this.beat = this.beatMs = 0;
     if (this.isMine !== wasMine || lease.latched) this.refusal = "";
-    const isOwed = this.phase === "failed" && !lease.latched;
-    if (lease.latched) this.settle("");
+    // A latch from before the press is no answer to it.
+    const isAnswered = Boolean(lease.latched) && (this.pressed === null || lease.stops !== this.pressed);
+    const isOwed = this.phase === "failed" && !isAnswered;
+    if (isAnswered) this.settle("");
     this.posted = null;
     this.double();
     if (isOwed) this.stop(); // pressed while the socket was down: sent now
@@ -175,12 +179,14 @@ export class Drive {
    */
   say(verb) {
     this.refusal = "";
-    return this.socket.send({ t: "drive", verb });
+    // A reset must not undo a STOP that the operator has not seen.
+    return this.socket.send({ t: "drive", verb, ...(verb === "reset" && { stops: this.stops }) });
   }
 
   /** Stop the robot: immediately over the socket, and over HTTP if the server does not react. */
   stop() {
     this.settle("sending");
+    this.pressed = this.stops;
     if (this.tell({ t: "stop" })) {
       this.phase = "sent";
       this.timer = window.setTimeout(() => void this.post(), STOP_AGAIN_MS);

@@ -34,6 +34,7 @@ const SENTENCES = [
   mark("viewers can stop the robot, but cannot reset it"),
   mark("Taking over needs the role maintain"),
   mark("nothing is stopped"),
+  mark("STOP was pressed again: reset it again"),
   mark("Take control first"),
   mark("Control changed hands meanwhile"),
   mark("Stopped: let go, then start again"),
