@@ -290,7 +290,7 @@ class MotionController:
             arguments = control.limited(arguments, now)
         try:
             data = frames.motion_frame(command, arguments, now)
-            if not (control.is_armed and backend.is_armed(command)):
+            if not control.is_armed or self._is_disarmed_at_rest(command, control, backend):
                 backend.arm(command, self._terms(command, frames))
                 control.is_armed, control.is_lasting = True, frames.is_lasting(command)
             elif not control.is_lasting:
@@ -306,6 +306,15 @@ class MotionController:
         shown = data.numbered.data if isinstance(data, CountedFrame) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
+
+    def _is_disarmed_at_rest(
+        self, command: str, control: HeldControl, backend: MotionBackend
+    ) -> bool:
+        """Return whether a lost connection has disarmed a control at rest.
+
+        A control that was moving is not armed again: its motion must not resume.
+        """
+        return control.motion_state == "rest" and not backend.is_armed(command)
 
     def _abandon(
         self, command: str, control: HeldControl, backend: MotionBackend, why: str

@@ -163,7 +163,23 @@ def test_control_that_its_line_has_disarmed_is_armed_again_by_the_next_gesture()
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.controller.release("ann", "drive")
+    it.controller.stopped("drive", "released")
     it.heard()
     it.backend.is_armed = lambda command: False  # type: ignore[method-assign]
     assert it.tick(speed=0.5) == ""
     assert it.heard()[0] == "arm drive"
+
+
+def test_held_control_that_its_line_has_disarmed_is_not_armed_again() -> None:
+    """Its stop may not be reported yet, and nothing goes on by itself."""
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    it.backend.is_armed = lambda command: False  # type: ignore[method-assign]
+    it.tick(speed=0.5)
+    assert "arm drive" not in it.heard()
+    it.controller.release("ann", "drive")
+    it.heard()
+    it.tick(speed=0.5)
+    assert "arm drive" not in it.heard(), "the stop of the release is not reported yet"
