@@ -52,6 +52,8 @@ class _Control:
     is_armed: bool = False
     number: int = 0
     """Number of the newest tick, counted since the present guard started."""
+    first: int = 0
+    """Number of the first tick since the control was armed."""
     at_s: float = 0.0
     """Time of the newest tick on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
@@ -125,14 +127,14 @@ class GuardClient:
             raise UrcError(f"{command}: {fault}") from fault
         control = self._control(command)
         control.terms = terms
-        control.is_armed = True
+        control.is_armed, control.first = True, control.number + 1
         self.channel.post(messages.ArmControl(control.line, command, terms))
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease of `command`, with `data` as its newest frame. Never waits."""
         control = self._controls.get(command)
-        if control is None:
-            return
+        if control is None or not control.is_armed:
+            return  # the guard has stopped it, and would drop the tick
         control.number += 1
         control.at_s = self.channel.now()
         control.may_move = True
@@ -247,7 +249,7 @@ class GuardClient:
         for spec in self.lines:
             yield spec.make
         for command, control in self._controls.items():
-            control.number = 0
+            control.number, control.first = 0, 1
             if control.may_move:
                 control.is_armed = False
                 yield messages.RecoverStop(control.line, command, control.terms)
@@ -292,11 +294,13 @@ class GuardClient:
         control = self._controls.get(stopped.control)
         if control is not None:
             control.stopped_s = self.channel.now()
-            if stopped.number == control.number:  # else a newer tick is on its way
-                control.may_move = False
-            if stopped.reason != "released":
+            # A stop of the present arming disarms the control: the guard drops all newer ticks.
+            is_disarmed = stopped.reason != "released" and stopped.number >= control.first
+            if is_disarmed:
                 control.is_armed = False
                 control.counted = None
+            if is_disarmed or stopped.number == control.number:  # else a newer tick is on its way
+                control.may_move = False
         self._report(stopped.control, stopped.reason)
 
     def _record_due(self, command: str) -> None:

@@ -84,7 +84,9 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._due: set[str] = set()
-        """Held commands whose stops the previous session could not deliver."""
+        """Held commands whose stops the previous session had not delivered at its end."""
+        self._ended: MotionBackend | None = None
+        """Backend of the previous session, which may deliver them while it ends."""
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after a stop is confirmed."""
         self.on_moved: Moved = _unseen
@@ -132,7 +134,17 @@ class MotionController:
         """Whether a STOP or the stop of a held command has not reached the robot yet."""
         backend = self._backend
         is_owing = backend is not None and any(map(backend.owes_stop, self._holds))
-        return bool(self._unconfirmed or self._due) or is_owing
+        return bool(self._unconfirmed or self.due) or is_owing
+
+    @property
+    def due(self) -> list[str]:
+        """Held commands whose stops no session has delivered."""
+        ended = self._ended
+        return [one for one in self._due if ended is None or ended.owes_stop(one)]
+
+    def inherit(self, due: Sequence[str]) -> None:
+        """Take over the undelivered stops of another version of the driver."""
+        self._due.update(name for name in due if name in self._holds)
 
     @property
     def deadline(self) -> float | None:
@@ -149,12 +161,14 @@ class MotionController:
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle
         backend = self._backend
-        due = [name for name in self._holds if name in self._due]
+        due = self.due
         if not self._unconfirmed.isdisjoint(self._holds):
             due = list(self._holds)
+        self._due, self._ended = set(due), None
         if backend is not None and due:
-            backend.stop(self._stop_frames(due))
-            self._due.clear()
+            frames = self._stop_frames(due)
+            backend.stop(frames)
+            self._due.difference_update(frames)
 
     def detach(self) -> None:
         """Detach the session: the backend stops all motion, and every control is disarmed.
@@ -164,6 +178,7 @@ class MotionController:
         backend = self._backend
         if backend is not None:
             self._due.update(filter(backend.owes_stop, self._holds))
+        self._ended = backend
         self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
@@ -414,7 +429,9 @@ class MotionController:
         for name in owed:
             self._controls[name].is_owed_again = False
         if owed and self._backend is not None:
-            self._backend.stop(self._stop_frames(owed))
+            frames = self._stop_frames(owed)
+            self._backend.stop(frames)
+            self._due.difference_update(frames)
 
     def _renew_stops(self, line: str) -> None:
         """Render the stop frames of transport `line` again, with the next counter values."""

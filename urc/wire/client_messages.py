@@ -124,7 +124,14 @@ class Reconnect(
     """A request to reopen the robot's lost connections without waiting for the backoff."""
 
 
-class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
+class Drive(
+    msgspec.Struct,
+    tag_field="t",
+    tag="drive",
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+    frozen=True,
+):
     """A request about the lease."""
 
     verb: Verb

@@ -370,8 +370,8 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
     assert not rig.guard.is_stopping("turn")
     assert rig.guard.is_stopping("drive")
     await rig.clock.advance(5.0)
-    rig.tick(b"refused, and nobody knows yet")
-    assert rig.guard.is_stopping("drive")
+    rig.tick(b"refused, as is known")
+    assert not rig.guard.is_stopping("drive")
     rig.guard.arm("drive", TERMS)
     rig.tick(b"go")
     rig.guard.release("drive")
@@ -462,3 +462,23 @@ async def test_line_that_is_lost_disarms_also_what_is_at_rest(rig: Rig) -> None:
     rig.tick(b"go 2")
     await settle()
     assert rig.robot.written == [b"go 1", STOP, b"go 2"]
+
+
+async def test_tick_that_crosses_the_report_of_a_stop_leaves_no_stop_due(rig: Rig) -> None:
+    """The server was blocked: the report and the next tick are on their way at the same time."""
+    await rig.drive()
+    rig.guard.tick("drive", b"dropped by the guard")
+    rig.guard.handle(messages.StopWritten("drive", "expired", 1), 0)
+    assert not rig.guard.owes_stop("drive")
+    rig.guard.tick("drive", b"dropped here")
+    assert not rig.guard.owes_stop("drive")
+
+
+async def test_late_report_of_an_older_stop_disarms_no_new_gesture(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.arm("drive", TERMS)
+    rig.guard.handle(messages.StopWritten("drive", "expired", 1), 0)
+    assert rig.guard.is_armed("drive")
+    rig.tick(b"go 2")
+    await settle()
+    assert rig.robot.written == [b"go 1", b"go 2"]

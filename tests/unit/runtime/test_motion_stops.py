@@ -183,3 +183,23 @@ def test_held_control_that_its_line_has_disarmed_is_not_armed_again() -> None:
     it.heard()
     it.tick(speed=0.5)
     assert "arm drive" not in it.heard(), "the stop of the release is not reported yet"
+
+
+def test_stop_that_the_ending_session_delivers_itself_is_not_sent_again() -> None:
+    it = Scene()
+    owes = {"drive"}
+    it.backend.owes_stop = owes.__contains__  # type: ignore[method-assign]
+    it.controller.detach()
+    owes.clear()
+    assert not it.controller.is_stop_due
+    next_backend = Movers()
+    it.controller.attach(FakeSession(it.frames, next_backend))
+    assert next_backend.told == []
+
+
+def test_stop_that_is_due_stays_so_with_another_version_of_the_driver() -> None:
+    it, other = Scene(), Scene(is_attached=False)
+    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.controller.detach()
+    other.controller.inherit(it.controller.due)
+    assert other.controller.is_stop_due

@@ -81,7 +81,7 @@ class ProgramSession:
             ApiError: the request was refused.
         """
         if asked.verb != "keep":
-            self.service.controls.handle(self.operator, Drive(asked.verb, asked.for_s))
+            self.service.controls.handle(self.operator, Drive(asked.verb, asked.for_s, asked.stops))
             refused = self.operator.notices.pop(asked.verb, "")
             if refused:
                 notice = _notice(refused)

@@ -286,6 +286,9 @@ class LeaseAsked(ApiMessage, frozen=True):
     """Time limit for the holder's answer to ``ask``, in seconds; the server uses 3 to 60 s."""
     session: _Word = ""
     """Secret of an open session; "" opens a new session."""
+    stops: int | None = None
+    """Number of STOPs of the last answer. A reset is refused if STOP was pressed again meanwhile;
+    null means the current number."""
 
 
 class MotionNotice(ApiMessage, frozen=True):

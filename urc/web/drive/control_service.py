@@ -106,7 +106,9 @@ class ControlService:
         self._has_roles = _has_roles(driver)
         self.once.driver = driver
         self._heed(file)
+        due = self.controller.due
         self.controller = self._controller(driver, kept)
+        self.controller.inherit(due)
         for operator in self._operators.values():
             self.controller.join(operator.client)
         self._changed(self.controller.lease.state)

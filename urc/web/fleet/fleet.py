@@ -108,8 +108,9 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver it. Without a session it does
-        not count, because otherwise a wrong robot address could not be corrected.
+        A pending stop counts as driving while a session can deliver it. Without a session, or a
+        page and a connection, it does not count, because otherwise a wrong robot address could not
+        be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -117,7 +118,8 @@ class Fleet:
         holder = service.controls.controller.lease.state.holder
         if holder is not None:
             return holder.name
-        return t("a pending stop") if service.is_open else ""
+        is_delivered = service.is_open and (service.is_used or service.is_heard)
+        return t("a pending stop") if is_delivered else ""
 
     def _apart(self, name: str, robot: Robot) -> Robot:
         others = [one.profile for other, one in self.robots.items() if other != name]

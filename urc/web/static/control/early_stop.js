@@ -38,6 +38,7 @@
       if (!answer.ok) throw new Error(`HTTP ${answer.status}`);
       show(button, place, (await answer.json()).confirmed ? "confirmed" : "latched");
     } catch (error) {
+      if (place.dataset["stopSent"] === "taken") return; // the modules have repeated it
       console.warn("URC: STOP could not be delivered:", error);
       show(button, place, "fault");
       // The modules may have started meanwhile. If so, they repeat the press.

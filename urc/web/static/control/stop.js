@@ -87,7 +87,9 @@ export class StopButton {
       event.preventDefault();
       this.press();
     });
-    if (["sending", "fault"].includes(root.dataset["stopSent"] ?? "")) this.press();
+    if (!["sending", "fault"].includes(root.dataset["stopSent"] ?? "")) return;
+    root.dataset["stopSent"] = "taken";
+    this.press();
   }
 
   /**

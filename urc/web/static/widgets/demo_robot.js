@@ -79,6 +79,7 @@ class PlayedSocket {
     this.drive = null;
     this.epoch = FREE.epoch;
     this.beat = 0;
+    this.stops = FREE.stops;
     setInterval(() => {
       if (this.drive?.isMine) this.drive.beat = this.beat += 1;
     }, BEAT_MS);
@@ -88,7 +89,10 @@ class PlayedSocket {
   send(message) {
     const { t: kind, ...rest } = message;
     if (kind === "drive") this.grant(message.verb);
-    else if (kind === "stop") this.lease({ latched: FREE.name, confirmed: true });
+    else if (kind === "stop") {
+      this.stops += 1;
+      this.lease({ latched: FREE.name, confirmed: true });
+    }
     if (kind === "tick") this.tell(`${rest.command} ${JSON.stringify(rest.arguments ?? rest.values ?? {})}`);
     else this.tell(`${kind} ${JSON.stringify(rest)}`);
     return true;
@@ -104,7 +108,7 @@ class PlayedSocket {
 
   /** @param {Partial<Lease>} changed */
   lease(changed) {
-    const lease = { ...FREE, epoch: this.epoch, ...changed };
+    const lease = { ...FREE, epoch: this.epoch, stops: this.stops, ...changed };
     queueMicrotask(() => this.drive?.setLease(lease, performance.now()));
   }
 }
