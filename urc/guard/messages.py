@@ -222,7 +222,7 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
     control: str
     reason: Reason
     number: int
-    """Number of the newest tick when the stop was written."""
+    """Number of the newest tick when the control was stopped."""
 
 
 class StopDue(msgspec.Struct, array_like=True, frozen=True, tag=32):

@@ -88,6 +88,8 @@ class MotionScheduler:
         """Queue of frames that the transport cannot accept immediately."""
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
+        self._stopped_at: dict[str, int] = {}
+        """Number of the newest tick when each control was stopped; a stop may wait in the queue."""
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
         """Whether a written stop may not have arrived at the robot."""
@@ -270,8 +272,10 @@ class MotionScheduler:
         return not unsent or (not self._is_strict and self._watch.age_s(now) < IN_FLIGHT_S)
 
     def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
-        if is_stop and self._unsent is not None:
-            self._watch.saw(self._unsent(), now)
+        if is_stop:
+            self._stopped_at[control] = self._numbers.get(control, 0)
+            if self._unsent is not None:
+                self._watch.saw(self._unsent(), now)
         if is_stop and self._forget is not None and not self._is_stop_under_way:
             # Unsent motion must not follow its stop. After an earlier stop no motion was written,
             # and that stop must not be dropped.
@@ -344,7 +348,7 @@ class MotionScheduler:
         hold_to_run = self._holds[control]
         if hold_to_run.reason is not None and not hold_to_run.is_told:
             hold_to_run.is_told = True
-            self._told(control, hold_to_run.reason, self._numbers.get(control, 0))
+            self._told(control, hold_to_run.reason, self._stopped_at.get(control, 0))
 
     # -- time
 

@@ -84,9 +84,9 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._due: set[str] = set()
-        """Held commands whose stops the previous session had not delivered at its end."""
+        """Held commands whose stops no backend has, or has sent too early."""
         self._ended: MotionBackend | None = None
-        """Backend of the previous session, which may deliver them while it ends."""
+        """Backend of the previous session, which may deliver its stops while it ends."""
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after a stop is confirmed."""
         self.on_moved: Moved = _unseen
@@ -134,13 +134,18 @@ class MotionController:
         """Whether a STOP or the stop of a held command has not reached the robot yet."""
         backend = self._backend
         is_owing = backend is not None and any(map(backend.owes_stop, self._holds))
-        return bool(self._unconfirmed or self.due) or is_owing
+        is_early = any(control.is_owed_again for control in self._controls.values())
+        return bool(self._unconfirmed or self.due) or is_owing or is_early
 
     @property
     def due(self) -> list[str]:
         """Held commands whose stops no session has delivered."""
         ended = self._ended
-        return [one for one in self._due if ended is None or ended.owes_stop(one)]
+        return [
+            name
+            for name in self._holds
+            if name in self._due or (ended is not None and ended.owes_stop(name))
+        ]
 
     def inherit(self, due: Sequence[str]) -> None:
         """Take over the undelivered stops of another version of the driver."""
@@ -175,10 +180,8 @@ class MotionController:
 
         Stops that have not reached the robot are sent first in the next session.
         """
-        backend = self._backend
-        if backend is not None:
-            self._due.update(filter(backend.owes_stop, self._holds))
-        self._ended = backend
+        self._due.update(name for name, one in self._controls.items() if one.is_owed_again)
+        self._ended = self._backend
         self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
@@ -430,6 +433,9 @@ class MotionController:
             self._controls[name].is_owed_again = False
         if owed and self._backend is not None:
             frames = self._stop_frames(owed)
+            for name in owed:
+                if self._controls[name].is_armed:
+                    self._close(self._controls[name])  # the backend disarms it
             self._backend.stop(frames)
             self._due.difference_update(frames)
 

@@ -482,3 +482,22 @@ async def test_late_report_of_an_older_stop_disarms_no_new_gesture(rig: Rig) -> 
     rig.tick(b"go 2")
     await settle()
     assert rig.robot.written == [b"go 1", b"go 2"]
+
+
+async def test_stop_that_waits_in_the_queue_is_reported_with_the_tick_it_stopped(
+    rigs: list[Rig],
+) -> None:
+    """A new gesture meanwhile keeps its control armed, and its own stop due."""
+    robot = GatedWire()
+    rigs.append(rig := Rig(robot))
+    await rig.drive()
+    robot.let_through()
+    await settle()
+    rig.guard.stop({"drive": STOP})
+    rig.guard.arm("drive", TERMS)
+    rig.tick(b"go 2")
+    robot.let_through()
+    await settle()
+    assert robot.written == [b"go 1", STOP]
+    assert rig.guard.is_armed("drive")
+    assert rig.guard.owes_stop("drive")

@@ -203,3 +203,41 @@ def test_stop_that_is_due_stays_so_with_another_version_of_the_driver() -> None:
     it.controller.detach()
     other.controller.inherit(it.controller.due)
     assert other.controller.is_stop_due
+
+
+def test_stop_that_was_sent_before_the_login_is_due_in_the_next_session() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.controller._controls["drive"].needs_ready_line = True
+    it.frames.is_greeted = False
+    it.controller.stopped("drive", "revoked")
+    assert it.controller.is_stop_due
+    it.controller.detach()
+    assert it.controller.due == ["drive"]
+
+
+def test_stop_that_a_session_could_not_render_is_due_in_the_one_after_it() -> None:
+    it = Scene()
+    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.controller.detach()
+
+    def broken(command: str) -> Payload:
+        raise UrcError("the login has not sent the session number yet")
+
+    it.frames.stop_frame = broken  # type: ignore[method-assign]
+    for _ in range(2):
+        it.controller.attach(FakeSession(it.frames, Movers()))
+        it.controller.detach()
+        assert it.controller.due == ["drive"]
+
+
+def test_stop_that_an_ending_session_loses_is_due() -> None:
+    """Its line was reset after the last report."""
+    it = Scene()
+    owes: set[str] = set()
+    it.backend.owes_stop = owes.__contains__  # type: ignore[method-assign]
+    it.controller.detach()
+    assert it.controller.due == []
+    owes.add("drive")
+    assert it.controller.due == ["drive"]

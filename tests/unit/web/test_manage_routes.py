@@ -294,12 +294,27 @@ def test_nothing_changes_under_who_drives(tmp_path: Path) -> None:
     with served(tmp_path) as client:
         send(client, settings={"key": "x"})
         fleet_of(client).driven_by = lambda _: "screen 1"
+        fleet_of(client).is_out_of_reach = lambda _: False
         answer = client.post("/api/v1/robots/rover/settings", json={"test": False})
         assert answer.status_code == 409
         assert "rover is being driven (screen 1)" in answer.json()["error"]
         gone = client.post("/api/v1/packages/remove", json={"package": "rover", "yes": True})
         assert gone.status_code == 409
     assert len(Store(tmp_path / "packages").installed()) == 2
+
+
+def test_settings_of_a_robot_out_of_reach_are_corrected_while_its_stop_is_pending(
+    tmp_path: Path,
+) -> None:
+    """A wrong address may be the reason; its package stays as it is."""
+    stock(tmp_path)
+    with served(tmp_path) as client:
+        send(client, settings={"key": "x"})
+        fleet_of(client).driven_by = lambda _: "a pending stop"
+        answer = client.post("/api/v1/robots/rover/settings", json={"test": False})
+        assert answer.status_code == 200
+        gone = client.post("/api/v1/packages/remove", json={"package": "rover", "yes": True})
+        assert gone.status_code == 409
 
 
 def fleet_of(client: TestClient) -> Any:

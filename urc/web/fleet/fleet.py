@@ -108,9 +108,8 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver it. Without a session, or a
-        page and a connection, it does not count, because otherwise a wrong robot address could not
-        be corrected.
+        A pending stop counts as driving while a session can deliver it. Without a session it does
+        not count, because otherwise a wrong robot address could not be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -118,8 +117,14 @@ class Fleet:
         holder = service.controls.controller.lease.state.holder
         if holder is not None:
             return holder.name
-        is_delivered = service.is_open and (service.is_used or service.is_heard)
-        return t("a pending stop") if is_delivered else ""
+        return t("a pending stop") if service.is_open else ""
+
+    def is_out_of_reach(self, name: str) -> bool:
+        """Return whether a robot has no client and no connection: its address may be wrong."""
+        service = self.services.get(name)
+        if service is None or service.controls.controller.lease.state.holder is not None:
+            return False
+        return not (service.is_used or service.is_heard)
 
     def _apart(self, name: str, robot: Robot) -> Robot:
         others = [one.profile for other, one in self.robots.items() if other != name]

@@ -316,10 +316,14 @@ class Manager:
     def _kept_folder(self) -> Path:
         return self.factory.robot_options.data / "robots"
 
-    def check_idle(self, name: str) -> None:
-        """Raise `Busy` while an operator drives the robot."""
+    def check_idle(self, name: str, *, is_correction: bool = False) -> None:
+        """Raise `Busy` while an operator drives the robot, or a stop is pending.
+
+        With `is_correction`, a pending stop for an unreachable robot does not count, because the
+        settings may be the reason.
+        """
         driver = self.fleet.driven_by(name)
-        if driver:
+        if driver and not (is_correction and self.fleet.is_out_of_reach(name)):
             raise Busy(f"{name} is being driven ({driver}): wait until the controls are free")
 
     # Data for pages

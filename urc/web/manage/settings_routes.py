@@ -134,7 +134,7 @@ class SettingsRoutes:
         manager, factory = self._manager, self._manager.factory
         if name not in manager.fleet.robots and name not in manager.fleet.broken:
             raise ApiError(404, "no robot of that name is served here")
-        manager.check_idle(name)
+        manager.check_idle(name, is_correction=True)
         before = await asyncio.to_thread(self._kept, name)
         bare = await asyncio.to_thread(self._document, name, said.version)
         kept, faults = await asyncio.to_thread(self._filled_in, bare, before, said)
@@ -149,7 +149,7 @@ class SettingsRoutes:
             if any(one.verdict == "fails" for one in lines) and not said.anyway:
                 text = t("Not saved: the robot cannot be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
-        manager.check_idle(name)  # checked again, because the test takes time
+        manager.check_idle(name, is_correction=True)  # the test takes time
         await asyncio.to_thread(factory.settings_store(name).save, kept)
         changes = _changes(before, kept, bare, secret_texts(bare, robot.settings))
         if changes:
