@@ -208,7 +208,7 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
 async def test_a_button_leads_to_the_widgets_that_a_small_screen_lacks(
     new_page: PageMaker,
 ) -> None:
-    """It is only on screens that lack widgets; each way, what is held is let go."""
+    """Only screens that lack widgets show it. Each switch releases held controls."""
     grids = {"landscape": row("left", "right", "up"), "phone_landscape": row("left")}
     async with driven(robot=steered(Interface("x", "X", grids))) as (robot, address):
         page = await opened(new_page, address)

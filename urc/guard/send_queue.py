@@ -160,7 +160,7 @@ def tolerant(
     def tried(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         try:
             return call(*args, **kwargs)
-        except Exception as bug:  # supervisor, as described
+        except Exception as bug:  # a third-party transport may raise anything
             failed(why_broken(bug))
             return instead
 

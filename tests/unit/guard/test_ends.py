@@ -127,7 +127,7 @@ async def test_log_says_why_a_line_could_not_be_closed(caplog: pytest.LogCapture
 
 
 class Faulty(CountedWire):
-    """One with a bug in what it tells of its bytes."""
+    """A wire whose `unsent` and `offer` raise an exception."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -271,13 +271,19 @@ async def test_message_of_unknown_length_makes_what_is_unsent_no_younger(
     assert robot.opens == 2
 
 
-async def test_stop_that_a_reset_of_the_line_discards_is_due_again(rig: Rig) -> None:
-    """It was reported as written: the engine must know, should this guard die or be ended."""
+async def driven_into_a_black_hole(rig: Rig) -> CountedWire:
+    """Drive, then let the line take bytes that never arrive."""
     robot = rig.robot
     assert isinstance(robot, CountedWire)
     await rig.drive()
     await rig.clock.advance(0.05)
     robot.is_stuck = True
+    return robot
+
+
+async def test_stop_that_a_reset_of_the_line_discards_is_due_again(rig: Rig) -> None:
+    """It was reported as written: the engine must know, should this guard die or be ended."""
+    robot = await driven_into_a_black_hole(rig)
     robot.refusal = "nothing listens"
     rig.guard.release("drive")
     await settle()
@@ -291,11 +297,7 @@ async def test_stop_that_a_reset_of_the_line_discards_is_due_again(rig: Rig) -> 
 
 
 async def test_stop_that_was_due_again_is_reported_when_it_is_written(rig: Rig) -> None:
-    robot = rig.robot
-    assert isinstance(robot, CountedWire)
-    await rig.drive()
-    await rig.clock.advance(0.05)
-    robot.is_stuck = True
+    await driven_into_a_black_hole(rig)
     rig.guard.release("drive")
     await rig.clock.advance(0.5)
     assert await rig.stops() == [("drive", "released"), ("drive", "lost"), ("drive", "revoked")]

@@ -41,13 +41,17 @@ class Movers:
         self.told: list[str] = []
         self.terms: dict[str, HoldTerms] = {}
         self.is_up = True
+        self.owing: set[str] = set()
+        """Commands whose stops have not reached the robot."""
+        self.disarmed: set[str] = set()
+        """Commands that a lost connection has disarmed."""
 
     def arm(self, command: str, terms: HoldTerms) -> None:
         self.told.append(f"arm {command}")
         self.terms[command] = terms
 
     def is_armed(self, command: str) -> bool:
-        return self.is_up
+        return command not in self.disarmed
 
     def tick(self, command: str, data: Payload) -> None:
         assert isinstance(data, bytes)
@@ -62,7 +66,7 @@ class Movers:
         return False
 
     def owes_stop(self, command: str) -> bool:
-        return False
+        return command in self.owing
 
     def is_open(self, command: str) -> bool:
         assert command

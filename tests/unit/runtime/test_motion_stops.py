@@ -121,7 +121,7 @@ def test_stop_of_a_released_control_that_is_lost_is_due_but_no_stop_of_an_operat
     it.controller.stopped("drive", "released")
     assert it.controller.rests("drive")
     it.controller.stopped("drive", "lost")
-    assert it.controller.is_confirmed, "nobody has pressed STOP"
+    assert it.controller.is_confirmed, "no STOP was pressed"
     assert not it.controller.rests("drive")
     it.controller.stopped("drive", "revoked")
     assert it.controller.rests("drive")
@@ -131,7 +131,7 @@ def test_stop_that_a_session_could_not_deliver_is_the_first_of_the_next_session(
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.backend.owing = {"drive"}
     assert it.controller.is_stop_due
     it.heard()
     it.controller.detach()
@@ -165,7 +165,7 @@ def test_control_that_its_line_has_disarmed_is_armed_again_by_the_next_gesture()
     it.controller.release("ann", "drive")
     it.controller.stopped("drive", "released")
     it.heard()
-    it.backend.is_armed = lambda command: False  # type: ignore[method-assign]
+    it.backend.disarmed = {"drive"}
     assert it.tick(speed=0.5) == ""
     assert it.heard()[0] == "arm drive"
 
@@ -176,7 +176,7 @@ def test_held_control_that_its_line_has_disarmed_is_not_armed_again() -> None:
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.heard()
-    it.backend.is_armed = lambda command: False  # type: ignore[method-assign]
+    it.backend.disarmed = {"drive"}
     it.tick(speed=0.5)
     assert "arm drive" not in it.heard()
     it.controller.release("ann", "drive")
@@ -187,10 +187,9 @@ def test_held_control_that_its_line_has_disarmed_is_not_armed_again() -> None:
 
 def test_stop_that_the_ending_session_delivers_itself_is_not_sent_again() -> None:
     it = Scene()
-    owes = {"drive"}
-    it.backend.owes_stop = owes.__contains__  # type: ignore[method-assign]
+    it.backend.owing = {"drive"}
     it.controller.detach()
-    owes.clear()
+    it.backend.owing = set()
     assert not it.controller.is_stop_due
     next_backend = Movers()
     it.controller.attach(FakeSession(it.frames, next_backend))
@@ -199,7 +198,7 @@ def test_stop_that_the_ending_session_delivers_itself_is_not_sent_again() -> Non
 
 def test_stop_that_is_due_stays_so_with_another_version_of_the_driver() -> None:
     it, other = Scene(), Scene(is_attached=False)
-    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.backend.owing = {"drive"}
     it.controller.detach()
     other.controller.inherit(it.controller.due)
     assert other.controller.is_stop_due
@@ -219,7 +218,7 @@ def test_stop_that_was_sent_before_the_login_is_due_in_the_next_session() -> Non
 
 def test_stop_that_a_session_could_not_render_is_due_in_the_one_after_it() -> None:
     it = Scene()
-    it.backend.owes_stop = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.backend.owing = {"drive"}
     it.controller.detach()
 
     def broken(command: str) -> Payload:
@@ -235,9 +234,7 @@ def test_stop_that_a_session_could_not_render_is_due_in_the_one_after_it() -> No
 def test_stop_that_an_ending_session_loses_is_due() -> None:
     """Its line was reset after the last report."""
     it = Scene()
-    owes: set[str] = set()
-    it.backend.owes_stop = owes.__contains__  # type: ignore[method-assign]
     it.controller.detach()
     assert it.controller.due == []
-    owes.add("drive")
+    it.backend.owing = {"drive"}
     assert it.controller.due == ["drive"]

@@ -40,7 +40,7 @@ export class LostCard {
     this.lostMs = 0;
     /** Kind of the current loss, and the time since which it is of this kind. @type {Loss["of"] | undefined} */
     this.lostOf = undefined;
-    this.partMs = 0;
+    this.kindMs = 0;
     this.again.addEventListener("click", () => {
       tryNow();
       this.again.setAttribute("disabled", "");
@@ -60,10 +60,10 @@ export class LostCard {
     if (!loss) this.wasGood ||= store.isUp && [...store.links.values()].some(isConnected);
     if (!loss) this.lostMs = 0;
     else if (this.lostMs === 0) this.lostMs = nowMs;
-    if (loss?.of !== this.lostOf) this.partMs = nowMs;
+    if (loss?.of !== this.lostOf) this.kindMs = nowMs;
     this.lostOf = loss?.of;
     const isShown = loss !== null && (!this.wasGood || nowMs - this.lostMs >= GRACE_MS);
-    const tries = isShown ? triesWords(loss, store, this.partMs, nowMs) : "";
+    const tries = isShown ? triesWords(loss, store, this.kindMs, nowMs) : "";
     if (this.tries.textContent !== tries) this.tries.textContent = tries;
     const key = isShown ? JSON.stringify(loss) : "";
     if (key === this.shown) return;
