@@ -290,7 +290,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon, caused by a comma in an unquoted text."""
+        """Report a key that has no colon because of a comma in unquoted text."""
         self._report(
             event,
             "unquoted",

@@ -286,7 +286,7 @@ class Relay(Program):
         self._done += line.startswith("done")
 
     def inside(self, side: str) -> tuple[str, ...]:
-        """Return the command prefix that starts a program at side ``a`` or ``b``."""
+        """Return the command prefix that starts a program on side ``a`` or ``b``."""
         return ("nsenter", f"--net=/proc/{self.pid}/fd/{self._descriptors[side]}", "--")
 
     def do(self, *orders: str) -> int:

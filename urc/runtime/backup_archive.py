@@ -42,7 +42,7 @@ PARTS: Final = re.compile(
     r"|packages/signatures/[0-9a-f]{64}\.json|packages/repositories/\w[\w.-]{0,100}\.json)",
     re.ASCII,
 )
-"""Files of a backup, relative to the data folder."""
+"""Paths of the files in a backup, relative to the data folder."""
 LEFT_OUT: Final = re.compile(
     r"(?:servers|packages/(?:ecosystems|work|blocking-work)|restoring-\w+|replaced-\w+)/.*"
     r"|packages/(?:changing|blocking|repositories/changing)"

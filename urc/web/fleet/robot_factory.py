@@ -218,10 +218,10 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return the versions of each installed package with a robot, by name, oldest first.
+        """Return a dict from the name of each installed package with a robot to its versions.
 
-        If a robot package and a driver package have the same name, the result contains only the
-        package in use.
+        Versions are in ascending order. If a robot package and a driver package have the same
+        name, the result contains only the package in use.
         """
         locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
