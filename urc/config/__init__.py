@@ -1,1 +1,1 @@
-"""Converts YAML documents to a checked, linked and compiled model."""
+"""Converts YAML documents into a checked, linked and compiled model."""

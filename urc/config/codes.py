@@ -21,9 +21,9 @@ class CodePage(NamedTuple):
     why: str
     """The problem's effect or cause."""
     example: str
-    """A document or part of a document with the problem, or a description in words."""
+    """A document or excerpt that has the problem, or a description in words."""
     instead: str
-    """Corrected example, or instructions in words."""
+    """The corrected example, or instructions in words."""
 
     def __str__(self) -> str:
         parts = zip(_PARTS, (self.what, self.why, self.example, self.instead), strict=True)
@@ -31,7 +31,7 @@ class CodePage(NamedTuple):
 
 
 def pages() -> dict[str, CodePage]:
-    """Return all pages, keyed by code, in the order of the file."""
+    """Return all pages, keyed by code, in file order."""
     _, *texts = _FILE.read_text("utf-8").split("\n## ")
     found = [_page(text) for text in texts]
     return {page.code: page for page in found}

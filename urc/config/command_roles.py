@@ -29,7 +29,7 @@ def link_role(problems: Problems, part: Node, command: Command) -> None:
 
     Args:
         problems: receives the problem.
-        part: mapping of the sequence.
+        part: the sequence's mapping.
         command: the sequence with its raised role.
     """
     declared = part.text("role", command.role)

@@ -44,7 +44,7 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widgets for several signals: name, suffixes of signal names by input, and required inputs."""
+"""Widgets for several signals: widget name, signal name suffixes by input, required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
 """Maximum number of columns in a default grid, by screen."""
@@ -60,7 +60,7 @@ _BIG: Final = frozenset(
 _GROUNDS: Final = ("camera", "pano360", "map")
 """Widgets that can fill the background, in order of preference."""
 _ACROSS: Final = (0, 4, 1, 3, 2)
-"""Columns in front of a background, in the order in which they are filled with displays."""
+"""Columns in front of a background, in the order in which displays fill them."""
 _MOST_OVER: Final = 14
 """Maximum number of widgets in front of a background."""
 _STEERED: Final = 2
@@ -68,7 +68,7 @@ _STEERED: Final = 2
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, with signal displays before controls."""
+    """Return the widget for each slot, with signal displays before controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
     for use in _grouped(left, registry):
@@ -121,7 +121,7 @@ def _grouped(left: dict[str, Signal], registry: WidgetFolder) -> Iterator[Widget
 def _stems(
     signals: Mapping[str, Signal], inputs: Mapping[str, tuple[str, ...]]
 ) -> dict[str, dict[str, Signal]]:
-    """Group signals by name without the last word: ``gps`` for ``gps_lat`` and ``gps_lon``."""
+    """Group signals by name minus the last word: ``gps`` for ``gps_lat`` and ``gps_lon``."""
     stems: dict[str, dict[str, Signal]] = {}
     for signal in signals.values():
         stem, _, last = signal.name.rpartition("_")
@@ -186,7 +186,7 @@ def _table(signals: list[Signal], registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _given(command: Command, driver: Driver, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the control of a command; None if no widget provides all required arguments."""
+    """Return the control for a command; None if no widget provides all required arguments."""
     if command.hold is not None:
         held = _held(command, registry)
         return held if held is not None and _is_complete(held, command) else None
@@ -285,9 +285,9 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
 def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
-    Displays are at the top, with the largest displays first. Steering controls are at the bottom
-    right, near the thumb. Other controls fill the free places. On a phone in landscape, steering
-    controls are in the first rows at the right and left edges, and other widgets are below.
+    Displays are at the top, largest first. Steering controls are at the bottom right, near the
+    thumb. Other controls fill the free places. On a phone in landscape, steering controls are in
+    the first rows at the right and left edges; other widgets are between them and below.
     """
     ground = _ground(slots)
     if ground:
@@ -298,7 +298,10 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
 
 
 def _ground(slots: Mapping[str, WidgetUse]) -> str:
-    """Return the background slot; "" if no widget is suitable or too many others exist."""
+    """Return the background slot; "" if no widget is suitable.
+
+    A single slot needs no background, and too many other widgets would hide it.
+    """
     if not 1 < len(slots) <= _MOST_OVER + 1:
         return ""
     found = {use.widget: name for name, use in reversed(list(slots.items()))}
@@ -308,8 +311,8 @@ def _ground(slots: Mapping[str, WidgetUse]) -> str:
 def _over_ground(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
     """Return the layout in front of a background: displays at the top, controls at the bottom.
 
-    Sticks are in the lower corners, with the first stick at the right. A phone in portrait has two
-    columns, with the displays first.
+    Sticks are in the lower corners, with the first stick on the right. The layout for a phone in
+    portrait has two columns, with the displays first.
     """
     ranks = {name: _rank(use) for name, use in slots.items()}
     sticks = [name for name, rank in ranks.items() if rank == _STEERED]
@@ -341,7 +344,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
     taken: set[tuple[int, int]] = set()
     placed: dict[str, Slot] = {}
     ranks = {name: _rank(use) for name, use in slots.items()}
-    # In a narrow grid, steering controls are last, at the bottom.
+    # In a narrow grid, steering controls come last, at the bottom.
     steered = -1 if is_low else _STEERED if columns > 2 else 4
     order = {name: steered if rank == _STEERED else rank for name, rank in ranks.items()}
     for number, name in enumerate(sorted(slots, key=lambda name: order[name])):
@@ -366,7 +369,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return the row and column of the first free square in or below the row `first`."""
+    """Return the row and column of the first free square in row `first` or below."""
     places = range(columns - size + 1)
     row = first
     while True:

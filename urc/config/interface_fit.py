@@ -57,7 +57,7 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
     Args:
         path: path of the interface's document.
         profile: profile of the robot.
-        registry: further widgets; the robot's own widgets take precedence.
+        registry: additional widgets; the robot's own widgets take precedence.
     """
     gathered = gather(path)
     sources = gathered.sources

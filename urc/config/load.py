@@ -42,13 +42,13 @@ class CheckResult(NamedTuple):
     kind: str
     """Document kind: ``robot``, ``driver``, ``interface`` or ``widget``; "" after early errors."""
     files: tuple[str, ...] = ()
-    """Paths of all requested files, including missing files; the checked document is first."""
+    """Paths of all requested files, including missing files; the checked document comes first."""
     pages: tuple[str, ...] = ()
     """URLs of web pages in the widgets, as written in the document."""
     widget: Widget | None = None
     """The widget of a valid manifest; None for other documents and invalid manifests."""
     is_cut_short: bool = False
-    """Whether an error prevented later passes, which might find more problems."""
+    """Whether an error prevented later passes, which might have found more problems."""
 
 
 def load_profile(
@@ -91,7 +91,7 @@ def check(
         path: path of the document, as shown in problems.
         catalog: the available transports and framings.
         registry: the available widgets; by default the widgets that ship with URC.
-            Several calls with one registry read each manifest only once.
+            Calls that share a registry read each manifest only once.
     """
     path = fspath(path)
     sources, reported, kind, files = gather(path)
@@ -132,7 +132,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without the duplicates that copies of an `each` item cause."""
+    """Return the problems without the duplicates that the copies of an `each` item cause."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem

@@ -1,4 +1,4 @@
-"""Message transports and their allowed forms of messages.
+"""Message transports and the message forms that they allow.
 
 `MESSAGING` contains only built-in transports. Transports from packages allow every form.
 """

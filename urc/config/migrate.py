@@ -41,7 +41,7 @@ class Migrated(NamedTuple):
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with new names, without changing the file.
+    """Return a file's content with the new names, without changing the file.
 
     Raises:
         ProblemsError: the file cannot be read, is not a document, or has a key under both names.

@@ -1,7 +1,7 @@
 """A typed view of a valid document for the parsers, and a class that collects problems.
 
 The parsers read documents only through `Node`. Every value therefore has a position for problems,
-and a test can record the keys in use. All functions of this module assume a document that fits its
+and a test can record the keys in use. All functions in this module assume a document that fits its
 schema.
 """
 
@@ -35,7 +35,7 @@ def duration_s(text: str) -> float:
 
 
 class Node(NamedTuple):
-    """A value of a document, and its path."""
+    """A value in a document, and its path."""
 
     document: Document
     path: Path

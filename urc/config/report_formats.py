@@ -46,7 +46,7 @@ def to_sarif(
 
     Args:
         problems: all problems.
-        version: of URC.
+        version: the version of URC.
         summaries: one-sentence summaries, by problem code.
     """
     codes = list(dict.fromkeys(problem.code for problem in problems))
@@ -106,6 +106,6 @@ def _slashed(file: str) -> str:
 
 
 def _uri(file: str) -> str:
-    """Return a file's URI reference, either absolute or relative to the folder of the run."""
+    """Return a file's URI reference, either absolute or relative to the run's folder."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(_slashed(file))

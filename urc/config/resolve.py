@@ -1,4 +1,4 @@
-"""Converts a profile to one document with the origin of every key.
+"""Converts a profile into a single document that shows the origin of every key.
 
 The result is a valid document with the same meaning.
 """
@@ -201,7 +201,7 @@ def _scalar(value: object) -> str:
 
 
 def _text(text: str) -> str:
-    """Quote a text, unless every YAML reader treats the unquoted text as a string."""
+    """Quote text, unless every YAML reader treats the unquoted text as a string."""
     if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
         return text
     if "\\" in text and text.isascii() and text.isprintable() and "'" not in text:

@@ -39,7 +39,7 @@ def kind_of(document: Document) -> str:
 
 @cache
 def shipped_check() -> "QuickCheck":
-    """Return the fast check of the shipped schemas."""
+    """Return the fast check for the shipped schemas."""
     return QuickCheck(read_schema)
 
 
@@ -62,7 +62,7 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class _UncertainError(Exception):
-    """This module does not support a keyword of the schema."""
+    """This module does not support a keyword in the schema."""
 
 
 class QuickCheck:

@@ -12,9 +12,9 @@ from urc.source import Document
 __all__ = ["RESERVED", "Sources"]
 
 _EMULATED: Final = ("signals", "state", "world")
-"""Keys of a simulator for initial values and the world."""
+"""Simulator keys for the initial values and the world."""
 RESERVED: Final = (*_EMULATED, "rules")
-"""Reserved keys of a simulator, which cannot be names of transports."""
+"""Reserved simulator keys, which cannot be names of transports."""
 
 
 class Sources:

@@ -69,7 +69,7 @@ def fit(value: Value, kind: str) -> Value:
 
 
 def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
-    """Return the elements of an array argument, or the value of another argument as a tuple.
+    """Return the elements of an array argument, or the value of any other argument as a tuple.
 
     Raises:
         ValueError: the value has another type or size.
@@ -111,7 +111,7 @@ def fit_hint(value: Value, kind: str) -> str:
 
 
 def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None, float | None]:
-    """Return ``min`` and ``max`` of a signal, argument or setting; report an empty range."""
+    """Return the ``min`` and ``max`` of a signal, argument or setting; report an empty range."""
     low, high = part.number("min"), part.number("max")
     if kind not in ("integer", "number"):
         for key in ("min", "max"):

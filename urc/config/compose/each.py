@@ -3,7 +3,7 @@
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
 
-An item with the same name as a copy changes the copy. For example, ``joint_2: { unit: deg }`` sets
+An item with the same name as a copy changes that copy. For example, ``joint_2: { unit: deg }`` sets
 the copy's unit, and ``joint_2: null`` removes the copy.
 """
 
@@ -211,10 +211,10 @@ class _Rest:
     """Ignores problems in all later copies of an item."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
-        """Say nothing."""
+        """Report nothing."""
 
     def unquoted(self, path: Path, text: str) -> None:
-        """Say nothing."""
+        """Report nothing."""
 
 
 def _are_alike(values: list[object]) -> bool:
@@ -252,7 +252,7 @@ def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -
 
 
 def is_removal(item: object) -> bool:
-    """Return whether the only purpose of an item is to remove another item."""
+    """Return whether an item serves only to remove another item."""
     return isinstance(item, dict) and item.get("remove") is True
 
 
@@ -333,7 +333,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
-    """Report names that still contain braces, which the schemas allow."""
+    """Report names that still contain braces, because the schemas allow braces in names."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
@@ -348,7 +348,7 @@ def _check_names(document: Document, places: list[Path], problems: Problems) -> 
 
 
 def _places(data: object) -> Iterator[Path]:
-    """Yield the paths of all mappings and lists that allow an `each` in their items."""
+    """Yield the paths of all mappings and lists whose items may have an `each`."""
     if not isinstance(data, dict):
         return
     for root in ((), ("driver",)):
@@ -381,7 +381,7 @@ def _has_each(collection: object) -> bool:
 
 
 def _replaced(tree: Tree, path: Path, change: Any, done: Path = ()) -> Tree:
-    """Return `tree` with the part at `path` changed; other parts are shared, not copied."""
+    """Return `tree` with the part at `path` changed; the other parts are shared, not copied."""
     if not path:
         result: Tree = change(tree, done)
         return result

@@ -1,8 +1,8 @@
 """Replaces names in single braces, such as ``{i}`` from an `each`, or ``{params.id}``.
 
-URC replaces names in single braces in all keys and texts while it loads a document. Templates have
-double braces and stay unchanged. If a text consists of only one name, the value itself replaces the
-text, so ``"{i}"`` may become a number.
+URC replaces these names in all keys and strings while it loads a document. Templates have double
+braces and stay unchanged. If a string consists of a single name, the name's value replaces the
+whole string, so ``"{i}"`` may become a number.
 """
 
 import re
@@ -31,7 +31,7 @@ class PlaceholderReporter(Protocol):
     """Reports names without a value."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
-        """Report an unknown word after the dot of a known `name`."""
+        """Report an unknown word that follows a known `name` and a dot."""
 
     def unquoted(self, path: Path, text: str) -> None:
         """Report an unquoted name such as ``max: {i}``, which YAML reads as a mapping."""
@@ -47,7 +47,7 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class ExpansionTooLarge(Exception):
-    """An expansion exceeds the size limits of a document."""
+    """An expansion exceeds the size limits for a document."""
 
 
 class ExpansionBudget:
@@ -58,7 +58,7 @@ class ExpansionBudget:
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Count new nodes and characters; raise `ExpansionTooLarge` above the limit."""
+        """Count new nodes and characters; raise `ExpansionTooLarge` if a limit is exceeded."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:

@@ -4,8 +4,8 @@
     extends: generic-ros1               # the same, with a document that ships with URC
     include: [parts/battery.yaml]       # parts of documents, below the keys of this document
 
-The keys of a document override the keys of included documents. The keys of included documents
-override the keys of the extended document.
+A document's keys override those of its included documents. The keys of included documents override
+those of the extended document.
 """
 
 import os
@@ -32,7 +32,7 @@ _INCLUDED: Final = {
     "driver": ("driver",),
     "interface": ("interface",),
 }
-"""Kinds of documents that a document may include, by its own kind."""
+"""Kinds of documents that a document may include, by the including document's kind."""
 
 
 class Composed(NamedTuple):
@@ -41,14 +41,14 @@ class Composed(NamedTuple):
     document: Document | None
     """The merged document; None if a required document is missing or invalid."""
     sources: tuple[Document, ...]
-    """The documents before the merge; empty without `extends` and `include`."""
+    """The documents before the merge; empty if the document has neither `extends` nor `include`."""
 
 
 def compose(document: Document, library: Library) -> Composed:
     """Merge a document with the documents that it extends and includes.
 
-    The library reads the documents, and collects problems in references and contradictory values.
-    The shape pass reports all other problems in the sources and the result.
+    The library reads the documents and collects the problems with references and contradictory
+    values. The shape pass reports all other problems in the sources and the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -81,7 +81,7 @@ class _Composer:
     def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
         """Return the document merged with its sources; a document without sources is unchanged.
 
-        `chain` contains the files from the first document to `document`.
+        `chain` lists the files from the first document to `document`.
         """
         data = document.data
         if not isinstance(data, dict) or not kind_of(document):

@@ -1,9 +1,10 @@
 """Merges two data trees with source positions; the upper tree overrides the lower tree.
 
-Mappings are merged by key, and lists of named items are merged by name. The upper tree replaces all
-other values. Rules of a simulator are merged by name, and rules without a name are kept. The value
-``null`` removes a key, and ``remove: true`` removes an item of a list. Every mark in the result
-refers to its document, so every problem is reported at its original position.
+Mappings are merged by key, and lists of named items are merged by name. For all other values, the
+upper tree's value replaces the lower tree's value. A simulator's rules are merged by name, and
+unnamed rules are kept. The value ``null`` removes a key, and ``remove: true`` removes a list item.
+Every mark in the result refers to its document, so every problem is reported at its original
+position.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge
 
 _NAMES: Final = ("name", "id")
 _EXCLUSIVE: Final = (frozenset(("grid", "layouts", "tabs")),)
-"""Groups of mutually exclusive keys, in addition to the forms of frames."""
+"""Groups of mutually exclusive keys, in addition to the frame forms."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
 """Keys under ``driver`` when a robot refers to a driver's document."""
 
@@ -27,7 +28,7 @@ class Tree(NamedTuple):
     value: object
     mark: Mark
     home: Document
-    """Document of the data; marks inside the data may refer to another document."""
+    """Document that contains the data; marks inside the data may refer to another document."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]

@@ -1,7 +1,7 @@
 """Replaces a driver's parameters, such as ``{params.id}``, in keys and texts.
 
 Each robot sets its driver's parameters, and URC replaces them while it loads the documents. The
-operator provides the values of settings.
+operator, in contrast, provides the values of settings.
 """
 
 from collections.abc import Mapping
@@ -141,7 +141,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 
 
 class _ParameterFiller:
-    """Replaces the parameters in one document and records the used parameters."""
+    """Replaces the parameters in one document and records which parameters it uses."""
 
     def __init__(self, document: Document, values: Mapping[str, Value], problems: Problems) -> None:
         self.used: set[str] = set()
@@ -193,7 +193,7 @@ class _ParameterFiller:
 
 
 class _RecordedValues(Mapping[str, Value]):
-    """A mapping of values that records each used name."""
+    """A mapping of values that records each name that is looked up."""
 
     def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:
         self._values = values

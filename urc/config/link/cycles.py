@@ -6,7 +6,7 @@ __all__ = ["cycle_from"]
 
 
 def cycle_from(start: str, following: Callable[[str], Iterable[str]]) -> list[str]:
-    """Return the shortest path from `start` back to itself; an empty list without a cycle.
+    """Return the shortest path from `start` back to itself; an empty list if there is no cycle.
 
     Args:
         start: first name of the path.

@@ -66,7 +66,7 @@ def check_option(
 
 
 class NameUses:
-    """The names that a driver uses; rules report unused declarations."""
+    """The names that a driver uses; rules use them to report unused declarations."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()

@@ -49,7 +49,7 @@ class Linker(Protocol):
 
 
 def link_command(linker: Linker, part: Node, command: Command) -> None:
-    """Check the keys of a command, except its frame's keys."""
+    """Check the keys of a command, except those of its frame."""
     known = {*linker.driver.signals, *command.arguments}
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
@@ -260,7 +260,7 @@ def link_arguments(
 
 
 def check_value(part: Node, argument: Argument, problems: Problems) -> None:
-    """Check the constant value at `part` for an argument."""
+    """Check whether the constant value at `part` is valid for an argument."""
     value = part.data
     try:
         elements = fit_argument(value, argument.type, argument.items, argument.size)

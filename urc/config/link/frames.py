@@ -1,6 +1,6 @@
 """Checks whether the framing can carry constant frames.
 
-Frames with expressions can only be checked later, when URC builds them.
+Frames with expressions can be checked only later, when URC builds them.
 """
 
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ __all__ = ["check_frames"]
 
 
 def check_frames(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report constant texts under ``send:`` that do not form exactly one frame."""
+    """Report constant text under ``send:`` that does not form exactly one frame."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
         if command is not None:
@@ -66,7 +66,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
 
 
 def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | None:
-    """Return the bytes of a constant text; None for a variable or invalid text."""
+    """Return the bytes of constant text; None for variable or invalid text."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
         return None
@@ -88,7 +88,7 @@ def _what(send: WriteSpec) -> str:
 
 
 def _check_end(part: Node, problems: Problems) -> None:
-    """Warn about a text that ends with a backslash and a letter instead of a control character."""
+    """Warn about text that ends with a backslash and a letter instead of a control character."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
         problems.warn(
             part,

@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, before any interface changes it."""
+    """Return each slot's widget, before any interface changes the widget."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
@@ -46,7 +46,7 @@ def link_interface(
 ) -> Interface:
     """Return the interface with its linked widgets.
 
-    `slots` contains the slots of the driver. Without a driver, the check covers only the interface.
+    `slots` contains the driver's slots. Without a driver, the check covers only the interface.
     """
     shown = set(interface.shown)
     uses = {}
@@ -264,7 +264,7 @@ def _check_signal(
 
 
 def misfit(port: WidgetPort, signal: Signal) -> str:
-    """Return the reason why a signal does not fit an input; "" if the signal fits."""
+    """Return why a signal does not fit an input; "" if the signal fits."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
         return f"type {' or '.join(port.types)} is expected, but the signal is {signal.type}"
@@ -287,7 +287,7 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
 def _options(
     part: Node, widget: Widget, base: WidgetUse | None, problems: Problems
 ) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return options, files and pages; the options include the manifest's defaults."""
+    """Return the options, files and pages; the options include the manifest's defaults."""
     options: dict[str, object] = {
         name: schema["default"]
         for name, schema in widget.options.items()

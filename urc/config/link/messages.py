@@ -170,7 +170,7 @@ def _check_read(
 
 
 def _answers(part: Node) -> list[Node]:
-    """Return the parts of a received frame, its stages and all its error replies."""
+    """Return the nodes for a received frame, its stages and the error replies with keys."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
     refusals = [inner for one in given for inner in one.listed("errors")]
@@ -178,7 +178,7 @@ def _answers(part: Node) -> list[Node]:
 
 
 def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
-    """Report the use of response headers on a transport without response headers."""
+    """Report the use of response headers on a transport whose replies have no headers."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,

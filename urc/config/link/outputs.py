@@ -234,7 +234,7 @@ def _is_of_type(port: WidgetPort, argument: Argument) -> bool:
 
 
 def _misfit(port: WidgetPort, argument: Argument) -> str:
-    """Return the reason why an output's value does not fit an argument; "" if the value fits."""
+    """Return why an output's value does not fit an argument; "" if the value fits."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
         return f"the value is {given}, but the argument is {argument.type}"

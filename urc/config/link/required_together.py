@@ -183,7 +183,7 @@ def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
 def _check_given(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Report an option's value that is invalid for its command argument."""
+    """Report an option value that is invalid for the command argument that the option sets."""
     options = part.get("options")
     if options is None:
         return
@@ -218,7 +218,7 @@ def _check_text(
 
 
 def _read(text: str, argument: Argument) -> bool | float | str | None:
-    """Convert a text to an argument's value, as pages do; None for an invalid text."""
+    """Convert text to an argument's value, as pages do; return None for invalid text."""
     if argument.type == "boolean":
         return {"true": True, "false": False}.get(text)
     if argument.type not in ("integer", "number"):

@@ -1,10 +1,10 @@
 """Checks files and web pages in a widget's options.
 
 The dashboard serves only the files that a document names for its widgets. Served files must be in
-the document's folder, so packages cannot publish other files of the server.
+the document's folder, so packages cannot publish other files on the server.
 
-The content security policy of a page contains the host of every embedded web page. The URLs of web
-pages must therefore be unambiguous for all browsers.
+A page's content security policy contains the host of every embedded web page. The URLs of embedded
+web pages must therefore be unambiguous to all browsers.
 """
 
 import ipaddress
@@ -94,10 +94,10 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
 
 
 def link_pages(options: Node, widget: Widget, problems: Problems) -> dict[str, tuple[str, ...]]:
-    """Return a mapping from each option for web pages to its URLs.
+    """Return the URLs of web pages in the options, by option.
 
     The options must already fit their schema. The widget's manifest marks the options that name
-    pages. An empty text is valid, and means no page.
+    pages. An empty string is valid and means no page.
     """
     found: dict[str, tuple[str, ...]] = {}
     for name, part in named_texts(options, widget.options, "page"):

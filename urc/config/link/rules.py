@@ -21,7 +21,7 @@ def link_values(
 ) -> dict[str, Reading]:
     """Return the initial values of the emulated robot, converted to the types of the signals.
 
-    `parts` contains the nodes `signals` and `state` of the simulator.
+    `parts` contains the simulator's nodes `signals` and `state`.
     """
     values: dict[str, Reading] = {}
     if "state" in parts:
@@ -118,7 +118,7 @@ def link_rules(
 
 
 def _given(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
-    """Check the trigger of a rule; return the field names of the trigger's frame."""
+    """Check a rule's trigger; return the field names in the trigger's frame."""
     match = rule.match
     if isinstance(match, ReadSpec):
         fields = set(match.fields)
@@ -218,7 +218,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
 
 
 def _check_word(linker: Linker, part: Node, value: Template) -> None:
-    """Check a constant text that a rule assigns to a signal."""
+    """Check constant text that a rule assigns to a signal."""
     signal = linker.driver.signals[part.name]
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})
@@ -227,7 +227,7 @@ def _check_word(linker: Linker, part: Node, value: Template) -> None:
 
 
 def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule) -> None:
-    """Report `auto` replies of a periodic rule, because it has no request to reply to."""
+    """Report `auto` replies in a periodic rule, because such a rule has no request to reply to."""
     if rule.every_s is None:
         return
     for place in places:

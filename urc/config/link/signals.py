@@ -1,4 +1,4 @@
-"""Checks the names and cycles of computed signals."""
+"""Checks computed signals for unknown names and for cycles."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -50,7 +50,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
 
 
 def _link_suppression(part: Node, signal: Signal, driver: Driver, check: _Check) -> None:
-    """Check the names in the expressions that suppress alarms of a signal."""
+    """Check the names in the expressions that suppress a signal's alarms."""
     limits = part.get("limits")
     if limits is None or signal.limits.is_empty:
         return
@@ -80,6 +80,6 @@ def _set_by_frames(driver: Driver) -> dict[str, str]:
 
 
 def _needed(name: str, signals: Mapping[str, Signal]) -> list[str]:
-    """Return the signals in the formula of the signal `name`."""
+    """Return the signals that the formula for the signal `name` uses."""
     formula = signals[name].formula
     return sorted(formula.names & signals.keys()) if formula else []

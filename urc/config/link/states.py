@@ -1,4 +1,4 @@
-"""Checks that expressions compare a signal with named states only to the names of its states."""
+"""Checks that expressions compare a signal that has named states only with those names."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -39,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Yield each pair of a name and a text that an expression compares."""
+    """Yield each name and the text that an expression compares with the name."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue

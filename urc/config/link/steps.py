@@ -1,4 +1,4 @@
-"""Checks sequences: names in their steps, and cycles."""
+"""Checks sequences: the names in their steps, and cycles."""
 
 from collections.abc import Iterator
 

@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the expected value at `part`; None if it is empty or invalid, or with `is_part`."""
+    """Return the expected value at `part`; None if it is empty or invalid, or `is_part` is set."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)
@@ -246,7 +246,7 @@ def _reply_to(
     poll = driver.polls[waiting]
     if test.feed and poll.reply is None:
         problems.error(inner, "no-reply", f"poll {waiting} expects no reply")
-    # The check of the poll reports an unknown transport.
+    # The poll's own check reports an unknown transport.
     if test.feed and poll.transport in driver.transports and poll.transport not in test.feed:
         problems.error(
             inner,

@@ -23,8 +23,8 @@ def link_world(
 ) -> WorldSpec:
     """Check every name in a world; return the world with the commands that reset its watchdog.
 
-    `state` contains the names of the emulated robot's state. `parts` contains the nodes of the
-    simulator.
+    `state` contains the names of the emulated robot's state. `parts` contains the simulator's
+    nodes.
     """
     driver, problems, own = linker.driver, linker.problems, {*state}
     known = {"now", "world", *own, *driver.signals}

@@ -31,7 +31,7 @@ _NEEDED: Final = {
 
 
 class DeclaredTrailer(NamedTuple):
-    """The declared position of a checksum after a text or after each of its lines."""
+    """The declared position of a checksum that follows text, or each line of text."""
 
     mark: bytes
     is_padded: bool
@@ -57,7 +57,7 @@ class DeclaredChecksum(NamedTuple):
     closes: bool
     before: bytes
     trailer: "DeclaredTrailer | None" = None
-    """Position of the checksum after a text; None for a fixed position."""
+    """Position of a checksum that follows text; None for a fixed position."""
 
     @property
     def size(self) -> int:
@@ -108,7 +108,7 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
 
 
 def _trailer(part: Node, encoding: str, problems: Problems) -> DeclaredTrailer | None:
-    """Return the position of the checksum at `part` after a text; None for a fixed position."""
+    """Return the trailer that the checksum at `part` declares; None for a fixed position."""
     mark = parse_bytes(part.get("after"), encoding, problems) or b""
     each = parse_bytes(part.get("each"), encoding, problems) or b""
     for key, bytes_found in (("after", mark), ("each", each)):

@@ -20,7 +20,7 @@ _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Conversion:
     """Return the conversion that the keys of `part` declare, without its states.
 
-    `kind` is the type of the converted value. Conversions of strings and booleans have no
+    `kind` is the type of the converted value. Conversions to strings and booleans involve no
     arithmetic.
     """
     if kind not in ("integer", "number"):
@@ -46,9 +46,9 @@ def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Co
 
 
 def _numbers_in(absent: object) -> tuple[float, ...]:
-    """Return the number in a text, if any, because some frame forms read values as text.
+    """Return the number that a string represents, if any; some frame forms read values as text.
 
-    A text with leading zeros is not a number: ``"000"`` does not mean 0.
+    A string with leading zeros is not a number: ``"000"`` does not mean 0.
     """
     if not isinstance(absent, str) or _A_NUMBER.fullmatch(absent) is None:
         return ()

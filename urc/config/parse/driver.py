@@ -34,7 +34,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: parse_transport(inner, problems, catalog)
         for name, inner in part.named("transports").items()
     }
-    # With only one transport, messages and commands need not name the transport.
+    # If there is only one transport, messages and commands need not name it.
     types, enums = _types(part, problems)
     lines = _Lines(transports, FormContext("", _set_by_frames(part), types, enums, catalog))
     transports = {
@@ -50,7 +50,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: _message(inner, lines, problems) for name, inner in part.named("messages").items()
     }
     polls = tuple(_poll(inner, lines, commands, problems) for inner in part.listed("polls"))
-    # The check of names reports a sequence with the name of a command.
+    # The name check reports a sequence that has the same name as a command.
     commands = {**_sequences(part, lines, problems), **commands}
     signals = {
         name: parse_signal(inner, spoken_name(name), problems)

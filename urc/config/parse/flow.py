@@ -89,7 +89,7 @@ def aged_by_lines(
 ) -> dict[str, Signal]:
     """Return the signals with the `stale_after` of their transports.
 
-    A `stale_after` of the signal itself takes precedence.
+    A signal's own `stale_after` takes precedence.
     """
     ages: dict[str, list[float]] = {}
     frames = [(one.transport, one.read) for one in messages.values()]
@@ -159,7 +159,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` of a held command, because the next value follows anyway."""
+    """Report `resend` and `extend` in a held command, because the next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold', because the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
@@ -264,7 +264,7 @@ def _arguments(part: Node) -> dict[str, Reading]:
 
 
 _NUMBERED_IN_FLIGHT: Final = 16
-"""Default limit of requests in flight when replies are matched by number."""
+"""Default limit on requests in flight when replies are matched by number."""
 
 
 def _queue(part: Node | None, kind: str) -> Queue:

@@ -41,7 +41,7 @@ class FormContext(NamedTuple):
     encoding: str = "utf-8"
     """Text encoding of the transport."""
     signals: frozenset[str] = frozenset()
-    """Names of all signals of the driver."""
+    """Names of all the driver's signals."""
     types: Mapping[str, tuple[Item, ...]] = NOTHING
     """Items of the reusable structs under ``types``, by name."""
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
@@ -82,7 +82,7 @@ def read_form(part: Node) -> tuple[Node, ReadForm] | None:
 
 
 def write_form(part: Node) -> tuple[Node, WriteForm]:
-    """Return the value under ``send:`` or under the form's key inside, and the form's module."""
+    """Return the value under ``send:`` or under the form's key inside it, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:

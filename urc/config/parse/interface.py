@@ -18,7 +18,7 @@ _Cell = tuple[str, int]
 
 
 def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
-    """Return the interface at `part`, without the widgets of its slots."""
+    """Return the interface at `part`, without the widgets in its slots."""
     title = part.text("title", spoken_name(name))
     pages = part.named("tabs")
     tabs = {key: _tab(inner, problems, part) for key, inner in pages.items()}
@@ -77,7 +77,7 @@ def _check_beside_tabs(part: Node, problems: Problems) -> None:
 
 
 def _tab(part: Node, problems: Problems, around: Node | None = None) -> Tab:
-    """Return one page; a tab inherits ``mirror`` from the interface `around`."""
+    """Return one page; a tab inherits ``mirror`` from `around`, the surrounding interface."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left_handed")
     return Tab(

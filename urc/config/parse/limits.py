@@ -32,7 +32,7 @@ def parse_limits(
         part: the signal.
         kind: type of the signal, or of an array's elements.
         bounds: smallest and largest valid value.
-        states: pairs of a raw text and the displayed word.
+        states: pairs of raw text and displayed word.
         problems: collector of problems.
     """
     inner = part.get("limits")

@@ -118,5 +118,5 @@ def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Pro
 
 
 def _is_host(text: str) -> bool:
-    """Return whether a text may be a host name or address, without a scheme, port or spaces."""
+    """Return whether a string may be a host name or address, without a scheme, port or spaces."""
     return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)

@@ -25,11 +25,11 @@ _BESIDE_SILENCE = (
     "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
 )  # fmt: skip
 _MOST_BUSY_S = 600.0
-"""Default of ``within``: maximum total time of a delayed reply, in seconds."""
+"""Default for ``within``: maximum total time for a delayed reply, in seconds."""
 
 
 def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> Reply | None:
-    """Return the reply at `part`; None without a part."""
+    """Return the reply at `part`; None if there is no part."""
     if part is None:
         return None
     own, context = parse_own_framing(part, problems, context)
@@ -65,7 +65,7 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
-    """Return the implied reply of a request if its protocol always replies; otherwise None.
+    """Return the implied reply to a request if its protocol always replies; otherwise None.
 
     Without the implied reply, a refused request would count as complete as soon as it is sent.
     """

@@ -41,7 +41,7 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("fov", "tilt"),
 }
-"""Fields whose unit in documents is degrees, by part of the world."""
+"""Fields that documents give in degrees, by part of the world."""
 _KEYS: Final = {"first": "from", "last": "to"}
 """Keys of a laser in documents, by model field."""
 _LONGEST_S: Final = 3600.0
@@ -195,7 +195,7 @@ class SimulatorSpec(NamedTuple):
     """The parsed emulated robot of a document, with unresolved names."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
-    """By transport."""
+    """Rules, by transport."""
     world: WorldSpec | None = None
 
 

@@ -37,7 +37,7 @@ class StepContext(NamedTuple):
     transport: str
     """Default transport of the steps; "" if each step must name its transport."""
     is_named: bool
-    """Whether the steps form a named sequence; no other steps may name a transport."""
+    """Whether the steps form a named sequence; only such steps may name a transport."""
     forms: FormContext
 
 
@@ -238,7 +238,7 @@ def _if(
 
 
 def _values(parts: dict[str, Node], problems: Problems) -> dict[str, Template | Value]:
-    """Return the given values, with texts compiled as templates."""
+    """Return the given values, with strings compiled as templates."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):

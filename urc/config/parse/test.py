@@ -22,9 +22,9 @@ _ADDRESS: Final = (
     "topic", "type", "service", "action", "method", "path", "url", "query", "headers", "qos",
     "retain", "ok", "status", "reason",
 )  # fmt: skip
-"""Keys of a message's address and status."""
+"""Keys for a message's address and status."""
 _BODIES: Final = ("json", "text", "hex")
-"""Keys of a message's body."""
+"""Keys for a message's body."""
 _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
 """Mutually exclusive keys of a step."""
 

@@ -84,7 +84,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
-    """Return the framing of received frames, including any separate framing of sent frames."""
+    """Return the framing for received frames, including any separate framing for sent frames."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema requires 'framing' for streams

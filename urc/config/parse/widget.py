@@ -1,4 +1,4 @@
-"""Parser for widget manifests, and reader for a folder with widgets."""
+"""Parser for widget manifests, and reader for a folder of widgets."""
 
 import re
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
 def parse_widget(document: Document, problems: Problems) -> Widget:
-    """Return the widget of a manifest."""
+    """Return the widget that a manifest declares."""
     part = Node(document, (), document.data)
     folder = FilePath(document.file).parent
     name = part.text("name")
@@ -149,7 +149,7 @@ class WidgetFolder:
     def __init__(self, folder: FilePath) -> None:
         self.folder = folder
         self.problems: list[Problem] = []
-        """The problems of the manifests read so far."""
+        """The problems in the manifests read so far."""
         self._widgets: dict[str, Widget | None] = {}
 
     @property
@@ -158,7 +158,7 @@ class WidgetFolder:
         return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
 
     def names(self) -> list[str]:
-        """Return the names of all widgets of the folder."""
+        """Return the names of all widgets in the folder."""
         try:
             return sorted(entry.parent.name for entry in self.folder.glob("*/widget.yaml"))
         except OSError:
@@ -171,7 +171,7 @@ class WidgetFolder:
         return self._widgets[name]
 
     def has(self, name: str) -> bool:
-        """Return whether the folder has a widget of this name, even with an invalid manifest."""
+        """Return whether the folder contains this widget, even if its manifest is invalid."""
         return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
 
     def place(self, name: str) -> FilePath:

@@ -21,7 +21,7 @@ from urc.model.sequence import SendStep, Step, UntilStep, WaitStep, all_steps
 __all__ = ["check_flow"]
 
 _GOOD_BYE_S = 2.0
-"""Time limit of ``on_close`` in seconds, as in `urc.protocol.engine`."""
+"""Time limit for ``on_close`` in seconds, as in `urc.protocol.engine`."""
 _BITS_OF_A_BYTE = 10
 """Number of bits per byte on a serial line, including the start bit and the stop bit."""
 

@@ -1,7 +1,7 @@
 """Rules for frames: patterns that match too much, and unused names.
 
-All are warnings. The rules report two declarations of the same frame only if an example frame
-matches both.
+These rules only issue warnings. They report two declarations of the same frame only if an example
+frame matches both.
 """
 
 import re
@@ -163,7 +163,7 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return text with an example if `first` matches every frame of `second`; otherwise None."""
+    """Return a phrase with an example if `first` matches every frame of `second`, else None."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:
@@ -200,7 +200,7 @@ def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
 
 
 def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
-    """Return the constants by offset and size; None if a match has other conditions."""
+    """Return the constants by offset and size; None if a match depends on other conditions."""
     found: dict[tuple[int, int], object] = {}
     offset = 0
     for item in items:
@@ -216,7 +216,7 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
 
 
 def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
-    """Warn about an error pattern that matches a successful reply: errors take precedence."""
+    """Warn if an error pattern, which takes precedence, matches a successful reply."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
     errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
     asides = [("resend", "a resend request"), ("extend", "a busy reply")]

@@ -1,4 +1,4 @@
-"""The last pass: rules for a complete profile, which only warn."""
+"""The last pass: rules that check a complete profile and only warn."""
 
 import re
 from pathlib import PurePath
@@ -82,7 +82,7 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
 
 
 def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn about a slot that the robot's document fills, but that no interface shows.
+    """Warn about a slot that the robot's document fills but no interface shows.
 
     A driver's document may fill slots for other interfaces, so the driver's slots are not checked.
     """
@@ -141,7 +141,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 
 
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
-    """Warn about a poll with a reply timeout longer than its period.
+    """Warn about a poll whose reply timeout is longer than its period.
 
     A declared timeout that is no longer than the default causes no warning.
     """

@@ -103,7 +103,7 @@ def _says_no(part: Node) -> bool:
 
 
 def why_it_moves(name: str, command: Command) -> str:
-    """Return the reason why a command suggests motion; "" for other commands."""
+    """Return why a command suggests motion; "" for other commands."""
     if command.send.options.get("verb") == "cancel":
         return ""  # a cancel ends motion, regardless of its name
     words = words_of(name)
@@ -136,7 +136,7 @@ def _motion_word(words: tuple[str, ...]) -> str:
 
 
 def _type_of_motion(send: Mapping[str, object]) -> str:
-    """Return the reason why a message type suggests motion; "" for other types."""
+    """Return why a message type suggests motion; "" for other types."""
     attributes = send.get("attributes")
     kind = attributes.get("type") if isinstance(attributes, Mapping) else None
     if not isinstance(kind, str):

@@ -1,6 +1,6 @@
 """The shape pass checks a document against the schema of its kind.
 
-The fast check of `urc.config.schemas` accepts valid documents. The library `jsonschema` checks all
+The fast check in `urc.config.schemas` accepts valid documents. The library `jsonschema` checks all
 other documents, and `urc.config.shape.report` converts its errors to problems.
 """
 

@@ -40,7 +40,7 @@ _OTHER_WORDS: Final = {
     "minimum": ("min",),
     "maximum": ("max",),
 }
-"""URC keys, keyed by the corresponding key of another tool."""
+"""URC keys, by the corresponding key in another tool."""
 _SAME_TYPES: Final = {
     "float": "number",
     "double": "number",
@@ -55,7 +55,7 @@ _SAME_TYPES: Final = {
     "picture": "image",
     "bytes": "blob",
 }
-"""URC type names, keyed by the corresponding type name of another tool."""
+"""URC type names, by the corresponding type name in another tool."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _SPAN: Final = re.compile(
     r"(?P<number>[0-9]{1,6}(?:\.[0-9]{1,6})?)\s*"
@@ -71,7 +71,7 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""Hints, keyed by a misplaced key and another valid key of the same mapping."""
+"""Hints, by misplaced key and by a valid key in the same mapping."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
@@ -96,7 +96,7 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Pat
 
 
 def _place_hint(value: object, known: Mapping[str, Any]) -> str:
-    """Return a hint with a URL's host and port as keys of a transport."""
+    """Return a hint that gives a URL's host and port as keys of a transport."""
     found = _URL.match(value) if isinstance(value, str) else None
     if found is None:
         return "write 'host' and 'port', such as host: robot.local, port: 9090"
@@ -104,7 +104,7 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
     written = [f"host: {host}"]
     written += [f"port: {found['port']}"] if found["port"] else []
     written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
-    # Because of the quoted names, a missing 'host' is not reported again.
+    # The hint quotes both names, so a missing 'host' is not reported again.
     return f"write 'host' and 'port': {', '.join(written)}"
 
 
@@ -120,7 +120,7 @@ def word_hint(word: str, words: Sequence[str]) -> str:
 
 
 def example_of(schema: Mapping[str, Any], key: str) -> str:
-    """Return the schema's example of a missing key; "" without an example."""
+    """Return the schema's example for a missing key; "" if the schema has no example."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
     if key == "urc":
@@ -134,7 +134,7 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
 
 
 def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
-    """Return a hint with the schema's first example of a mapping, with `value` as its delimiter."""
+    """Return a hint with the schema's first example of a mapping; `value` becomes its delimiter."""
     if _is_filled_in(document, path):
         return ""
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
@@ -163,7 +163,7 @@ def _quoted(value: object) -> str:
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
-    """Return a hint for converting a value to one of `types`; "" without a suitable hint."""
+    """Return a hint for converting a value to one of `types`; "" if no hint is suitable."""
     if value is None:
         return "give the key a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -187,7 +187,7 @@ def type_hint(
 
 
 def text_hint(document: Document, path: Path, value: str, schema: Mapping[str, Any]) -> str:
-    """Return a hint for a text that does not match its schema's pattern; "" without a hint."""
+    """Return a hint for text that does not match its schema's pattern; "" without a hint."""
     if schema.get("title") == "duration":
         found = _SPAN.fullmatch(value.strip())
         if found is None:

@@ -1,4 +1,4 @@
-"""Converts errors from `jsonschema` to problems with exact positions.
+"""Converts errors from `jsonschema` into problems with exact positions.
 
 URC imports this module only for invalid documents, because `jsonschema` takes 80 ms to import.
 """
@@ -58,7 +58,7 @@ _EXPECTED: Final = {
 def report(
     document: Document, schema: Mapping[str, Any], read: _Read, path: Path = (), value: Any = None
 ) -> list[Problem]:
-    """Return the problems of a document, with the deepest paths first.
+    """Return the problems in a document, with the deepest paths first.
 
     The schema describes the part at `path`. `read` returns the schema with a given file name.
     """

@@ -1,4 +1,4 @@
-"""Several frames of one command: each item of a list under ``send:`` has a form."""
+"""Several frames for one command: each item in a list under ``send:`` has a form."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ __all__ = ["parse_write", "templates"]
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the frames at `part`, in the order of the list."""
+    """Return the frames at `part`, in list order."""
     if context.framing is not None and context.framing.type == "datagram":
         problems.error(
             part,

@@ -1,4 +1,4 @@
-"""The form ``json`` of sent frames: any JSON value, with templates in its texts."""
+"""The form ``json`` for sent frames: any JSON value, with templates in its strings."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -29,7 +29,7 @@ def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
 
 
 def compiled_tree(part: Node, problems: Problems) -> Any:
-    """Return the value at `part`, and compile each text with braces as a template."""
+    """Return the value at `part`; compile each string that has braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:

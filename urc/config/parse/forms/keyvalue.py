@@ -1,4 +1,4 @@
-"""The form ``keyvalue``: pairs of key and value, in any order."""
+"""The form ``keyvalue``: key-value pairs, in any order."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ __all__ = ["parse_read", "place_of"]
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return the separators and the field of each key."""
+    """Return the separators and the field for each key."""
     pairs, separator = part.must("pairs"), part.must("separator")
     if pairs.data == separator.data:
         problems.error(separator, "same-separator", "'pairs' and 'separator' must be different")

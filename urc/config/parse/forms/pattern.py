@@ -43,7 +43,7 @@ def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
 
 
 def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
-    """Return the fields with the literal text before each field, and the text after the last."""
+    """Return each field with the literal text before it, and the text after the last field."""
     holes: list[PatternField] = []
     literal, position = "", 0
     last = (0, 0)

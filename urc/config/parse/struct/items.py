@@ -84,7 +84,7 @@ class ItemParser:
         return tuple(item for item in found if item is not None)
 
     def _check_rest(self, part: Node, found: list[Item | None]) -> None:
-        """Report an item after an item that extends to the end of the frame."""
+        """Report any item that follows an item extending to the end of the frame."""
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
             if any(extent is not None and extent.kind == "rest" for extent in extents):
@@ -303,7 +303,7 @@ class ItemParser:
             check_fits(part, subject.number, key, self.problems, key=True)
 
     def _check_sent(self, part: Node, item: Item) -> None:
-        """Report an item without a value in a sent struct."""
+        """Report an item of a sent struct without a value or with an unknown size."""
         if self.purpose == "send" and asks_for_the_end(item):
             self.problems.error(
                 part,
@@ -362,7 +362,7 @@ def asks_for_the_end(item: Item) -> bool:
 
 
 def weight_of(item: Item | None) -> int:
-    """Return the number of items after the expansion of an item."""
+    """Return the number of items in an item after its expansion, including the item itself."""
     if item is None:
         return 0
     return 1 + sum(weight_of(one) for items in _inner(item) for one in items)

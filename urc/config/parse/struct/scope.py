@@ -73,7 +73,7 @@ class Scope:
         if part is None:
             return None
         if isinstance(part.data, str):
-            # A sent type may use names outside the type; a received struct ignores 'value'.
+            # A sent type may use names from outside the type; a received struct ignores 'value'.
             return self._expression(part, OUTER_NAMES if self._purpose == "type" else frozenset())
         from urc.expressions import compile_expression
 
@@ -107,7 +107,7 @@ class Scope:
 
 
 def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
-    """Yield the item values of a type that use names outside the type."""
+    """Yield the item values in a type that use names from outside the type."""
     for item in items:
         if item.value is not None and item.value.names & OUTER_NAMES:
             one = item.value
