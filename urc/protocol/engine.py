@@ -8,12 +8,12 @@ tests, playback and the simulator share this engine.
     events = engine.receive("wire", data, now)    # bytes were received
     events = engine.closed("wire", "why", now)    # the transport is not connected
     events = engine.command(request, now)         # a command was requested
-    events = engine.tick(now)                     # `engine.deadline` has come
-    events = engine.finish(now)                   # close in order; each connection ends with a
+    events = engine.tick(now)                     # `engine.deadline` has been reached
+    events = engine.finish(now)                   # close gracefully; each connection ends with a
         `Close`
 
-A returned `Close` means that the engine has discarded the connection. The owner must close the
-connection, without calling `closed`.
+A returned `Close` means that the engine has discarded the connection. The owner must then close the
+connection without calling `closed`.
 
 Theory of operation. Conversations, polls, commands and sequences do not call each other. A
 conversation also returns internal events: `ExchangeEnded` for a finished request, `Matched` for an
@@ -84,10 +84,10 @@ class Engine:
 
     Args:
         driver: a loaded driver, with compiled patterns and templates.
-        settings: values of all settings in the profile, by name.
-        fresh: sources of time and randomness for sent frames; fixed sources for tests.
+        settings: values of all settings in the profile, keyed by name.
+        fresh: sources of time and randomness for sent frames; tests pass fixed sources.
         is_compiled: whether to generate a function for each message and command. This saves time in
-            live sessions. In short document tests, generating the functions takes longer than it
+            live sessions. In short document tests, generating the functions takes more time than it
             saves.
 
     Raises:
@@ -137,7 +137,7 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether any condition or formula of the driver depends on the newest samples."""
+        """Whether any condition or formula in the driver depends on the newest samples."""
 
     # -- methods
 
@@ -163,7 +163,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum time between a command or received data and any new deadline, in seconds."""
+        """Minimum time from a command or received data to any new deadline, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
@@ -338,7 +338,7 @@ class Engine:
     def _act(self, event: LineEvent, told: list[Event], now: float) -> None:
         """Handle one event; append the resulting external events to `told`."""
         if type(event) in _PLAIN:
-            told.append(event)  # type: ignore[arg-type]  # events for the outside
+            told.append(event)  # type: ignore[arg-type]  # external events
         elif isinstance(event, ExchangeEnded):
             exchange, outcome = event
             for one in exchange.owner.ended(exchange, outcome, now):

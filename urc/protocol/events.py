@@ -69,7 +69,7 @@ class Ready(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Samples from frames that arrived together, in order, including computed signals."""
+    """Samples, in order, from frames that arrived together; computed signals are included."""
 
     transport: str
     """Name of the transport; "" for an alarm that began without a frame."""
@@ -77,7 +77,7 @@ class Samples(NamedTuple):
 
 
 class Replied(NamedTuple):
-    """The request has succeeded; `values` contains the reply fields, by name."""
+    """The request has succeeded; `values` contains the reply fields, keyed by name."""
 
     id: int
     command: str
@@ -97,7 +97,7 @@ class Failed(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """A protocol violation by the robot, which is counted and shown without an exception."""
+    """A protocol violation by the robot; it is counted and shown, but raises no exception."""
 
     transport: str
     code: str

@@ -1,4 +1,4 @@
-"""Motion frames: setpoints and stops of held commands.
+"""Motion frames: setpoints and stops for held commands.
 
 Pure. Motion frames bypass the connection's request queue. The owner of the transport sends only the
 newest setpoint, and sends a stop before any other frame. Setpoints must meet all requirements of
@@ -36,7 +36,7 @@ class MotionUnavailable(UrcError):
 
 
 class _Way:
-    """The encoder of one held command; it is built in advance, because setpoints are frequent."""
+    """The encoder for one held command; it is built in advance, because setpoints are frequent."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -48,7 +48,7 @@ class _Way:
 
 
 class MotionEncoder:
-    """The encoder for all held commands of one driver."""
+    """The encoder for all held commands in one driver."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class MotionEncoder:
         self._lines = lines
         self._known = known
         self._counting: dict[str, int] = {}
-        """Number of held commands with counters, for each connection."""
+        """Number of held commands with counters, keyed by connection."""
         self._made: dict[str, Made] = {}
         """Cached stop frames, keyed by command."""
         self._lengths: dict[str, int] = {}
@@ -135,7 +135,7 @@ class MotionEncoder:
         return line.is_open and line.is_ready
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
-        """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
+        """Return the stop for `command`: bytes including framing, an envelope, or frame variants.
 
         A stop can be rendered without a connection. A stop with a counter is a series with one
         frame for each possible next number. The series is long enough for the stops of all held
@@ -155,7 +155,7 @@ class MotionEncoder:
         return line.counters.series(
             lambda draw: ask.encode({**names, COUNTERS: draw}),
             self._lengths.get(found.transport, 1),
-            # Values from the robot may have changed since then.
+            # Values from the robot may have changed since the stops were rendered.
             self._made.setdefault(command, {}) if ask.is_local else {},
         )
 
@@ -176,7 +176,7 @@ class MotionEncoder:
 
         Args:
             command: name of a held command.
-            arguments: values by name; missing arguments have their default values.
+            arguments: values, keyed by name; missing arguments take their default values.
             now: current time in seconds, for requirements that need fresh signals.
             confirmed_by: names of the people who have confirmed the command, for the two-person
                 rule.

@@ -60,7 +60,7 @@ class PollState:
         # Requests keep to a fixed grid of times, so that polls neither drift nor bunch up after a
         # pause.
         self.due += ((now - self.due) // every_s + 1) * every_s
-        if self.due <= now:  # the period is below the resolution of the clock
+        if self.due <= now:  # the period is below the clock's resolution
             self.due = now + every_s
         if self._line.has(self._ask.label):
             return []
@@ -104,8 +104,8 @@ class KeepaliveState:
         Args:
             keepalive: the declaration.
             line: conversation on the connection to keep open.
-            ask: request of the keepalive; None if the keepalive runs a command.
-            known: state of the robot, for the keepalive's templates.
+            ask: request for the keepalive; None if the keepalive runs a command.
+            known: state of the robot, used in the keepalive's templates.
         """
         self._keepalive = keepalive
         self._line = line
@@ -119,7 +119,7 @@ class KeepaliveState:
         """Time of the next keepalive; None while a keepalive is pending or while disconnected."""
         if not self._line.is_ready or self._is_asked:
             return None
-        # A refused keepalive is not retried at once.
+        # A refused keepalive is not retried immediately.
         return max(self._line.last_sent, self._spoke_at) + self._keepalive.every_s
 
     def forget(self) -> None:
@@ -127,7 +127,7 @@ class KeepaliveState:
         self._is_asked = False
 
     def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
-        """Send a keepalive if due. The function `run` runs a command and calls `done`."""
+        """Send a keepalive if it is due. The function `run` runs a command and calls `done`."""
         due = self.deadline
         if due is None or due > now:
             return []
@@ -214,7 +214,7 @@ class PollSchedule:
             poll.stop()
 
     def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit the due requests one at a time, and yield the events of each."""
+        """Submit the due requests one at a time, and yield the events for each."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.submit_if_due(now)

@@ -24,7 +24,7 @@ def function_of(
         name: name of the function, a Python identifier.
         arguments: parameter list of the function, in Python syntax.
         lines: lines of the function body, indented by at least four spaces.
-        scope: global variables of the function, by name.
+        scope: global variables of the function, keyed by name.
     """
     import linecache  # imported here, because functions are generated only in live sessions
 

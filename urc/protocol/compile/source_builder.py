@@ -1,8 +1,8 @@
 """Builder for the source text of a generated struct function.
 
-Pure. WARNING: the source is compiled and run. The source may contain only text of this package, the
-`repr()` of constants, and names from `SourceBuilder.bind`. Text from a document must never become
-part of the source.
+Pure. WARNING: the source is compiled and run. The source may contain only text from this package,
+the `repr()` of constants, and names from `SourceBuilder.bind`. Text from a document must never
+become part of the source.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ class SourceBuilder:
 
     def __init__(self) -> None:
         self.scope: dict[str, Any] = dict(BUILTINS)
-        """Global variables of the function, by name."""
+        """Global variables of the function, keyed by name."""
         self.lines: list[str] = []
 
     def bind(self, word: str, value: object) -> str:

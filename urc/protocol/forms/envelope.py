@@ -26,7 +26,7 @@ _UP: Final = (".", "..")
 class _AddressPiece(NamedTuple):
     template: Template
     is_value: bool
-    """Whether the piece contains a command argument, not only text or settings."""
+    """Whether the piece contains a command argument; other pieces contain only text or settings."""
 
 
 class PathTemplate:
@@ -57,7 +57,7 @@ class PathTemplate:
 
 
 def place_writer(name: str, tree: object) -> PathTemplate | None:
-    """Return the writer of the attribute `name`; None if the attribute has no restrictions.
+    """Return the writer for the attribute `name`; None if the attribute has no restrictions.
 
     Args:
         name: name of the attribute, such as ``path`` or ``topic``.
@@ -98,11 +98,11 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
 """Attributes that identify an envelope; all other attributes are delivery options."""
 _TEXTS: Final = ("query", "headers")
-"""Attributes whose values are mappings to text."""
+"""Attributes whose values map names to text."""
 
 
 class EnvelopeWriter:
-    """A writer for envelopes, which also reads the values back from an envelope."""
+    """A writer for envelopes; it also reads the values back from an envelope."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._verb = cast("str", spec.options["verb"])
@@ -130,7 +130,7 @@ class EnvelopeWriter:
         return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values by name; None if the envelope does not match."""
+        """Return the values, keyed by name; None if the envelope does not match."""
         envelope = frame.payload
         if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
             return None
@@ -154,7 +154,7 @@ class EnvelopeWriter:
         return None if said is None else {**found, **said}
 
     def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
-        """Return whether `value` matches `tree`, and add the values by name to `found`."""
+        """Return whether `value` matches `tree`; add the values to `found`, keyed by name."""
         if isinstance(tree, Mapping):
             if not isinstance(value, Mapping) or tree.keys() != value.keys():
                 return False

@@ -1,6 +1,6 @@
 """Field conversions, ``set`` and ``when`` for one frame.
 
-Pure. `ShapedReader` wraps the reader of a form, for reading and writing.
+Pure. `ShapedReader` wraps a form's reader, for both reading and writing.
 """
 
 from collections.abc import Mapping
@@ -69,10 +69,10 @@ class ShapedReader:
         try:
             return self._when is not None and bool(self._when.evaluate(names))
         except ExpressionError:
-            return False  # it reads a field of another frame
+            return False  # the condition reads a field of another frame
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame with `fields`, except the fields of ``set``."""
+        """Return a frame with `fields`, excluding the fields from ``set``."""
         raw: dict[str, object] = {}
         for name, value in fields.items():
             if name in self._sets:
@@ -89,7 +89,7 @@ class ShapedReader:
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return an unusable operand, None if an operand is missing, or else the expression's error."""
+    """Return an unusable operand, None for a missing operand, or else the expression's error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

@@ -16,7 +16,7 @@ _PLAIN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\|\s*([a-z0-9]+)\s*)?")
 
 
 class BytesWriter:
-    """A writer for concatenated pieces, which also reads back fixed-width values."""
+    """A writer for concatenated pieces; it also reads fixed-width values back."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._pieces = cast("tuple[bytes | Template, ...]", spec.options["pieces"])
@@ -53,7 +53,7 @@ class BytesWriter:
         )
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of pieces such as ``{{ name | u16be }}``; None without a match."""
+        """Return the values of pieces such as ``{{ name | u16be }}``; None if nothing matches."""
         data, at = frame.payload, 0
         if not isinstance(data, bytes):
             return None

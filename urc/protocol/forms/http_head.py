@@ -1,6 +1,6 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. The reader for status and headers wraps the body's reader, for both reading and writing.
+Pure. `HeadReader` wraps the body's reader, for both reading and writing.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ STATUS: Final = "status"
 _REDIRECTS: Final = 3
 """First digit of redirect status codes."""
 LOCATION: Final = "location"
-"""Header with the target URL of a redirect."""
+"""Header that contains the target URL of a redirect."""
 
 
 def is_redirect(frame: Frame) -> bool:
@@ -29,7 +29,7 @@ def is_redirect(frame: Frame) -> bool:
 class HeadReader:
     """A reader for the status and headers, with another reader for the body.
 
-    Fields of missing HTTP headers are omitted.
+    Fields for missing HTTP headers are omitted.
     """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec) -> None:

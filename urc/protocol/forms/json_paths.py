@@ -1,7 +1,7 @@
 """The form ``json`` for reading: fields at paths in a document.
 
 Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
-decoder of `msgspec` skips all other data, and a generated function extracts the fields
+`msgspec` decoder skips all other data, and a generated function extracts the fields
 (`urc.protocol.compile.source`). If a document has a different structure, the decoder raises an
 error. The reader then decodes the whole document and follows the paths step by step. JMESPath
 expressions always require decoding the whole document. Typed and complete decoding return the same
@@ -26,7 +26,7 @@ _Find = Callable[[Any], object]
 
 
 class JsonReader:
-    """A reader for the values at given paths, which also writes documents with such values."""
+    """A reader for the values at given paths; it also writes documents with such values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         paths = cast("Mapping[str, object]", spec.options["paths"])
@@ -127,7 +127,7 @@ def _put(root: dict[str, Any], path: JsonPath, value: object) -> None:
     for step, after in zip(path, (*path[1:], None), strict=True):
         if isinstance(step, int):
             if not isinstance(holder, list):
-                return  # another path needs another type here; `write` sees the missing value
+                return  # another path needs another type here; `write` detects the missing value
             holder += [None] * (step + 1 - len(holder))
         elif not isinstance(holder, dict):
             return

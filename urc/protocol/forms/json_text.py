@@ -13,7 +13,7 @@ __all__ = ["JsonWriter", "filled", "matches"]
 
 
 class JsonWriter:
-    """A writer for compact JSON, which also reads back the values of plain names and counters."""
+    """A writer for compact JSON; it also reads back the values of plain names and counters."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
@@ -47,7 +47,7 @@ class JsonWriter:
         return value
 
     def completed(self, value: object) -> object:
-        """Return a ROS message with zeros for missing members, as a ROS bridge does."""
+        """Return a ROS message with its missing members set to zero, as a ROS bridge does."""
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -81,7 +81,7 @@ def _completed(tree: Any, value: Any) -> Any:
 
 
 def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
-    """Return whether `value` matches `tree`, and add the values of plain names to `found`."""
+    """Return whether `value` matches `tree`; add the values of plain names to `found`."""
     if isinstance(tree, Template):
         name = tree.source.strip().removeprefix("{{").removesuffix("}}").strip()
         if name.isidentifier() and name in tree.names:

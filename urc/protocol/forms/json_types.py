@@ -19,16 +19,16 @@ _LISTS_TO = 64
 
 
 class _Shape:
-    """The required type of the value at one path of the document."""
+    """The required type of the value at one path in the document."""
 
     def __init__(self) -> None:
         self.names: dict[str, _Shape] = {}
         self.element: _Shape | None = None
-        """Type of all elements of an array; None if the value is not an array."""
+        """Type of an array's elements; None if the value is not an array."""
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape after one more path step, creating the shape if missing."""
+        """Return the shape after one more path step; create the shape if it is missing."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:
@@ -60,12 +60,12 @@ class ExtractionPlan(NamedTuple):
     """A plan for extracting the fields at given paths from a document."""
 
     decode: Callable[[bytes], Any]
-    """Function that decodes a document, or raises `msgspec.DecodeError` for a different
-    structure."""
+    """Function that decodes a document, or raises `msgspec.DecodeError` if the structure
+    differs."""
     want: PathNode
 
     def access(self, want: PathNode, step: str | int) -> str:
-        """Return the source text for accessing `step` of a value."""
+        """Return the source text that accesses `step` of a value."""
         if isinstance(step, int):
             return f"[{step}]"
         return f".f{list(want.shape.names).index(step)}"

@@ -43,7 +43,7 @@ _FILLERS: Final[Mapping[FieldKind, object]] = {"integer": 0, "number": 0, "hex":
 
 
 class PatternReader:
-    """A reader for typed fields in text, which also writes text with field values."""
+    """A reader for typed fields in text; it also writes text with field values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._holes = cast("tuple[PatternField, ...]", spec.options["holes"])
@@ -59,7 +59,7 @@ class PatternReader:
             if hole.name
         ]
         self._words = _words(self._holes, self._tail)
-        """Words of the pattern; None if the pattern needs a regular expression."""
+        """Words in the pattern; None if the pattern needs a regular expression."""
         self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
@@ -115,7 +115,7 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
         return None
     if not holes:
         return None
-    # Several blanks in a row, and blanks other than the space, stay literal.
+    # Several blanks in a row, and blanks other than spaces, stay literal.
     literals = [holes[0].before.lstrip(), *(hole.before for hole in holes[1:]), tail]
     is_plain = all(" ".join(text.split()) == text.strip(" ") for text in literals)
     is_single = not any("  " in text for text in literals)
@@ -123,7 +123,7 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _by_words(words: list[str | PatternField], found: list[str]) -> dict[str, object] | None:
-    """Return the fields of a text that was split into words; None if the text does not match."""
+    """Return the fields of text that was split into words; None if the text does not match."""
     if len(found) != len(words):
         return None
     fields: dict[str, object] = {}

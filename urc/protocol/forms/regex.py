@@ -12,19 +12,19 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["RegexReader"]
 
 _WIDEST: Final = 16
-"""Maximum length of a number in alternative spellings, in characters."""
+"""Maximum length of an alternative spelling of a number, in characters."""
 _PLACES: Final = 6
 
 
 class RegexReader:
-    """A reader for text with a pattern, which also writes the shortest matching text."""
+    """A reader for text that matches a pattern; it also writes the shortest matching text."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._pattern = cast("Pattern", spec.options["pattern"])
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the named groups that participated in the match, by name."""
+        """Return the named groups that participated in the match, keyed by name."""
         found = self._pattern.search(frame.text)
         if found is None:
             return None

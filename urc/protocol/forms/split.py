@@ -12,7 +12,7 @@ __all__ = ["KeyvalueReader", "SplitReader"]
 
 
 class SplitReader:
-    """A reader for values by position. An empty part means that the value is not available."""
+    """A reader for values identified by position; an empty part means an unavailable value."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -25,7 +25,7 @@ class SplitReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the parts by name; None if the number of parts is wrong."""
+        """Return the parts, keyed by name; None if the number of parts is wrong."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -41,7 +41,7 @@ class SplitReader:
         }
 
     def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
-        """Return the parts by name; the last name has a list of all remaining parts."""
+        """Return the parts, keyed by name; the last name has a list of all remaining parts."""
         first, strip = len(self._names) - 1, self._strip
         if len(parts) < first:
             return None
@@ -71,7 +71,7 @@ class SplitReader:
 
 
 class KeyvalueReader:
-    """A reader for values by key. A key without text means that the value is not available."""
+    """A reader for values identified by key; a key without text means an unavailable value."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -115,7 +115,7 @@ class KeyvalueReader:
         return {name: part.strip(self._strip) for name, part in named if name}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return `fields` as key-value pairs in one text."""
+        """Return `fields` as key-value pairs in one string."""
         keys = {name: key for key, name in self._names.items()}
         texts = {keys[name]: field_text(value) for name, value in fields.items() if name in keys}
         pairs = [field_text(fields.get(name)) or "-" for name in self._first]

@@ -1,6 +1,6 @@
-"""The tables of readers and writers by form, and functions that build readers and writers.
+"""The readers and writers for each form, and functions that build readers and writers.
 
-Pure. Each value of `READERS` and `WRITERS` is a factory with the parameters ``(spec, context)``,
+Pure. Each value in `READERS` and `WRITERS` is a factory with the parameters ``(spec, context)``,
 which returns a reader or a writer. Each engine calls the factory once for each declaration.
 `urc.protocol.values.payload` defines the interfaces of readers and writers.
 """

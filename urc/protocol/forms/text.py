@@ -21,7 +21,7 @@ back."""
 
 
 class TextWriter:
-    """A writer for rendered templates, which also reads back the values of plain names."""
+    """A writer for rendered templates; it also reads back the values of plain names."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._template = cast("Template", spec.options["template"])
@@ -39,8 +39,9 @@ class TextWriter:
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the text at each plain name, keyed by name; None if the frame does not match.
 
-        A counter's number has the key ``seq.NAME``. A field ends at the next occurrence of its
-        following literal text. The last field ends before the literal text at the end of the frame.
+        A counter's number has the key ``seq.NAME``. A field ends at the next occurrence of the
+        literal text that follows it. The last field ends before the literal text at the end of the
+        frame.
         """
         try:
             text = frame.text

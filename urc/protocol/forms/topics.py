@@ -19,11 +19,11 @@ from urc.protocol.values.payload import CodecContext, Frame, NotWritable, Payloa
 __all__ = ["TopicReader", "frame_of", "listened", "matches", "paths_by_topic", "topic_of"]
 
 FEEDBACK = "/feedback"
-"""Suffix of the feedback topic of an action."""
+"""Suffix of an action's feedback topic."""
 
 
 class TopicReader:
-    """A reader for the messages of one topic, using the reader of another form.
+    """A reader for the messages on one topic; it uses the reader of another form.
 
     For a topic with wildcards, the field ``_topic`` contains the actual topic.
     """
@@ -72,7 +72,7 @@ def matches(topic: str) -> Callable[[str], bool]:
 
 
 def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
-    """Return the topic of a declaration; raise `UrcError` if the template fails."""
+    """Return the topic in a declaration; raise `UrcError` if the template fails."""
     try:
         return "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
     except ExpressionError as error:
@@ -96,7 +96,7 @@ def frame_of(payload: Payload, encoding: str) -> Frame:
 def listened(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, Mapping[str, Value]]:
-    """Return a driver's subscription options on a transport, keyed by topic.
+    """Return a driver's subscription options for a transport, keyed by topic.
 
     If several declarations have the same topic, the first options take precedence, and later
     options add missing keys.

@@ -1,8 +1,7 @@
 """The form ``xml``: fields at element paths in a document.
 
-The form uses the parser of the standard library. Documents with a document type declaration are
-rejected before parsing. XML entities therefore cannot expand, and external resources are never
-loaded.
+The form uses the standard library's parser. Documents with a document type declaration are rejected
+before parsing. XML entities therefore cannot expand, and external resources are never loaded.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,7 +21,7 @@ _MAX_DEPTH = 100
 
 
 class XmlReader:
-    """A reader for the text and attributes of XML elements, which also writes XML documents."""
+    """A reader for the text and attributes of XML elements; it also writes XML documents."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._paths = dict(cast("Mapping[str, XmlPath]", spec.options["paths"]))

@@ -1,1 +1,1 @@
-"""All framings. Framing families, each a module that is imported on first use."""
+"""All framings; each framing family is a module that is imported on first use."""

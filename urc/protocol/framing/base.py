@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 SKIPPED: Final = ""
-"""Violation code of a frame that a `switch` drops silently."""
+"""Violation code for a frame that a `switch` drops silently."""
 Open = Callable[[bytes], bytes]
 
 
@@ -44,7 +44,7 @@ class FrameFault(NamedTuple):
     """A framing violation: received bytes that are not a valid frame."""
 
     code: str
-    """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
+    """Violation code: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
     message: str
     closes: bool = False
     """Whether the violation requires closing the connection."""
@@ -71,7 +71,7 @@ class Decoder(Protocol):
         """Append received bytes for `next` to decode."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames and violations completed by silence until `now`."""
@@ -81,7 +81,7 @@ class Framing(Protocol):
     """A framing method with its options."""
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` on failure."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder for the bytes in `stream` and all later bytes."""
@@ -116,7 +116,7 @@ class StreamDecoder:
         self._stream.push(data)
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
         raise NotImplementedError
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
@@ -162,7 +162,7 @@ class StreamDecoder:
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:
-        """Return a violation; None if the current invalid bytes are already reported."""
+        """Return a violation; None if the current invalid bytes have already been reported."""
         if self._is_lost:
             return None
         self._is_lost = True
@@ -170,13 +170,13 @@ class StreamDecoder:
 
 
 def frame_codec_of(spec: FramingSpec) -> FrameCodec | None:
-    """Return the frame codec of `spec`; None if the frame is the payload."""
+    """Return the frame codec for `spec`; None if a frame consists only of its payload."""
     layout = cast("FrameLayout | None", spec.options.get("layout"))
     return None if layout is None or layout == FrameLayout() else FrameCodec(layout)
 
 
 def encode_frame(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
-    """Return the frame of `payload`; raise `FramingError` if no frame can contain the payload."""
+    """Return `payload` as a frame; raise `FramingError` if no frame can contain the payload."""
     try:
         frame = payload if codec is None else codec.close(payload)
     except BadFrame as error:

@@ -11,12 +11,12 @@ __all__ = ["ChecksumTrailer"]
 
 
 class ChecksumTrailer:
-    """A checksum after a text, or after each line of a text."""
+    """A checksum after text, or after each line of the text."""
 
     def __init__(self, spec: TrailerSpec, start: bytes) -> None:
         self._spec = spec
         self._before = b"" if spec.each else start
-        """Bytes of the frame before the text, which all positions include."""
+        """Bytes of the frame before the text; all positions count these bytes."""
         self._checksum = Checksum(spec.checksum)
         self._size = self._checksum.size
 

@@ -1,4 +1,4 @@
-"""Checksums over part of a frame, verified on receipt and written when sending.
+"""Checksums over part of a frame, verified on receipt and written on transmission.
 
 Pure. `urc._checksum_math` computes the checksums. Every operation on a checksum takes time linear
 in the size of the frame.
@@ -25,7 +25,7 @@ class BadFrame(UrcError):
 
 
 class Checksum:
-    """A checksum at a fixed position of a frame."""
+    """A checksum at a fixed position in a frame."""
 
     def __init__(self, spec: ChecksumSpec) -> None:
         self.spec = spec
@@ -34,7 +34,7 @@ class Checksum:
         self._salt = _salter(spec.salt)
 
     def check(self, frame: bytes) -> None:
-        """Verify the checksum of a received frame; raise `BadFrame` for a wrong checksum."""
+        """Verify the checksum of a received frame; raise `BadFrame` if the checksum is wrong."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))
         if right is not None:

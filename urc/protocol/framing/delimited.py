@@ -28,12 +28,12 @@ class DelimiterFraming(NamedTuple):
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
-        """Return the framing for options ``tx`` and ``rx``, both bytes."""
+        """Return the framing for the options ``tx`` and ``rx``, both of type bytes."""
         tx, rx = cast("bytes", spec.options["tx"]), cast("bytes", spec.options["rx"])
         return cls(tx, rx, spec.max_bytes, frame_codec_of(spec))
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = payload if self.codec is None else encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
@@ -73,20 +73,20 @@ class DelimiterDecoder(StreamDecoder):
         self._open = opened
         self._skips_empty = skips_empty
         self._searched = 0
-        """Number of scanned bytes without a delimiter."""
+        """Number of scanned bytes that contain no delimiter."""
         self._is_skipping = False
         self._credit: RescanBudget | None = None
         """Rescan budget for a case of a `switch`; None outside a `switch`. In a `switch`, only
         the first byte of a frame over the size limit is dropped."""
 
     def restart(self) -> None:
-        """Reset the state for a new frame, selected by a `switch`."""
+        """Reset the state for a new frame that a `switch` assigns to the decoder."""
         super().restart()
         self._searched = 0
         self._credit = self._credit or RescanBudget()
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
         stream, delimiter = self._stream, self._delimiter
         while stream.at < len(stream.data):
             start = stream.at
@@ -111,7 +111,7 @@ class DelimiterDecoder(StreamDecoder):
         return None
 
     def ahead(self) -> list[bytes]:
-        """Return all complete frames if several are buffered, without removing any frame.
+        """Return all complete frames if several are buffered, without removing them.
 
         The returned list is empty if any frame requires a check. `skip` removes processed frames
         from the stream.

@@ -17,11 +17,10 @@ class DigitLength:
         self._spec = spec
         self._base = 10 if spec.spelling == "dec" else 16
         self.end = spec.offset + (spec.size + 1 if spec.is_counted else 1 + len(spec.until))
-        """Minimum number of frame bytes that must be received before the length field can be
-        read."""
+        """Minimum number of frame bytes needed to read the length field."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
-        """Return the size in bytes of the frame at `at`: negative if invalid, None if unknown."""
+        """Return the size of the frame at `at`, in bytes; negative if invalid, None if unknown."""
         digits = self._digits(data, at)
         if digits is None:
             return None
@@ -55,7 +54,7 @@ class DigitLength:
         return text + spec.until if spec.until else count.rjust(spec.size, b"0") + text
 
     def _digits(self, data: bytes | bytearray, at: int) -> slice | None:
-        """Return the range of the digits, which may be empty; None if incomplete."""
+        """Return the range of the digits, which may be empty; None if the digits are incomplete."""
         spec = self._spec
         first = at + spec.offset
         if spec.until:
@@ -73,7 +72,7 @@ class DigitLength:
 
 
 def _number(digits: bytes, base: int) -> int:
-    """Return the number in the digits; -1 for an invalid number."""
+    """Return the number that the digits spell; -1 for an invalid number."""
     if not digits.isalnum() or len(digits) > 16:
         return -1
     try:

@@ -49,7 +49,7 @@ class EscapedFraming(NamedTuple):
         return cls(FrameCodec(layout), Stuffing(escape), tx, rx, spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         start, end = self.codec.layout.start, self.codec.layout.end
         inner = frame[len(start) : len(frame) - len(end)]
@@ -91,7 +91,7 @@ class EscapedFraming(NamedTuple):
         return self.codec.open(frame)
 
     def opened_between(self, start: bytes, end: bytes, frame: bytes) -> bytes:
-        """Return the payload from a frame including its markers; raise `BadFrame` if invalid."""
+        """Return the payload from a frame with its markers; raise `BadFrame` if invalid."""
         return self.opened(frame[len(start) : len(frame) - len(end)])
 
 
@@ -104,7 +104,7 @@ class _DoubledDecoder(StreamDecoder):
         self._start, self._end = framing.codec.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
-        """Number of scanned frame bytes without an end; -1 before the start of a frame."""
+        """Number of scanned frame bytes that contain no end; -1 before a frame starts."""
 
     def restart(self) -> None:
         super().restart()
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return a frame, a violation or None; if `_searched` becomes -1, search again."""
+        """Return a frame, a violation or None; after None, search again if `_searched` is -1."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -203,7 +203,7 @@ class _LengthDecoder(StreamDecoder):
         self._total = 0
         """Size of the frame in bytes; 0 before the length field is decoded."""
         self._taken = len(self._start)
-        """Number of processed wire bytes since the start of the frame."""
+        """Number of wire bytes processed since the start of the frame."""
 
     def restart(self) -> None:
         super().restart()
@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes; the result has the same form as that of `_read`."""
+        """Check the end bytes; return a result in the same form as `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:
@@ -257,7 +257,7 @@ class _LengthDecoder(StreamDecoder):
         return None if self._end.startswith(there) else ("no-frame", "wrong end bytes; skipped")
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start bytes, or to incomplete start bytes at the end."""
+        """Advance to the next start bytes, or to partial start bytes at the end of the buffer."""
         gone = self._before(self._start)
         self._credit.earn(gone)
         return self._skip(gone) if gone else None

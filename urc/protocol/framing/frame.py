@@ -77,7 +77,7 @@ def _found(spec: ChecksumSpec) -> str:
 
 
 class FrameCodec:
-    """A codec between payloads and frames with constants, length field and checksum."""
+    """A converter between payloads and frames with constants, a length field and a checksum."""
 
     def __init__(self, layout: FrameLayout) -> None:
         self.layout = layout
@@ -95,8 +95,7 @@ class FrameCodec:
             and not self._is_text
         )
         self.open = generate_open(layout, self._open) if is_plain else self._open
-        """Function that returns the payload of a frame, or raises `BadFrame` for an invalid
-        frame."""
+        """Function that returns a frame's payload, or raises `BadFrame` for an invalid frame."""
 
     def _open(self, frame: bytes) -> bytes:
         """Return the payload of a frame; raise `BadFrame` for an invalid frame."""
@@ -113,7 +112,7 @@ class FrameCodec:
         return payload if self._stuffing is None else self._stuffing.unstuff(payload)
 
     def close(self, payload: bytes) -> bytes:
-        """Return the frame of `payload`; raise `BadFrame` if the payload does not fit.
+        """Return `payload` as a frame; raise `BadFrame` if the payload does not fit.
 
         All bytes outside the payload and the frame's declared parts are zero.
         """

@@ -1,4 +1,4 @@
-"""The framings ``idle`` (silence ends a frame) and ``datagram`` (each receive is one frame)."""
+"""The framings ``idle`` (silence ends a frame) and ``datagram`` (each receive yields a frame)."""
 
 from typing import NamedTuple, cast
 
@@ -29,7 +29,7 @@ class IdleFraming(NamedTuple):
         return cls(cast("float", spec.options["gap_s"]), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
@@ -42,7 +42,7 @@ class IdleFraming(NamedTuple):
 
 
 class DatagramFraming(NamedTuple):
-    """Frames that arrive whole: each receive is one frame."""
+    """Frames that arrive whole: each receive yields one frame."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -53,7 +53,7 @@ class DatagramFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
@@ -66,7 +66,7 @@ class DatagramFraming(NamedTuple):
 
 
 class _WholeDecoder(StreamDecoder):
-    """A decoder that returns the bytes of each receive as one frame."""
+    """A decoder that returns the bytes from each receive as one frame."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, codec: FrameCodec | None, max_bytes: int
@@ -92,14 +92,14 @@ class _WholeDecoder(StreamDecoder):
 class _IdleDecoder(_WholeDecoder):
     """A decoder for frames that end with silence.
 
-    The argument `now` of `push` is the time of receipt. Without `now`, only `tick` ends frames.
+    The argument `now` to `push` is the time of receipt. Without `now`, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:
         super().__init__(stream, framing.codec, framing.max_bytes)
         self._gap_s = framing.gap_s
         self._newest: float | None = None
-        """Time of the newest received byte; None for an empty buffer."""
+        """Time of the newest received byte; None if the buffer is empty."""
         self._done: list[bytes | FrameFault] = []
         self._is_too_long = False
 

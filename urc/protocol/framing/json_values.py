@@ -33,7 +33,7 @@ _QUOTE, _BACKSLASH = ord('"'), ord("\\")
 
 
 class JsonFraming(NamedTuple):
-    """Frames of one JSON object or array each; `tx` follows each sent frame."""
+    """Frames that each contain one JSON object or array; `tx` follows each sent frame."""
 
     tx: bytes
     codec: FrameCodec | None
@@ -46,7 +46,7 @@ class JsonFraming(NamedTuple):
         return cls(cast("bytes", spec.options.get("tx", b"")), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if _JsonDecoder(None, b"", None, self.max_bytes).feed(frame) != [frame.strip(_BETWEEN)]:
             raise FramingError(f"{payload[:80]!r} is not a single JSON object or array")
@@ -77,7 +77,7 @@ class _JsonDecoder(StreamDecoder):
         """Closing brackets that are still missing, in the order of the opening brackets."""
         self._is_in_string = False
         self._looked = 0
-        """Number of scanned bytes of the current value."""
+        """Number of bytes of the current value that have been scanned."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream = self._stream

@@ -27,7 +27,7 @@ __all__ = ["LengthFraming"]
 
 
 class LengthFraming(NamedTuple):
-    """Frames of fixed size or with a length field, the same in both directions."""
+    """Frames of fixed size or with a length field; both directions use the same layout."""
 
     codec: FrameCodec
     max_bytes: int
@@ -38,7 +38,7 @@ class LengthFraming(NamedTuple):
         return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
@@ -105,7 +105,7 @@ class _MeasuredDecoder(StreamDecoder):
                 return fault
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start bytes, or to incomplete start bytes at the end."""
+        """Advance to the next start bytes, or to partial start bytes at the end of the buffer."""
         stream, start = self._stream, self._start
         if not start or stream.data.startswith(start, stream.at):
             return None

@@ -1,6 +1,6 @@
 """The receive buffer of one connection, and the budget for rescanning bytes.
 
-Pure; for `urc.protocol.framing.table`.
+Pure; used by `urc.protocol.framing.table`.
 """
 
 from typing import Final
@@ -9,7 +9,7 @@ __all__ = ["RescanBudget", "ReceiveBuffer"]
 
 
 class ReceiveBuffer:
-    """The unconsumed received bytes of one connection."""
+    """The bytes received on one connection and not yet consumed."""
 
     __slots__ = ("at", "data")
 
@@ -30,9 +30,9 @@ class ReceiveBuffer:
 
 
 class RescanBudget:
-    """The number of bytes that may be rescanned, which grows with each consumed byte.
+    """The number of bytes that may be rescanned; it grows with each consumed byte.
 
-    The total number of scanned bytes is at most (`RATE` + 1) · size of the stream + `MOST`.
+    The total number of scanned bytes is at most (`RATE` + 1) · stream size + `MOST`.
     """
 
     RATE: Final = 8

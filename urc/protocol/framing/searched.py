@@ -23,15 +23,15 @@ from urc.protocol.framing.receive_buffer import ReceiveBuffer
 __all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
 
 Search = Callable[[bytes | bytearray, int], Any]
-"""Search function: returns the next match of `re` or RE2 after a start offset, or None."""
+"""Search function that returns the next `re` or RE2 match after a start offset, or None."""
 
 _SMALL: Final = 256
 """Maximum size of a buffer that is searched after every receive, in bytes."""
 _GROWTH: Final = 8
 """A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005
-"""How long the robot must be silent before a larger buffer is searched regardless of its growth, in
-seconds."""
+"""How long, in seconds, the robot must be silent before a larger buffer is searched regardless of
+its growth."""
 
 
 class RegexFraming(NamedTuple):
@@ -54,7 +54,7 @@ class RegexFraming(NamedTuple):
         return cls(search, tx, frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
@@ -83,12 +83,12 @@ def _searcher(pattern: str) -> Search:
     try:
         import re2
     except ImportError:
-        # The loader accepts only patterns with linear time at each start position.
+        # The loader accepts only patterns that take linear time at each start position.
         compiled: Search = re.compile(source).search
         return compiled
     options = re2.Options()
     options.log_errors = False
-    options.max_mem = 1 << 20  # the limit of all patterns
+    options.max_mem = 1 << 20  # the limit for all patterns
     options.encoding = re2.Options.Encoding.LATIN1
     searched: Search = re2.compile(source, options).search
     return searched
@@ -102,7 +102,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._codec = codec
         self._tried = 0
-        """Number of bytes that have been searched without a match."""
+        """Number of searched bytes that contain no match."""
         self._newest = 0.0
 
     @property
@@ -183,7 +183,7 @@ class BracketsFraming(NamedTuple):
         return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         layout = self.codec.layout
         inner = frame[len(layout.start) : len(frame) - len(layout.end)]
@@ -217,12 +217,12 @@ class BracketsDecoder(StreamDecoder):
         """Number of scanned bytes without a closing marker; 0 before the opening marker."""
 
     def restart(self) -> None:
-        """Reset the state for a new frame, selected by a `switch`."""
+        """Reset the state for a new frame that a `switch` assigns to the decoder."""
         super().restart()
         self._searched = 0
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
         stream, data = self._stream, self._stream.data
         while True:
             if not self._searched:

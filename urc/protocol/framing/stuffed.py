@@ -34,7 +34,7 @@ class SlipFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if not frame:
             raise FramingError("SLIP cannot send an empty frame")
@@ -63,7 +63,7 @@ class CobsFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return _to_cobs(encode_frame(self.codec, payload, self.max_bytes)) + b"\0"
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:

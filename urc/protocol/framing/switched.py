@@ -24,12 +24,12 @@ __all__ = ["SwitchFraming"]
 
 
 class SwitchFraming(NamedTuple):
-    """Cases in the order of selection, as pairs of first bytes and framing."""
+    """Cases in the order of selection; each case is a pair of first bytes and framing."""
 
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
     otherwise: Framing | None = None
-    """Framing of frames that match no case; None makes these frames invalid."""
+    """Framing for frames that match no case; None makes these frames invalid."""
     is_robot: bool = False
     """Whether the framing is for the robot's end of the connection, in an emulated robot."""
 
@@ -81,7 +81,7 @@ class SwitchFraming(NamedTuple):
 
 
 def _is_text(payload: bytes) -> bool:
-    """Return whether an emulated robot's payload is probably a text line and not a binary frame."""
+    """Return whether an emulated robot's payload is probably a text line, not a binary frame."""
     return payload.isascii() and payload.decode("ascii").isprintable()
 
 
@@ -136,7 +136,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """End the case after the result `found`; return None for an already reported violation."""
+        """End the case after the result `found`; return None for a violation already reported."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False

@@ -23,7 +23,7 @@ class AsymmetricFraming(NamedTuple):
     received: Framing
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return self.sent.encode(payload)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:

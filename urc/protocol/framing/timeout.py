@@ -3,8 +3,8 @@
 Theory of operation. An incomplete frame blocks all later frames. For example, a corrupted length
 field may require bytes that never arrive. With a timeout, silence after the newest byte ends the
 wait. After the timeout, bytes are dropped one by one, until the remaining bytes contain valid
-frames. Terminal escape sequences are removed before framing, because they could split a marker or a
-text.
+frames. Terminal escape sequences are removed before framing, because they could split a marker or
+other text.
 """
 
 import re
@@ -37,7 +37,7 @@ class TimeoutFraming(NamedTuple):
     strips_ansi: bool
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         return self.framing.encode(payload)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
@@ -59,7 +59,7 @@ class _PatientDecoder:
         self._newest: float | None = None
         """Time of the newest byte; None before the first byte."""
         self._told: list[bytes | FrameFault] = []
-        """Frames and violations found after the timeout, which `next` returns."""
+        """Frames and violations found after the timeout, to be returned by `next`."""
         self._held = b""
         """Received bytes of an incomplete escape sequence."""
 
@@ -96,7 +96,7 @@ class _PatientDecoder:
         self._newest = now
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
         if self._newest is None and len(self._stream):
             self._newest = now  # bytes left by another decoder
         if self._told:
@@ -127,7 +127,7 @@ class _PatientDecoder:
             if found is None:
                 left -= 1
                 if not left or isinstance(self._framing.framing, DelimiterFraming):
-                    before = len(stream.data)  # no further beginning of a frame exists
+                    before = len(stream.data)  # no later byte can begin a frame
                 # No further bytes will arrive, so the buffered bytes are not a frame.
                 stream.at = min(max(before + 1, stream.at), len(stream.data))
                 if not is_lost:

@@ -26,7 +26,7 @@ _WAIT, _BAD = 0, -1
 
 
 class XmlFraming(NamedTuple):
-    """Frames of one XML element each; `tx` follows each sent frame."""
+    """Frames that each contain one XML element; `tx` follows each sent frame."""
 
     tx: bytes
     max_bytes: int
@@ -38,7 +38,7 @@ class XmlFraming(NamedTuple):
         return cls(cast("bytes", spec.options.get("tx", b"")), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         if len(payload) > self.max_bytes:
             raise FramingError(f"a frame of {len(payload)} bytes is longer than {self.max_bytes}")
         found = _XmlDecoder(None, b"", self.max_bytes).feed(payload)
@@ -63,7 +63,7 @@ class _XmlDecoder(StreamDecoder):
         self._begin()
 
     def restart(self) -> None:
-        """Reset the state for a new frame, selected by a `switch`."""
+        """Reset the state for a new frame that a `switch` assigns to the decoder."""
         super().restart()
         self._begin()
 
@@ -71,7 +71,7 @@ class _XmlDecoder(StreamDecoder):
         self._open: list[bytes] = []
         """Names of the open elements, outermost first."""
         self._looked = 0
-        """Number of scanned bytes of the current element."""
+        """Number of bytes of the current element that have been scanned."""
         self._tag = -1
         """Offset of an incomplete tag; -1 outside tags."""
         self._quote = b""
@@ -79,7 +79,7 @@ class _XmlDecoder(StreamDecoder):
         """Terminator of the current comment, declaration or plain text."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove and return the next frame or violation; return None if incomplete."""
+        """Remove and return the next frame or violation; return None if it is incomplete."""
         stream = self._stream
         while True:
             if not self._looked:

@@ -101,7 +101,7 @@ class AlarmMonitor:
             self._due.pop(level, None)
 
     def tick(self, now: float) -> Alarm:
-        """Return the alarm of the newest value at `now`."""
+        """Return the alarm for the newest value at `now`."""
         if self._ends:
             for level in [level for level, end in self._ends.items() if end <= now]:
                 del self._ends[level], self._due[level]

@@ -122,7 +122,7 @@ def _of_pattern(
         checks[0] = "text.isprintable()"
     checks += [f"parts[{place}] == {word!r}" for place, word in literals.items()]
     if "integer" in kinds:
-        checks.append("len(payload) <= 400")  # the limit of digits in a pattern
+        checks.append("len(payload) <= 400")  # the maximum number of digits in a pattern
     if kinds - {"word"}:
         checks.append("95 not in payload")  # an underscore, which only Python accepts in numbers
     lines += [f"    if not ({' and '.join(checks)}):", "        return slow(frame, now)"]
@@ -144,7 +144,7 @@ def _of_pattern(
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the words of a pattern; None if any field is only a part of a word."""
+    """Return the words of a pattern; None if any field is only part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before

@@ -29,7 +29,7 @@ def build_fast_json(
         value = value_of(readings.signals[name], "json", True)
         if value is None:
             return None
-        # The decoder accepts finite numbers only, but a product may be infinite.
+        # The decoder accepts only finite numbers, but a product may be infinite.
         values[name] = value._replace(is_finite=value.is_finite or value.convert in ("", "{r}"))
     raws = {name: f"r{place}" for place, name in enumerate(names)}
     lines = ["    try:", "        v = decode(payload)", "    except Otherwise:"]

@@ -1,4 +1,4 @@
-"""Code shared by the generated decoders, which converts a raw field to a sample.
+"""Conversion of a raw field to a sample, shared by the generated decoders.
 
 Each engine builds the source text for field conversions, checks and samples once. If a value has
 the wrong type or is out of range, the closures (`slow`) read the frame again.
@@ -41,9 +41,9 @@ class Value(NamedTuple):
     convert: str
     """Expression using the raw text; "" means no conversion."""
     checks: tuple[str, ...]
-    """Conditions for a valid value, using the value ``{v}``."""
+    """Conditions for a valid value; ``{v}`` stands for the value."""
     raw_checks: tuple[str, ...] = ()
-    """Conditions for a valid value, using the raw text ``{r}``."""
+    """Conditions for a valid value; ``{r}`` stands for the raw text."""
     is_finite: bool = True
     """Whether the value is always finite, or `checks` reject infinity and not-a-number."""
 
@@ -54,7 +54,7 @@ def of_json_type(type_name: str, raw: str) -> str:
 
 
 def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
-    """Return the conversion of raw text to a value of `signal`; None if not supported."""
+    """Return the conversion of raw text to a value of `signal`; None if it is not supported."""
     conversion = signal.conversion
     if signal.deadband or signal.debounce_s:
         return None

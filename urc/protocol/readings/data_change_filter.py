@@ -28,7 +28,7 @@ class DataChangeFilter:
         return None if self._pending is None else self._since + self._settle_s
 
     def filter(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report: the new sample, an update of the last sample, or None."""
+        """Return the sample to report: the new sample, an update to the last sample, or None."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
             self._pending = None

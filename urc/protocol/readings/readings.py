@@ -37,7 +37,7 @@ class Readings:
     """The conversion of fields to samples, with formula inputs and alarm states.
 
     Args:
-        signals: loaded signals by name; no computed signal depends on itself.
+        signals: loaded signals, keyed by name; no computed signal may depend on itself.
         names: additional names for formulas, such as ``settings``.
     """
 
@@ -97,7 +97,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values from outside a frame in the same way as fields."""
+        """Convert values that do not come from a frame in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -146,7 +146,7 @@ class Readings:
         return samples
 
     def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
-        """Compute all signals that depend on `samples`, and append the new samples."""
+        """Compute all signals that depend on `samples`, and append the new samples to `samples`."""
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:
@@ -168,7 +168,7 @@ class Readings:
                 changed.add(computed.name)
 
     def _report(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report; None while dead band or debounce suppresses the sample."""
+        """Return the sample to report; None while the dead band or the debounce suppresses it."""
         change_filter = self._change_filter.get(sample.signal)
         return sample if change_filter is None else change_filter.filter(sample, now)
 
@@ -186,7 +186,7 @@ class Readings:
                 if name in computed.spare:
                     continue
                 return None
-            # A computed sample becomes stale together with the first of its inputs.
+            # A computed sample becomes stale as soon as the first of its inputs does.
             left_s = self.signals[name].stale_after_s - computed.shortest_s
             time_s = min(time_s, sample.time_s + left_s)
             is_absent |= sample.value is None

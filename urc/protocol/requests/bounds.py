@@ -29,10 +29,10 @@ GOOD_BYE_S: Final = 2.0
 
 
 def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
-    """Return the maximum time that a request waits in the queue, in seconds.
+    """Return the maximum time for which a request waits in the queue, in seconds.
 
     Args:
-        spec: transport of the request.
+        spec: transport for the request.
         reply_s: timeout of the first reply in seconds; None means the transport's default timeout.
     """
     answer_s = spec.timeouts.reply_s if reply_s is None else reply_s
@@ -49,10 +49,10 @@ def longest_s(driver: Driver, name: str) -> float:
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the minimum time between a frame or command and a new deadline in seconds, or 0.
+    """Return the minimum time from a frame or command to a new deadline, in seconds, or 0.
 
-    Deadlines result from replies, polls and stale connections. Deadlines of sequences and framing
-    timeouts are not considered. The result is 0 if the minimum is unknown.
+    The deadlines of replies, polls and stale connections count, but those of sequences and framing
+    timeouts do not. The result is 0 if the minimum is unknown.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
         return 0.0

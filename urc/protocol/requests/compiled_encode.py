@@ -1,7 +1,7 @@
 """Generated encoders: one function per command, which encodes arguments to bytes.
 
 A generated encoder handles only the common case, in which every argument is a number of the
-declared type. The closures of `urc.protocol.requests.encode` handle all other cases. Tests compare
+declared type. The closures in `urc.protocol.requests.encode` handle all other cases. Tests compare
 the generated encoders with the closures. Templates of generated encoders may contain only sums and
 products of numbers, and the filter ``fixed``.
 """
@@ -147,7 +147,7 @@ def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
 
 
 def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str]) -> list[ast.expr]:
-    """Return the parts of a format string: literal texts and numbers."""
+    """Return the parts of a format string: literal text and numbers."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return [node]
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):

@@ -25,12 +25,12 @@ class SignalState:
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Record a stop with its reason; "" records the reset of the stop."""
+        """Record a stop with its reason; "" records its reset."""
         self.latched = reason
         self.stops += reason != ""
 
     def update(self, samples: Iterable[Sample]) -> None:
-        """Keep new readings."""
+        """Store new readings."""
         for sample in samples:
             self._last[sample.signal] = sample
 
@@ -53,7 +53,7 @@ class SignalState:
 
         Args:
             now: current time, in seconds.
-            names: values with precedence over signals, such as arguments, by name.
+            names: values that take precedence over signals, such as arguments, keyed by name.
             since: earliest arrival time of valid samples, in seconds.
         """
         return ConditionScope(self, now, names, since)

@@ -64,7 +64,8 @@ class Connection:
         self._misses = 0
         """Number of consecutive missing replies."""
         self._silent_at: float | None = None
-        """Time at which the connection becomes stale; None if not watched or already stale."""
+        """Time at which the connection becomes stale; None if it is not watched or is already
+        stale."""
 
     @property
     def is_open(self) -> bool:
@@ -179,7 +180,7 @@ class Connection:
         return rendered_size(exchange, self.counters, self.learnt)
 
     def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
-        """Return the payload of a request, registering secrets for redaction."""
+        """Return the payload of a request; register its secrets for redaction."""
         data = exchange.data
         assert data is not None  # noqa: S101 - it was made just before
         if exchange.is_secret:

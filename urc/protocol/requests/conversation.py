@@ -3,16 +3,16 @@
 Theory of operation. A connection is closed, opening or open. An open connection is *ready* from the
 end of ``on_connect`` until the start of ``on_close``. A connection that is not ready sends only the
 privileged exchanges of ``on_connect`` and ``on_close``. The session opens persistent connections. A
-per-request conversation requests a connection (`Open`) for each request, and closes the connection
-afterwards (`Close`). The module is pure: callers pass the time.
+per-request conversation requests a connection (`Open`) for each request, and closes it afterwards
+(`Close`). The module is pure: callers pass the time.
 
-Requests in flight are kept in sending order. A received frame is offered to all requests in flight,
-oldest first. A request with a correlation accepts only its own reply. Among requests without a
-correlation, only the oldest accepts the frame, because replies arrive in order. Real-time requests
-have a separate reply order. After its timeout, a request is *late*, and stays in flight for another
-reply timeout. A late reply is dropped so that the next request does not accept it. Until the late
-reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
-consecutive missing replies, the connection is closed and reopened.
+Requests in flight are kept in sending order. A received frame is offered to each request in flight,
+from the oldest to the newest. A request with a correlation accepts only its own reply. Among
+requests without a correlation, only the oldest accepts the frame, because replies arrive in order.
+Real-time requests have a separate reply order. After its timeout, a request is *late*, and stays in
+flight for another reply timeout. A late reply is dropped so that the next request does not accept
+it. Until the late reply arrives or times out, requests with similar replies wait. After
+`MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,17 +62,17 @@ class Conversation(Connection):
         super().__init__(spec, messages)
         self._gap_s = spec.min_gap_s
         self.is_scripted = False
-        """Whether a sequence is running that may wait for the next frame."""
+        """Whether a running sequence may be waiting for the next frame."""
         self._free_at = float("-inf")
         """Earliest time of the next request after a reply to a motion frame."""
         self._may_recut = False
-        """Whether the framing may differ for a pending reply or step."""
+        """Whether a pending reply or step may have a different framing."""
         self._number = 0
         """Number of the last envelope that expects a reply; numbers are never reused."""
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next deadline for `tick`; None if there is no deadline."""
+        """Time at which `tick` is next due; None if there is no deadline."""
         pending_replies = self._pending_replies
         due = (
             None
@@ -189,7 +189,7 @@ class Conversation(Connection):
             number = self._number = self._number + 1
         count = None
         uses = ask.has_counters and exchange.data is None and self.counters.is_shared
-        sent: list[LineEvent] = [NumbersUsed(self.spec.name)] if uses else []  # also if not encoded
+        sent: list[LineEvent] = [NumbersUsed(self.spec.name)] if uses else []  # even if not encoded
         if exchange.data is None:
             try:
                 count = written(exchange, self.counters, self.learnt).takes
@@ -229,7 +229,7 @@ class Conversation(Connection):
         try:
             made = written(exchange, self.counters, self.learnt)
         except BadArgument:
-            return None  # its reply times out, which is reported
+            return None  # its reply times out, and the timeout is reported
         return made._replace(data=self._as_sent(exchange, number))
 
     # -- receiving
@@ -282,7 +282,7 @@ class Conversation(Connection):
                 return events
             if receiver.has_more:
                 events += self._ahead(now)
-        # Queued requests may depend on the new samples, so process these first.
+        # Queued requests may depend on the new samples, so process the samples first.
         self.is_behind = bool(events) and bool(self._request_queue)
         if receiver.is_prompted:
             events += receiver.find_prompt()
@@ -291,8 +291,8 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Short frames take almost twice as long one by one as in batches (decision 27). A batch
-        ends after the expected reply or a refused value, or before another kind of frame.
+        Processing short frames one by one takes almost twice as long as in batches (decision 27). A
+        batch ends after the expected reply or a refused value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -330,7 +330,7 @@ class Conversation(Connection):
         return events
 
     def _recut(self) -> None:
-        """Select the framing of a pending reply or step, or else that of the connection."""
+        """Select the framing of a pending reply or step, or else the connection's framing."""
         framing = (
             self._pending_replies.framing() if self._pending_replies else None
         ) or self.receiver.framing
@@ -370,7 +370,7 @@ class Conversation(Connection):
         if plain is not None:
             return self._plain(plain, frame, now)
         if self._pending_replies:
-            # Any frame may be a line of a reply, so messages have precedence.
+            # Any frame may be a line of a reply, so messages take precedence.
             message = (
                 self.receiver.message(frame, now)
                 if self._pending_replies.collects_lines()
@@ -439,14 +439,14 @@ class Conversation(Connection):
     def _motion_response(
         self, frame: Frame, attributes: Mapping[str, object], now: float
     ) -> list[LineEvent]:
-        """Return the events of a response envelope that answers a motion frame."""
+        """Return the events for a response envelope that answers a motion frame."""
         if attributes.get("ok", True):
             return self._of_motion(frame, now) or []
         reason = str(attributes.get("reason") or "the robot refused")
         return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
 
     def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of a reply to a motion frame; None for other frames."""
+        """Return the events for a reply to a motion frame; None for other frames."""
         owed_until_s = self.held.owed_until_s
         told = self._told_of_motion(frame, now)
         if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
@@ -458,7 +458,7 @@ class Conversation(Connection):
         if refused:
             return self._motion_refused(refused, frame, now)
         if self.receiver.is_listening:
-            return None  # a sequence waits for a frame, and may match this one
+            return None  # a sequence is waiting for a frame, and may match this one
         message = self.receiver.message(frame, now)
         accepted = self.held.accepted(frame, now) if message is None else None
         if accepted is None:
@@ -485,7 +485,7 @@ class Conversation(Connection):
     def _answer(
         self, pending: PendingReply, offer: MatchResult, frame: Frame | None, now: float
     ) -> list[LineEvent]:
-        """Return the events of a frame whose match result for a request is `offer`.
+        """Return the events for a frame whose match result for a request is `offer`.
 
         A provisional reply may also be a message. Without `frame`, the frame has already been
         reported as a message.
@@ -538,7 +538,7 @@ class Conversation(Connection):
     def _late_answer(
         self, pending: PendingReply, offer: MatchResult, now: float
     ) -> list[LineEvent] | None:
-        """Return the events of a late reply; None if the reply also answers a retransmission."""
+        """Return the events for a late reply; None if the reply also answers a retransmission."""
         exchange = pending.exchange
         again = self._pending_replies.again(exchange)
         if again is not None:

@@ -36,7 +36,7 @@ def build_encode(
 ) -> Encode:
     """Return a function that encodes and frames `send`; constant frames are encoded once.
 
-    A group's frames are joined, so that they are sent together.
+    The frames in a group are joined, so they are sent together.
     """
     if send.form == "frames":
         return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])

@@ -1,8 +1,8 @@
 """Requests, and their execution from submission to outcome.
 
 Pure. A `CompiledRequest` is a declared request in compiled form. An `Exchange` is one execution of
-a request, from queue to outcome. `urc.protocol.requests.reply_match.CompiledReply` describes the
-expected reply.
+a request, from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply`
+describes the expected reply.
 """
 
 import re
@@ -53,12 +53,12 @@ def untold(error: Exception) -> str:
     """Return the error message for a secret frame that cannot be sent; omit the secret."""
     text = str(error)
     if _MISSING.fullmatch(text):
-        return text  # only the name of a missing value, and no secret
+        return text  # only the name of a missing value, not a secret
     return "the frame cannot be encoded; the reason contains a secret"
 
 
 class CompiledRequest(NamedTuple):
-    """A compiled request of a command, poll, keepalive or step."""
+    """A compiled request for a command, poll, keepalive or step."""
 
     label: str
     """Label of the request in messages: the name of the command, or ``polls.0``."""
@@ -67,15 +67,14 @@ class CompiledRequest(NamedTuple):
     """Expected replies, one for each stage; () means no reply."""
     match: Template | None = None
     framing: Framing | None = None
-    """Framing of the replies; None means the connection's framing."""
+    """Framing for the replies; None means the connection's framing."""
     rank: int = 2
     is_latest_only: bool = False
     bucket: GcraLimiter | None = None
     retries: int = 0
-    """Maximum number of retries of the request."""
+    """Maximum number of retries for the request."""
     is_repeated: bool = False
-    """Whether a missing reply causes a retry, in addition to a retransmission request by the
-    robot."""
+    """Whether a missing reply causes a retry, as a retransmission request from the robot does."""
     retry: Retry = Retry()
     """Delays before retries of the request."""
     has_counters: bool = False
@@ -91,7 +90,7 @@ class CompiledRequest(NamedTuple):
     queue_s: float = 0.0
     """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader of the reply if the request has a single reply that contains only samples; otherwise
+    """Reader for the reply if the request has a single reply that contains only samples; otherwise
     None."""
     is_miss_harmless: bool = False
     """Whether only the poll counts missing replies. If so, a missing reply does not indicate a lost
@@ -130,12 +129,12 @@ class RequestOwner(Protocol):
 class Exchange:
     """One execution of a request, from the queue to the outcome."""
 
-    # Rarely set attributes are class attributes, because every command makes an instance.
+    # Rarely set attributes are class attributes, because every command creates an instance.
     numbers: Mapping[str, int] = NOTHING
     """Numbers in the last rendered frame, keyed by counter."""
     is_privileged = False
-    """Whether the request is part of the login or the close and may be sent before the connection
-    is ready."""
+    """Whether the request is part of the login or the close sequence, and may be sent before the
+    connection is ready."""
     is_secret = False
     """Whether the payload is secret, and must not appear in any message."""
     condition: Callable[[float], str] | None = None
@@ -159,7 +158,7 @@ class Exchange:
         self.ask = ask
         self.owner = owner
         self.namespace = namespace
-        """Values for the templates, keyed by name, without counters."""
+        """Values for the templates, keyed by name, excluding counters."""
         self.data = data
         """Rendered payload; None means that the payload is rendered when it is sent
         (`CompiledRequest.render`)."""
@@ -187,7 +186,7 @@ class Exchange:
         return self
 
     def why_not(self, now: float) -> str:
-        """Return the reason not to send the request, or ""."""
+        """Return the reason for not sending the request, or ""."""
         unwanted = self.unless() if self.unless is not None else ""
         return unwanted or (self.condition(now) if self.condition is not None else "")
 
@@ -198,7 +197,7 @@ class Exchange:
 
     @property
     def latest_key(self) -> str:
-        """Label of requests that replace each other in the queue; "" if they do not."""
+        """Label of requests that replace each other in the queue; "" if none are replaced."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
@@ -232,7 +231,7 @@ class ReplySink:
         self._request = request
 
     def __call__(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Return the `Replied` or `Failed` event of the request."""
+        """Return the `Replied` or `Failed` event for the request."""
         number, command = self._request.id, self._request.command
         if outcome.code:
             return [Failed(number, command, outcome.code, outcome.message)]
@@ -244,7 +243,7 @@ class ReplySink:
         return self._request.on_sent
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Return the `Replied` or `Failed` event of the request."""
+        """Return the `Replied` or `Failed` event for the request."""
         return self(outcome, now)
 
 

@@ -1,4 +1,4 @@
-"""Received frames of one connection, except replies to requests.
+"""Frames received on one connection, except replies to requests.
 
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
@@ -64,7 +64,7 @@ class SentSecrets:
 new = tuple.__new__
 """Fast constructor of named tuples, used for every frame."""
 _SHOWN_BYTES = 20
-"""Number of bytes of an unknown frame to include in a message."""
+"""Number of bytes from an unknown frame to include in a message."""
 _NO_MATCH = "nothing declared matches "
 
 
@@ -122,7 +122,7 @@ class FrameReceiver:
         """Whether the decoder has timeouts."""
 
     def publish(self, frame: Frame, now: float) -> list[LineEvent]:
-        """Return the events of a frame that is not a reply."""
+        """Return the events for a frame that is not a reply."""
         heard = self._listeners(frame, now) if self._expectations else None
         told = self.message(frame, now)
         if heard is None and told is None:
@@ -136,7 +136,7 @@ class FrameReceiver:
 
         Args:
             since: start time of the wait, in seconds.
-            instead: reason why the frame is unexpected, such as "no answer to home".
+            instead: the reason why the frame is unexpected, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -151,7 +151,7 @@ class FrameReceiver:
 
     @property
     def framing(self) -> Framing | None:
-        """Framing of the expectations; None means the connection's framing."""
+        """Framing for the expectations; None means the connection's framing."""
         return next(
             (
                 expectation.answer.framing
@@ -180,7 +180,7 @@ class FrameReceiver:
         return self._prompt is not None
 
     def find_prompt(self) -> list[LineEvent]:
-        """Search for the expected prompt; return the events of a match."""
+        """Search for the expected prompt; return the events for a match."""
         if self._prompt is None:
             return []
         pattern, expectation = self._prompt
@@ -195,7 +195,7 @@ class FrameReceiver:
         return [Matched(expectation, MatchResult({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of a declared message; None for other frames."""
+        """Return the events for a declared message; None for other frames."""
         taken = self.messages.decode(frame, now)
         return None if taken is None else self.events_of(*taken)
 
@@ -207,7 +207,7 @@ class FrameReceiver:
         return None
 
     def _match(self, expectation: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
-        """Return the events of a frame that matches an expectation."""
+        """Return the events for a frame that matches an expectation."""
         events: list[LineEvent] = self.dropped(offer)
         if offer.fields is not None:
             events += self.samples(expectation.answer.matcher, offer.fields, now)[0]
@@ -219,7 +219,7 @@ class FrameReceiver:
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
-        """Return the events of a reply, for the step of `asker` that expects the reply.
+        """Return the events for a reply to the step of `asker` that expects it.
 
         Args:
             asker: the sequence that made the request; only this sequence receives the reply.
@@ -262,7 +262,7 @@ class FrameReceiver:
     def samples(
         self, matcher: Matcher, found: Fields, now: float
     ) -> tuple[list[LineEvent], list[Sample]]:
-        """Return the events for the fields of a frame, and the samples from the fields."""
+        """Return the events for the fields in a frame, and the samples from those fields."""
         samples, refused = matcher.decode(found, now)
         return self.events_of(samples, refused), samples
 

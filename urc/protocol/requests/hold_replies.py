@@ -8,8 +8,7 @@ In half-duplex mode, motion frames wait for a pending reply, and queued requests
 motion frames. The wait for a reply to a motion frame is short, because a lost reply must not
 prevent motion. A stop never waits for replies.
 
-A held command expects replies from when its first frame is sent until the reply timeout of its
-newest frame.
+A held command expects replies from its first frame until the reply timeout of its newest frame.
 """
 
 from collections.abc import Mapping
@@ -62,13 +61,13 @@ class _Listening:
 
 
 class HoldReplies:
-    """The held commands with replies on one connection."""
+    """The held commands on one connection that expect replies."""
 
     def __init__(self) -> None:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """Time until which a reply to a motion frame is pending, in seconds."""
+        """Time until which a reply to a motion frame is awaited, in seconds."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:
@@ -76,7 +75,7 @@ class HoldReplies:
         self._all[command] = _Listening(answer, match)
 
     def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record that a frame of a command was sent with the values `names`."""
+        """Record that a frame for a command was sent with the values `names`."""
         one = self._all.get(command)
         if one is not None:
             self.owed_until_s = now + min(one.expectation.answer.timeout_s, LONGEST_WAIT_S)
@@ -124,14 +123,14 @@ class HoldReplies:
         return found
 
     def refuse(self, frame: Frame, reason: str, now: float) -> list[HoldRejected]:
-        """Return the refusals in an error response, with the driver's texts if declared."""
+        """Return the refusals in an error response, with the driver's text if declared."""
         plain = [
             HoldRejected(name, MatchResult(refusal=reason)) for name, _ in self._listening(now)
         ]
         return self.refusals(frame, now) or plain
 
     def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
-        """Return the match result of a motion acknowledgement; None for other frames."""
+        """Return the match result for a motion acknowledgement; None for other frames."""
         for _, one in self._listening(now):
             offer = one.expectation.offer(frame, one.is_mine)
             if offer is not None:

@@ -27,7 +27,7 @@ class Acknowledgements(list[Payload | CountedFrame]):
 
 
 class Collector:
-    """A collector of one value from several frames."""
+    """A collector that builds one value from several frames."""
 
     def __init__(self, spec: Collect) -> None:
         self._spec = spec
@@ -41,7 +41,7 @@ class Collector:
         self._size = 0
 
     def add(self, names: Mapping[str, object]) -> object:
-        """Process the fields of a frame; return a complete value, or None."""
+        """Process the fields of a frame; return the value if it is complete, or None."""
         spec, whole = self._spec, None
         if spec.begin is not None and _holds(spec.begin, names):
             if spec.end is None and self._parts is not None:
@@ -71,7 +71,7 @@ def _holds(condition: Template | None, names: Mapping[str, object]) -> bool:
     try:
         return condition is not None and bool(condition.evaluate(names))
     except ExpressionError:
-        return False  # it reads a field of another frame
+        return False  # the condition reads a field of another frame
 
 
 def _joined(parts: list[object]) -> object:
@@ -108,7 +108,7 @@ def answering(
     replies: Acknowledgements,
     decode: Decode,
 ) -> Decode:
-    """Return a variant of `decode` that also renders the acknowledgement of the frame.
+    """Return a variant of `decode` that also renders the frame's acknowledgement.
 
     Args:
         encode: function that renders the acknowledgement.

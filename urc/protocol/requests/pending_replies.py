@@ -51,7 +51,7 @@ class PendingReply:
         another request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
-        """Number of the request that the reply repeats; None means that the reply has no number."""
+        """Request number that the reply repeats; None means that the reply has no number."""
 
     @property
     def expectation(self) -> Expectation:
@@ -61,7 +61,7 @@ class PendingReply:
         return self._expectation
 
     def answer(self, frame: Frame) -> MatchResult:
-        """Return the match result of a frame that has this request's number."""
+        """Return the match result for a frame that has this request's number."""
         offer = self.expectation.offer(frame)
         if offer is None:
             return MatchResult(refusal=f"the reply does not match the declaration: {shown(frame)}")
@@ -73,12 +73,12 @@ class PendingReply:
         return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
-        """Return the match result of a frame; None if the frame answers another request.
+        """Return the match result for a frame; None if the frame answers another request.
 
         With `is_message`, only provisional and error replies can match.
         """
         if self.number is not None:
-            return None  # its reply would carry the number, see `answer`
+            return None  # its reply would carry the number; see `answer`
         is_mine = None if self.exchange.ask.match is None else self._is_mine
         return (
             self.expectation.beside(frame, is_mine)
@@ -87,14 +87,14 @@ class PendingReply:
         )
 
     def extend(self, now: float) -> None:
-        """Extend the timeout by another reply timeout, within the driver's limit."""
+        """Extend the timeout by another reply timeout, up to the driver's limit."""
         answer = self.expectation.answer
         self.is_extended = True
         late_s = answer.timeout_s if self.is_late else 0.0
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return the elapsed reply timeout as text, for messages."""
+        """Return the elapsed reply timeout as text, for use in messages."""
         answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -161,7 +161,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the earliest timeout of all pending replies; None if no reply is pending."""
+        """Time of the earliest timeout among all pending replies; None if no reply is pending."""
         if len(self) == 1:
             return self[0].due
         return min((pending.due for pending in self), default=None)

@@ -21,7 +21,7 @@ class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
     After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
-    between calls would instead delay every slightly early call and so reduce the average rate.
+    between calls would instead delay every slightly early call, and so reduce the average rate.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -94,7 +94,7 @@ class Counters:
         return FrameCounters(self._last)
 
     def draw_urgent(self) -> FrameCounters:
-        """Return the numbers of a frame that overtakes all pending frames."""
+        """Return the numbers for a frame that overtakes all pending frames."""
         return FrameCounters(self._known)
 
     def count(self, draw: FrameCounters) -> None:
@@ -152,7 +152,7 @@ class Counters:
     def reset(self) -> None:
         """Reset the counters for a new connection.
 
-        Shared counters keep their values until `set_counters`.
+        Shared counters keep their values until `set_counters` is called.
         """
         if not self.is_shared:
             self._last = self._known = {}
@@ -187,7 +187,7 @@ class PriorityQueue(list[Item]):
         if item.latest_key:
             for place, other in enumerate(self):
                 if other.latest_key == item.latest_key:
-                    self[place] = item  # keep the place, so that updates cannot starve it
+                    self[place] = item  # keep its place, so that updates cannot starve it
                     return other
         crowded_out: Item | None = None
         if len(self) >= self._depth:
@@ -198,7 +198,7 @@ class PriorityQueue(list[Item]):
         return crowded_out
 
     def put_back(self, item: Item) -> None:
-        """Add a request to retry, ahead of other requests of equal rank."""
+        """Add a request that must be retried, ahead of other requests of equal rank."""
         insort_left(self, item, key=_rank)
 
     def drain(self) -> list[Item]:

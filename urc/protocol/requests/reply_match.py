@@ -45,7 +45,7 @@ class Matcher:
 
     Args:
         reader: reader for the fields of a frame.
-        decode: function that returns the samples and the refused values of fields.
+        decode: function that returns the samples and the refused values from the fields.
         compiled: generated function that reads and decodes the most common frames.
     """
 
@@ -98,7 +98,7 @@ class CompiledReply(NamedTuple):
 
 
 class MatchResult(NamedTuple):
-    """The result of matching a frame with an expectation."""
+    """The result of matching a frame against an expectation."""
 
     fields: Fields | None = None
     """Fields of a complete reply; None for an incomplete reply or a refusal."""
@@ -129,7 +129,7 @@ class Expectation:
         self._size = 0
 
     def offer(self, frame: Frame, is_mine: IsMine | None = None) -> MatchResult | None:
-        """Return the match result of a frame; None if the frame is not part of the reply."""
+        """Return the match result for a frame; None if the frame is not part of the reply."""
         beside = self.beside(frame, is_mine)
         if beside is not None:
             return beside
@@ -141,7 +141,7 @@ class Expectation:
         return MatchResult(found)
 
     def beside(self, frame: Frame, is_mine: IsMine | None = None) -> MatchResult | None:
-        """Return the match result of a provisional or error reply; None for other frames.
+        """Return the match result for a provisional or error reply; None for other frames.
 
         If the request has no correlation, the frame belongs to the oldest pending request.
         """
@@ -161,7 +161,7 @@ class Expectation:
 
     def _refusal(self, frame: Frame, is_mine: IsMine | None) -> MatchResult | None:
         """Return the robot's refusal; None if the frame is not an error reply."""
-        for matcher, text in self.answer.faults:  # first: these give more detail
+        for matcher, text in self.answer.faults:  # first, because these give more detail
             fields = matcher.read(frame)
             if fields is not None and _is_about(fields, is_mine):
                 if _lacks(text, fields) and self.answer.matcher.read(frame) is not None:
@@ -203,7 +203,7 @@ class ExpectationOwner(Protocol):
     """The owner of an expectation, which receives the match results."""
 
     def matched(self, expectation: Expectation, offer: MatchResult, now: float) -> None:
-        """Process the match result of a frame."""
+        """Process the match result for a frame."""
 
 
 class Matched(NamedTuple):

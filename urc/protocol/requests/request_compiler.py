@@ -102,7 +102,7 @@ class RequestCompiler:
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> CompiledRequest:
-        """Return the compiled request of a command."""
+        """Return the compiled request for a command."""
         ask = self._compile(
             command.name, command.transport, command.send, command.reply, command.arguments
         )
@@ -117,7 +117,7 @@ class RequestCompiler:
         )
 
     def poll(self, poll: Poll, label: str) -> CompiledRequest:
-        """Return the compiled request of a poll."""
+        """Return the compiled request for a poll."""
         ask = self._compile(label, poll.transport, poll.send, poll.reply)
         return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
 
@@ -126,7 +126,7 @@ class RequestCompiler:
         return self._compile(label, transport, send, None)
 
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
-        """Return the compiled request of a step.
+        """Return the compiled request for a step.
 
         Step requests have normal rank and therefore keep the order of the steps.
         """

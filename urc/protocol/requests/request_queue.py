@@ -99,7 +99,7 @@ class RequestQueue(PriorityQueue[Exchange]):
             return None
         first: float | None = None
         barred_from = float("inf")
-        """From this time on, a request that does not fit into the robot's buffer blocks later
+        """Time from which a request that does not fit into the robot's buffer blocks later
         requests."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(
@@ -121,7 +121,7 @@ def _free_at(exchange: Exchange) -> float:
 
 
 def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Numbered:
-    """Render a frame with the next counter numbers; a retry keeps the numbers.
+    """Render a frame with the next counter numbers; a retry keeps its numbers.
 
     Args:
         exchange: request that must be rendered when it is sent.

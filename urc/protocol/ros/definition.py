@@ -1,7 +1,7 @@
 """Definitions of ROS message types, and the layout of a message.
 
 Pure. A robot sends the definition of each type as text (`urc.protocol.ros.msg_text`,
-`urc.protocol.ros.idl_text`). `layout_of` expands a definition to a tree of layouts, without type
+`urc.protocol.ros.idl_text`). `layout_of` expands a definition into a tree of layouts without type
 names. Definitions are untrusted input, so their size and depth are limited.
 """
 
@@ -31,9 +31,9 @@ __all__ = [
 MAX_TEXT: Final = 262_144
 """Maximum length of the definition text of one type, in characters."""
 MAX_TYPES: Final = 512
-"""Maximum number of types in one text."""
+"""Maximum number of types in one definition text."""
 MAX_LAYOUTS: Final = 8192
-"""Maximum number of layouts of one message. Without this limit, nested types could grow
+"""Maximum number of layouts for one message. Without this limit, nested types could grow
 exponentially."""
 MAX_DEPTH: Final = 24
 """Maximum depth of nested types."""
@@ -54,7 +54,7 @@ class MessageField(NamedTuple):
     length: int | None = None
     """Length of a fixed array; 0 for a sequence; None for a single value."""
     default: object = None
-    """Default value; None for zero or empty."""
+    """Default value; None means zero or empty."""
     bound: int | None = None
     """Maximum length of a sequence; None means unlimited."""
 
@@ -69,26 +69,26 @@ class Definition(NamedTuple):
 
 
 Definitions = Mapping[str, Definition]
-"""Definitions by short name ``pkg/Type``."""
+"""Definitions, keyed by short name ``pkg/Type``."""
 
 CODES: Final[Mapping[str, str]] = {
     "bool": "?", "byte": "B", "char": "B", "octet": "B",
     "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
     "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
-"""Format code of the module `struct`, keyed by primitive type."""
+"""Format code for the module `struct`, keyed by primitive type."""
 SIZES: Final[Mapping[str, int]] = {
     "?": 1, "b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8,
 }  # fmt: skip
 """Size in bytes, keyed by format code."""
 BYTE_CODES: Final = "B"
-"""Format code of numbers whose arrays are treated as bytes, as in images."""
+"""Format code for numbers whose arrays are treated as bytes, as in images."""
 TIME_TYPES: Final = frozenset(("builtin_interfaces/Time", "time"))
 """Types for a point in time; messages may contain the text ``now`` in place of such a value."""
 
 
 class Primitive(NamedTuple):
-    """A number or a boolean, with its format code of the module `struct`."""
+    """A number or a boolean, with its format code for the module `struct`."""
 
     code: str
     default: object = None
@@ -109,7 +109,7 @@ class Record(NamedTuple):
 
 
 class Array(NamedTuple):
-    """A fixed array of `length` elements, or a sequence with length 0."""
+    """A fixed array of `length` elements, or a sequence if `length` is 0."""
 
     element: "Layout"
     length: int
@@ -128,7 +128,7 @@ _STANDARD: Final = {
     "time": (MessageField("secs", "uint32"), MessageField("nsecs", "uint32")),
     "duration": (MessageField("secs", "int32"), MessageField("nsecs", "int32")),
 }
-"""Types that a text can use without defining them: the time types of ROS 2 and ROS 1."""
+"""Types that definition text can use without defining them: the time types of ROS 2 and ROS 1."""
 _PADDING: Final = (("structure_needs_at_least_one_member", Primitive("B")),)
 """The only field of an empty type in ROS 2, according to rosidl."""
 

@@ -44,7 +44,7 @@ def parse_idl(name: str, text: str) -> Definitions:
 
     Args:
         name: name of the main type, in any form.
-        text: text of all types, separated as in ``ros2msg`` texts, with ``IDL:`` before each name.
+        text: text of all types, separated as in ``ros2msg`` text, with ``IDL:`` before each name.
 
     Raises:
         BadDefinition: the text is invalid.
@@ -110,7 +110,7 @@ class _Parser:
         return word
 
     def _skip(self, *ends: str) -> list[str]:
-        """Return the tokens before the first of the characters `ends` outside brackets."""
+        """Return the tokens before the first of the characters `ends` that is outside brackets."""
         depth, start = 0, self._at
         while depth or self._peek() not in ends:
             word = self._take()

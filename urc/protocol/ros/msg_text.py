@@ -1,6 +1,6 @@
 """Definitions in ``.msg`` text, as sent by robots (``ros2msg``, ``ros1msg``).
 
-Pure. The text contains one definition per type. The first definition has no name. Each further
+Pure. The text contains one definition per type. The first definition has no name. Each later
 definition follows a line of ``=`` and a line ``MSG: pkg/Type``. The grammar follows the ROS 2 page
 “Interfaces” and the ROS 1 page “msg”.
 """
@@ -34,7 +34,7 @@ def split_types(name: str, text: str, mark: str) -> list[tuple[str, str]]:
     Args:
         name: name of the first type.
         text: text of all types.
-        mark: word before the name of each further type, such as ``MSG:``.
+        mark: word before the name of each later type, such as ``MSG:``.
 
     Raises:
         BadDefinition: the text is too long or contains too many types.
@@ -123,7 +123,7 @@ def _default(word: str, text: str, length: int | None, owner: str) -> object:
 
 
 def _value(word: str, text: str, owner: str) -> object:
-    """Return the value of a literal of the primitive type `word`."""
+    """Return the value of a literal of primitive type `word`."""
     if word in ("string", "wstring"):
         quote = text[:1]
         end = text.find(quote, 1) if quote in ("'", '"') else -1

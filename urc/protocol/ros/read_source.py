@@ -26,8 +26,8 @@ from urc.protocol.ros.wanted import EACH, Wanted
 __all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
 MAX_ELEMENTS: Final = 200_000
-"""Maximum number of texts and nested messages in the arrays of one message. An element takes a few
-bytes in a message, but a hundred or more in memory."""
+"""Maximum number of strings and nested messages in the arrays of one message. An element takes a
+few bytes in a message, but a hundred or more in memory."""
 MAX_NUMBERS: Final = 4_000_000
 """Maximum number of numbers in one array."""
 _HEADER: Final = 4
@@ -212,7 +212,7 @@ class _ReadGenerator:
         """Record that the offset is only known to be a multiple of `modulus`."""
         self._modulus, self._rest = modulus, 0
 
-    # -- values; each method returns the expression of the value, or "" for a skipped value
+    # -- values; each method returns the expression for the value, or "" for a skipped value
 
     def _read(self, layout: Layout, wanted: Wanted) -> str:
         match layout:
@@ -433,7 +433,7 @@ def _with_check(value: str, name: str) -> str:
 
 
 def _sizes(layout: Layout) -> Iterator[tuple[int, int] | None]:
-    """Yield size and count of the numbers in a layout; None for a variable-size part."""
+    """Yield the size and count of the numbers in a layout; None for a variable-size part."""
     match layout:
         case Primitive():
             yield SIZES[layout.code], 1

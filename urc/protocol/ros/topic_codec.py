@@ -34,11 +34,11 @@ DEFINITION: Final = "definition"
 """Verb of a definition; the envelope has a text body and the attributes `topic`, `type`, `encoding`
 and `notation`."""
 UNENCODED: Final = "unencoded"
-"""Verb of a returned call. Its attributes are those of the call, plus `request` and `response`,
+"""Verb of a returned call. The attributes are those of the call, plus `request` and `response`,
 each a list of type, encoding, notation and text."""
 MAX_COMPILED: Final = 256
-"""Maximum number of compiled types of one connection. Otherwise, a hostile robot could announce an
-unlimited number of new types."""
+"""Maximum number of compiled types on one connection. Without this limit, a hostile robot could
+announce an unlimited number of new types."""
 _SHOWN: Final = 60
 _ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Byte order and largest alignment for CDR and plain CDR2, keyed by encapsulation identifier."""
@@ -99,7 +99,7 @@ class TopicCodec:
         """Initialise without definitions.
 
         Args:
-            paths: paths that the driver reads, keyed by topic; messages of other topics are read
+            paths: paths that the driver reads, keyed by topic; messages on other topics are read
                 whole.
             is_ros1: whether to write in the ROS 1 format until a definition determines the format.
         """
@@ -146,7 +146,7 @@ class TopicCodec:
             str(envelope.body),
         )
         if schema.encoding == "json":
-            return  # the form json reads bytes
+            return  # the form ``json`` reads bytes
         self._is_ros1 = schema.encoding == "ros1"
         self._sources[topic] = self._source(schema, self._wanted.get(topic, ALL))
 
@@ -227,7 +227,7 @@ class TopicCodec:
     # -- sent envelopes
 
     def sent(self, payload: Payload) -> Payload:
-        """Return the envelope; if the definition is known, the message's bytes are added.
+        """Return the envelope, with the message's bytes added if the definition is known.
 
         Raises:
             Unwritable: the message does not fit its type.

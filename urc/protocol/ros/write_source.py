@@ -2,8 +2,9 @@
 
 Theory of operation. The source is generated once per layout. Consecutive numbers become one
 `struct.Struct` format. Alignment works as in `urc.protocol.ros.read_source`. A message is a mapping
-of fields, as in a document; missing fields have their default values or zero. The generated
-function is fast, but its errors give no reason. `Writer` then searches the message for the reason.
+of fields, as in a document; missing fields take their default values or zero. The generated
+function is fast, but its errors give no reason. After an error, `Writer` searches the message for
+the reason.
 """
 
 import base64

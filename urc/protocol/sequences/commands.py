@@ -1,4 +1,4 @@
-"""Conditions of commands: requirements, confirmations, and verification after the reply. Pure."""
+"""Conditions for commands: requirements, confirmations, and verification after the reply. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -48,8 +48,8 @@ def why_not_allowed(
 
     Args:
         command: the declared command.
-        known: state of the robot, for conditions.
-        values: checked arguments, by name.
+        known: state of the robot, used in conditions.
+        values: checked arguments, keyed by name.
         now: current time, in seconds.
         stops: number of stops when the command was requested; None for a new request.
     """
@@ -70,7 +70,8 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
     Args:
         command: the declared command.
-        values: arguments including defaults, by name; each element of an array may need a question.
+        values: arguments, including defaults, keyed by name; each element of an array may need a
+            question.
     """
     asked = [] if command.confirm is None else [command.confirm]
     for name, argument in command.arguments.items():
@@ -123,10 +124,10 @@ def exchange_of(
     Args:
         command: the command, which must not be a sequence.
         ask: compiled request of the command.
-        values: checked arguments, by name.
+        values: checked arguments, keyed by name.
         sink: function that receives the outcome.
         now: current time, in seconds.
-        known: state of the robot, for conditions.
+        known: state of the robot, used in conditions.
         verifications: runs waiting for verification; if the command requires verification, its run
             is added.
 
@@ -196,7 +197,7 @@ class Verifications:
             self.has_news = True
 
     def check(self, now: float) -> list[LineEvent]:
-        """Return the events of all newly verified commands."""
+        """Return the events for all newly verified commands."""
         events: list[LineEvent] = []
         if not self.has_news:
             return events
@@ -211,7 +212,7 @@ class Verifications:
         return events
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Return the events of verified commands and of verification timeouts."""
+        """Return the events for verified commands and verification timeouts."""
         events = self.check(now)
         for one in tuple(self._waiting):
             if one.due <= now and one.run.verify is not None:

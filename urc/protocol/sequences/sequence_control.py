@@ -9,8 +9,8 @@ from typing import Final, Literal
 __all__ = ["PAUSE_S", "Pull", "SequenceControl"]
 
 PAUSE_S: Final = 600.0
-"""Maximum duration of a pause, in seconds. There is a limit because a paused sequence blocks other
-sequences."""
+"""Maximum duration of a pause, in seconds. Pauses are limited because a paused sequence blocks
+other sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
 """A control request from the operator. ``step`` runs one outermost step and then pauses. If
@@ -53,7 +53,7 @@ class SequenceControl:
     # -- for the runner
 
     def start(self) -> None:
-        """Record the start of a run of the sequence."""
+        """Record the start of a sequence run."""
         self.place, self.reason = 0, ""
         self.is_running, self.is_paused, self.is_aborted = True, False, False
         self.count += 1
@@ -66,7 +66,7 @@ class SequenceControl:
             self._halt = "outer"
 
     def end(self, reason: str) -> None:
-        """Record the end of a run of the sequence."""
+        """Record the end of a sequence run."""
         self._halt, self.reason = "", reason
         self.is_running, self.is_paused, self.is_aborted = False, False, False
         self.count += 1

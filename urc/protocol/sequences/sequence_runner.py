@@ -82,8 +82,7 @@ class SequenceRunner:
             sink: function that receives the outcome, exactly once.
             privileged_on: name of the transport of a login or close sequence; "" for other
                 sequences.
-            confirmed_by: names of the people who have confirmed the sequence, including its
-                commands.
+            confirmed_by: names of the people who have confirmed the sequence and its commands.
             ends_at: deadline of the whole run, in seconds; None means no deadline.
         """
         self.host = host
@@ -234,7 +233,7 @@ class SequenceRunner:
         return []
 
     def matched(self, expectation: Expectation, offer: MatchResult, now: float) -> None:
-        """Process the match result of the expected frame."""
+        """Process the match result for the expected frame."""
         self._listening = None
         if offer.refusal:
             self.stop("refused", offer.refusal)
@@ -258,7 +257,7 @@ class SequenceRunner:
         self.is_waiting, self.due = True, due
 
     def wait(self) -> None:
-        """Wait for a call of `done`."""
+        """Wait for a call to `done`."""
         self.is_waiting = True
 
     def listen(

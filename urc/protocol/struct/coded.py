@@ -30,7 +30,7 @@ Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
-"""Key in `out` for the first invalid item's error; no item has this name."""
+"""Key in `out` for the error of the first invalid item; no item has this name."""
 
 
 class OtherFrame(Exception):

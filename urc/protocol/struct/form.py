@@ -16,14 +16,14 @@ __all__ = ["StructReader", "StructWriter"]
 
 
 class StructReader:
-    """A reader for the items of a frame, which also writes frames from fields."""
+    """A reader for the items in a frame; it also writes frames from fields."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._items = cast("tuple[Item, ...]", spec.options["items"])
         self._names = frozenset(names_of(self._items))
         self._encoding = context.encoding
         self.read = generate_read(self._items, context.encoding)
-        """Generated function that returns the fields, or None if the frame does not match, or
+        """Generated function that returns the fields, returns None if the frame does not match, or
         raises `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
         # A reply contains the number of its request, which `match` supplies.
@@ -43,7 +43,7 @@ class StructReader:
 
 
 class StructWriter:
-    """A writer for the items of a frame, which also reads the arguments back."""
+    """A writer for the items in a frame; it also reads the arguments back."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         items = cast("tuple[Item, ...]", spec.options["items"])

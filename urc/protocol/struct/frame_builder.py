@@ -1,4 +1,4 @@
-"""A builder for binary frames, which leaves gaps for numbers that are computed later. Pure."""
+"""A builder for binary frames; it leaves gaps for numbers that are computed later. Pure."""
 
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ LARGEST_FRAME = 1 << 20
 
 
 GAP = "gap of "
-"""Prefix of a gap's key in the scope, before the item id; ids contain no space."""
+"""Prefix of a gap's key in the scope, before the item id; ids contain no spaces."""
 
 
 class Backpatch(NamedTuple):
@@ -37,7 +37,7 @@ class FrameBuilder:
     def __init__(self) -> None:
         self.bytes = bytearray()
         self.late: list[tuple[Backpatch, Template, Scope]] = []
-        """Gaps of computed items that depend on the size of the whole frame."""
+        """Gaps for computed items that depend on the size of the whole frame."""
 
     def append(self, data: bytes) -> None:
         """Append bytes; raise `NotWritable` if the frame becomes too long."""

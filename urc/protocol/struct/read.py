@@ -1,4 +1,4 @@
-"""Closures that read struct items from bytes to fields.
+"""Closures that read struct items from bytes into fields.
 
 Pure. The closures are a readable version of the code that `urc.protocol.struct.read_source`
 generates. Generated functions are faster for runs of fixed items. Tests compare the results of the
@@ -74,7 +74,7 @@ def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | 
 
 
 def build_steps(items: tuple[Item, ...], encoding: str) -> tuple[Step, ...]:
-    """Return the steps for the items of one level."""
+    """Return the steps for the items at one level."""
     return tuple(build_step(item, encoding) for item in items)
 
 

@@ -69,7 +69,7 @@ def add_fixed(
     if len(runs) < len(parts):
         return None
     size = sum(run.struct.size for run in runs)
-    # An `Envelope` is a tuple of three: only for other sizes does the length exclude it.
+    # An `Envelope` is a tuple of three, so its length excludes it only for larger frames.
     kind = f"type({data}) is not bytes or " if size <= 3 else ""
     source.add(f"if {kind}len({data}) {'<' if has_open_end else '!='} {size}: return None")
     lines: list[str] = []

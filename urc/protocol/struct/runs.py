@@ -25,7 +25,7 @@ class FixedField(NamedTuple):
     name: str
     """Name of the field, including the names of outer structs; "" if the item has no field."""
     outer: str
-    """Joined name of the outer structs."""
+    """Joined names of the outer structs."""
     code: str
     """Format characters for `struct`; "x" means that the item has no value."""
     endian: Literal["", "big", "little"] = ""

@@ -126,7 +126,7 @@ def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
         raw = raw_from(value)
         try:
             return raw, meaning(raw)
-        except BadItem as error:  # rounding has moved it out of range
+        except BadItem as error:  # rounding has moved the value out of range
             raise NotWritable(str(error)) from None
 
     return checked
@@ -156,7 +156,7 @@ def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
 
     def text(raw: bytes) -> str:
         if is_padded:
-            # After the first NUL of a C string, any bytes may follow.
+            # After the first NUL in a C string, any bytes may follow.
             raw = raw.rstrip(pad) if item.pad else raw.partition(pad)[0]
         try:
             return raw.decode(codec)
@@ -208,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes for a text of hex digits."""
+    """Return the bytes for a string of hex digits."""
     try:
         return bytes.fromhex(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Closures that write struct items from values to bytes.
+"""Closures that write the values of struct items as bytes.
 
 Pure. These closures are the inverse of the closures in `urc.protocol.struct.read`. Theory of
 operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values
@@ -60,13 +60,13 @@ class StructWriteScope(NamedTuple):
     derived: Mapping[str, Template]
     """Formulas for sizes and counts, keyed by the name of the item that contains the number."""
     is_lenient: bool
-    """Whether missing values are zero, for an emulated robot that sets only some values."""
+    """Whether missing values count as zero, because an emulated robot sets only some values."""
 
 
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps for the items of a separate scope."""
+    """Return the steps for the items in a separate scope."""
     rules = StructWriteScope(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 
@@ -141,7 +141,7 @@ def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
 def _deferral(
     item: Item, rules: StructWriteScope
 ) -> Callable[[FrameBuilder, Scope, Backpatch], None] | None:
-    """Return the handler for the gap if the number is computed later, or None."""
+    """Return the handler for the gap if the number is computed later, otherwise None."""
     value = item.value
     if value is None and item.id in rules.derived:
         return lambda builder, scope, gap: scope.__setitem__(GAP + item.id, gap)
@@ -357,7 +357,7 @@ def _struct_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _outer(scope: Scope) -> Scope:
-    """Return those values of the outer scope that a struct may use, keyed by name."""
+    """Return the values from the outer scope that a struct may use, keyed by name."""
     return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 

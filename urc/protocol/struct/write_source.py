@@ -71,7 +71,7 @@ def _is_quick(leaf: FixedField) -> bool:
 
 
 def _written(source: SourceBuilder, leaf: FixedField, encoding: str) -> list[str]:
-    """Return the source of one item's ``pack`` arguments."""
+    """Return the source for one item's ``pack`` arguments."""
     item = leaf.item
     if item.kind == "padding":
         return []

@@ -1,8 +1,8 @@
 """Decoding of raw fields into typed values.
 
-Pure. Each engine builds the converters once per signal. A value with the wrong type or range is
-counted as a violation and never becomes a sample. On a screen, a wrong number would be worse than
-an old number.
+Pure. Each engine builds the converters once per signal. A value of the wrong type or outside its
+range counts as a violation and never becomes a sample. On a screen, a wrong number would be worse
+than an old number.
 """
 
 import math
@@ -84,7 +84,7 @@ def _typed_converter(
         states = dict(signal.states)
         word_of = _states_converter(states, is_number=kind in ("integer", "number"))
         if kind == "boolean" and _BOTH.issuperset(states.values()):
-            return lambda raw: _to_boolean(word_of(raw))  # words of the robot for true and false
+            return lambda raw: _to_boolean(word_of(raw))  # the robot's words for true and false
         return word_of
     if kind == "string":
         return _to_string

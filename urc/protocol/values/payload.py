@@ -1,4 +1,4 @@
-"""Interfaces of readers and writers, and their context.
+"""Interfaces for readers and writers, and their context.
 
 Pure. A form is one notation for the content of a frame. A form works in both directions, so the
 emulated robot can use the same declaration. `urc.protocol.forms.table` contains all forms.
@@ -42,10 +42,9 @@ class Frame:
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Reason why a reader rejected a value of the frame; unset if no reader rejected a value."""
+    """Reason why a reader rejected a value in the frame; unset if no reader rejected a value."""
     was_text_wanted: bool
-    """Whether a reader needed the text of an undecodable frame; unset if no reader needed the
-    text."""
+    """Whether a reader needed the text of an undecodable frame; unset if no reader needed it."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
@@ -55,7 +54,7 @@ class Frame:
         """Source topic of the frame; None on transports without topics."""
         self.attributes: Mapping[str, object] = NOTHING
         """Attributes of the frame's envelope, such as status and headers."""
-        # `fault` stays unset until needed, because a connection makes thousands of frames per
+        # `fault` stays unset until needed, because a connection creates thousands of frames per
         # second.
 
     @property
@@ -101,10 +100,10 @@ class PayloadReader(Protocol):
 
 
 class PayloadWriter(Protocol):
-    """Makes a frame."""
+    """A writer for frames."""
 
     def write(self, namespace: Mapping[str, object]) -> Payload:
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return values of top-level names with which `write` returns this frame, or None."""
+        """Return the values of top-level names for which `write` returns this frame, or None."""

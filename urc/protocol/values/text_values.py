@@ -19,7 +19,7 @@ def counter_in(expression: str) -> str:
 
 
 def field_text(value: object) -> str:
-    """Return a value as text: ``true``, ``3``, ``2.5``; lists are separated by blanks."""
+    """Return a value as text: ``true``, ``3``, ``2.5``; list elements are separated by blanks."""
     if value is None:
         return ""
     if isinstance(value, (list, tuple)):
@@ -36,7 +36,7 @@ def encoded(text: str, encoding: str) -> bytes:
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
-    """Return the first field whose value differs after reading back a frame, or ""."""
+    """Return the first field whose value differs after a frame is read back, or ""."""
     for name, value in fields.items():
         if found is None or field_text(found.get(name)) != field_text(value):
             return name

@@ -24,7 +24,7 @@ class TimeAndNonce(NamedTuple):
     """Function that returns a given number of random bytes, different for each call."""
 
     def names(self) -> dict[str, object]:
-        """Return the namespace of one frame, in which all uses see the same time and nonce."""
+        """Return the namespace for one frame; all uses of it get the same time and nonce."""
         made: dict[int, bytes] = {}
 
         def nonce(size: int) -> bytes:
@@ -41,4 +41,4 @@ def fixed_bytes(size: int) -> bytes:
 
 
 FIXED: Final = TimeAndNonce(lambda: FIXED_UNIX_S, fixed_bytes)
-"""Fixed time and nonce sources, for tests."""
+"""Fixed sources of times and nonces, for tests."""

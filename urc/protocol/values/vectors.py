@@ -29,7 +29,7 @@ _AROUND = " \t\r\n[]()"
 def array_converter(
     signal: Signal, element: Callable[[object], Value]
 ) -> Callable[[object], Reading]:
-    """Return a function that converts raw elements to a tuple of values, each with `element`."""
+    """Return a function that converts raw elements to a tuple, using `element` for each value."""
     wanted = signal.size
 
     def convert(raw: object) -> Reading:

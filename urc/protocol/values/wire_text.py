@@ -4,7 +4,7 @@ __all__ = ["WireText"]
 
 
 class WireText(str):
-    """Received text that also equals its number, so ``_id == id`` is true for "3" and 3."""
+    """Received text that also equals its numeric value, so ``_id == id`` is true for "3" and 3."""
 
     __slots__ = ()
 
