@@ -78,7 +78,7 @@ class AlarmList:
         )
         self._activations: dict[str, deque[float]] = {}
         self._settling: dict[str, float] = {}
-        """Time at which each chattering alarm with a normal value ends, by signal."""
+        """End time of each chattering alarm whose value is normal, by signal."""
 
     @property
     def is_flooded(self) -> bool:
@@ -133,7 +133,7 @@ class AlarmList:
                 else:
                     self._raise(changed, now)
             return
-        self._flood_counts(now)  # first: the record has the number of the burst that it may begin
+        self._flood_counts(now)  # first: this may begin a new burst, whose number the record stores
         self._activations.setdefault(signal, deque(maxlen=CHATTER_TIMES)).append(now)
         self._number += 1
         fresh = AlarmRecord(
@@ -178,7 +178,7 @@ class AlarmList:
         self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
-        """Mark values as unknown after a lost link or after values became stale; alarms stay."""
+        """Mark values as unknown after the link is lost or the values become stale; alarms stay."""
         for signal in signals:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
@@ -188,7 +188,7 @@ class AlarmList:
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
         """Set the pairs of signal and condition that are suppressed by design from now on.
 
-        Alarms of unknown values stay unchanged until their next value.
+        An alarm whose value is unknown stays unchanged until its next value.
         """
         if suppressed == self._suppressed:
             return
@@ -206,7 +206,7 @@ class AlarmList:
             self._raise(judged, now)
 
     def adopt(self, limits: Mapping[str, AlarmLimits], now: float) -> None:
-        """Use another document's limits, and remove alarms that this document does not declare."""
+        """Use a new document's limits, and remove alarms that the new document does not declare."""
         self._limits = limits
         self._settling.clear()
         for record in [*self.records.values()]:

@@ -1,8 +1,8 @@
 """Floods and bursts of alarms, as in ISA-18.2.
 
-Layer 3. Pure. A flood begins with more than 10 alarms in 10 minutes, because one operator can
-handle at most 10. A flood ends with fewer than 5 alarms in 10 minutes. A burst is a sequence of
-alarms with short gaps. The first alarm in a burst is often the cause of the others.
+Layer 3. Pure. A flood begins when more than 10 alarms occur in 10 minutes, because one operator can
+handle at most 10. A flood ends when fewer than 5 alarms occur in 10 minutes. A burst is a sequence
+of alarms with short gaps. The first alarm in a burst is often the cause of the others.
 """
 
 from collections import deque
@@ -14,7 +14,7 @@ FLOOD_S: Final = 600.0
 FLOOD_BEGINS: Final = 10
 """Highest number of alarms in `FLOOD_S` that is not yet a flood."""
 FLOOD_ENDS: Final = 5
-"""A flood ends when fewer alarms than this number occurred in `FLOOD_S`."""
+"""A flood ends when fewer than this number of alarms occurred in `FLOOD_S`."""
 BURST_GAP_S: Final = 5.0
 """Longest time between two alarms of one burst, in seconds."""
 
@@ -23,10 +23,10 @@ class FloodDetector:
     """The rate of one robot's alarms."""
 
     def __init__(self, group: int = 0) -> None:
-        """Begin without alarms; `group` is the number of the last burst before a restart."""
+        """Begin with no alarms; `group` is the number of the last burst before a restart."""
         self.is_flooded = False
         self.group = group
-        """Number of the present burst."""
+        """Number of the current burst."""
         self._times: deque[float] = deque(maxlen=FLOOD_BEGINS + 1)
         """Times of the newest alarms; the oldest time decides whether a flood begins."""
 
@@ -40,7 +40,7 @@ class FloodDetector:
 
     @property
     def deadline(self) -> float | None:
-        """Time at which the flood ends without further alarms; None without a flood."""
+        """Time at which the flood ends if no further alarms occur; None if there is no flood."""
         return self._times[-FLOOD_ENDS] + FLOOD_S if self.is_flooded else None
 
     def tick(self, now: float) -> None:

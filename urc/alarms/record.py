@@ -1,6 +1,6 @@
 """The state of one alarm, and the events in its history.
 
-Layer 3. Pure. All times are in UTC seconds since 1970, because shelves end at a time of day and
+Layer 3. Pure. All times are in UTC seconds since 1970, because shelving ends at a time of day and
 states survive a restart.
 """
 
@@ -44,7 +44,7 @@ class AlarmRecord(NamedTuple):
     """Crossed limit or alarm state, now or before the return to normal."""
     priority: AlarmPriority
     number: int
-    """Number of the activation within the robot; these numbers give the first-out order."""
+    """Number of the activation, counted per robot; these numbers give the first-out order."""
     group: int
     """Number of the burst to which the activation belongs."""
     began_at: float
@@ -54,7 +54,7 @@ class AlarmRecord(NamedTuple):
     """Value at the last change, as text."""
     is_active: bool = True
     is_known: bool = True
-    """Whether the present value is known; an alarm of an unknown value stays in the list."""
+    """Whether the current value is known; an alarm with an unknown value stays in the list."""
     is_acknowledged: bool = False
     is_suppressed: bool = False
     times: int = 1
@@ -64,7 +64,7 @@ class AlarmRecord(NamedTuple):
     acknowledged_at: float = 0.0
     acknowledged_by: str = ""
     shelved_until: float = 0.0
-    """End of the shelf; 0 for an unshelved alarm."""
+    """Time at which shelving ends; 0 for an unshelved alarm."""
     shelved_by: str = ""
 
     @property
@@ -100,13 +100,13 @@ class AlarmEvent(NamedTuple):
     """Name of the person or program that acted; "" if the robot caused the event."""
     principal: str = ""
     until: float = 0.0
-    """End time of a shelf."""
+    """Time at which shelving ends."""
     times: int = 1
     """Number of identical activations that the event represents."""
 
 
 def condition_of(alarm: Alarm, value: Reading, limits: AlarmLimits) -> str:
-    """Return the limit or alarm state that caused a sample's alarm; "" without an alarm."""
+    """Return the limit or alarm state that caused a sample's alarm; "" if there is no alarm."""
     if alarm not in ("major", "minor"):
         return alarm
     wanted = "high" if alarm == "major" else ""
@@ -127,7 +127,7 @@ def is_easing(before: str, after: str) -> bool:
 
 
 def text_of_value(value: Reading) -> str:
-    """Return a short text of a value."""
+    """Return a value as short text."""
     if isinstance(value, bytes):
         return f"{len(value)} bytes"
     if isinstance(value, bool):

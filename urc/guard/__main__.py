@@ -1,4 +1,4 @@
-"""The guard process, ``python -m urc.guard PIPE DOOR…``, which only `PipeChannel` starts."""
+"""The guard process, ``python -m urc.guard PIPE DOOR…``, started only by `PipeChannel`."""
 
 import asyncio
 import gc
@@ -85,7 +85,7 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
             await host.finish()
     pipe.close()
     logging.shutdown()
-    os._exit(0)  # threads and tasks of libraries must not keep the process alive
+    os._exit(0)  # library threads and tasks must not keep the process alive
 
 
 def _line(place: str) -> socket.socket:
@@ -100,7 +100,7 @@ def _line(place: str) -> socket.socket:
 
 def main() -> None:
     """Guard the connections of one robot until the pipe closes or SIGTERM arrives."""
-    # Ctrl-C reaches every process of the terminal; the server decides how to react.
+    # Ctrl-C reaches every process in the terminal; the server decides how to react.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)
     line = _line(sys.argv[1])

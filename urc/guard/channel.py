@@ -41,7 +41,7 @@ class ChannelListener(Protocol):
         """Handle a message from the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:
-        """Handle the guard process's end, which closes every connection."""
+        """Handle the end of the guard process, which closes every connection."""
 
 
 class Channel(Protocol):
@@ -56,7 +56,7 @@ class Channel(Protocol):
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message to the guard.
 
-        Without a running guard, drop the message: the next guard is initialised from the client's
+        If no guard is running, drop the message: the next guard is initialised from the client's
         table.
 
         Args:

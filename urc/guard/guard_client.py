@@ -8,9 +8,9 @@ of other armed commands. For each pending stop, the guard opens the connection a
 first. Motion never resumes automatically.
 
 A control's state *may be moving* begins with its first tick or stop request. The state ends when
-the guard reports that it has written the stop after the newest tick. It begins again if the guard
-reports that this stop may be lost with the connection. A pending stop is therefore not lost when
-the guard process dies.
+the guard reports that it has written the stop after the newest tick. The state begins again if the
+guard reports that this stop may be lost with the connection. A pending stop is therefore not lost
+when the guard process dies.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ __all__ = ["GuardClient", "HeldSpec"]
 
 _MOST_STOPS: Final = 256
 _TELLING_S: Final = 0.5
-"""Maximum delay of a message to the guard, in seconds."""
+"""Maximum delay for a message to the guard, in seconds."""
 _UNCOUNTED: Final = Count({}, {})
 
 
@@ -45,13 +45,13 @@ class HeldSpec(NamedTuple):
 
 @dataclass(slots=True)
 class _Control:
-    """A held command after its first arming or stop."""
+    """A held command that has been armed or stopped."""
 
     line: str
     terms: HoldTerms
     is_armed: bool = False
     number: int = 0
-    """Number of the newest tick, counted since the present guard started."""
+    """Number of the newest tick, counted since the current guard started."""
     first: int = 0
     """Number of the first tick since the control was armed."""
     at_s: float = 0.0
@@ -96,8 +96,8 @@ class GuardClient:
         }
         """Guarded transports by name, used by the session's links."""
         self.on_stand: Stands = _unheard
-        """Callback with a transport's counters, and whether all of the engine's frames with
-        counters were sent.
+        """Callback that receives a transport's counters, and whether all of the engine's frames
+        with counters were sent.
         """
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
@@ -215,7 +215,7 @@ class GuardClient:
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait for written or lost stops; return the command and the report for each stop.
 
-        Cancelling loses none.
+        Cancelling the wait loses no stop.
         """
         while not self._stops:
             self._stopped.clear()
@@ -231,7 +231,7 @@ class GuardClient:
         return control
 
     def _discard_tick(self, command: str) -> None:
-        """Discard an unsent tick, so that it cannot start a motion later."""
+        """Discard an unsent tick, so that it cannot start motion later."""
         self.channel.drop(command)
         control = self._controls.get(command)
         if control is not None:
@@ -270,7 +270,7 @@ class GuardClient:
                 self._tick_again(message)
 
     def lost(self, reason: str) -> None:
-        """Handle the guard's end, which also ends every connection."""
+        """Handle the end of the guard, which also ends every connection."""
         for transport in self.transports.values():
             transport.lost(reason)
 
@@ -285,7 +285,7 @@ class GuardClient:
         for command, number in counted.stale:
             control = self._controls.get(command)
             if control is None or control.counted is None or control.number != number:
-                continue  # it was released, or a newer tick is on its way
+                continue  # the control was released, or a newer tick is on its way
             numbered = control.counted.again()
             if numbered is not None:
                 self._post_tick(command, control, numbered)
@@ -294,7 +294,7 @@ class GuardClient:
         control = self._controls.get(stopped.control)
         if control is not None:
             control.stopped_s = self.channel.now()
-            # A stop of the present arming disarms the control: the guard drops all newer ticks.
+            # A stop since the last arming disarms the control: the guard drops all newer ticks.
             is_disarmed = stopped.reason != "released" and stopped.number >= control.first
             if is_disarmed:
                 control.is_armed = False

@@ -44,12 +44,13 @@ _RESCUE_S: Final = 90.0
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
-"""Minimum interval between connection attempts, in seconds; five times that for slow transports."""
+"""Minimum interval between connection attempts, in seconds; five times as long for slow
+transports."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
 """Maximum timeout for one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout
-is a multiple of the usual duration of successful attempts. A short timeout is needed because an
-attempt that begins before the robot is reachable fails, and delays the next attempt.
+is a multiple of the usual duration of successful attempts. An attempt that begins before the robot
+is reachable fails and delays the next attempt, so the timeout must be short.
 """
 _REMEMBERED: Final = 5
 _TIMES: Final = 4.0
@@ -132,9 +133,9 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """How often the engine's frames were refused because their counter values were used."""
+        """How often the engine's frames were refused because their counters were already used."""
 
-    # -- requests of the engine
+    # -- requests from the engine
 
     def open(self, turn: int, timeout_s: float) -> None:
         """Open the connection; report the result as `LineOpened` or `OpenFailed`."""
@@ -148,7 +149,7 @@ class GuardedConnection:
             self._waiting = self._clock.call_at(self._clock.now() + timeout_s, self._in_vain)
 
     def close(self, turn: int) -> None:
-        """Stop moving controls, close the connection, and report `LineClosed`."""
+        """Stop all moving controls, close the connection, and report `LineClosed`."""
         if turn != self._turn or self._is_rescuing:
             self._forget_waiting()
             self._emit(messages.LineClosed(self.name, turn))
@@ -176,7 +177,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return the data to send for the next frame in the queue; None for an outdated frame."""
+        """Return the data to send for the next frame in the queue; None if it is outdated."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -217,7 +218,7 @@ class GuardedConnection:
             self._switch(self._rescue())
 
     async def finish(self, within_s: float) -> None:
-        """Stop moving controls, wait up to `within_s` for their stops, and close the connection."""
+        """Stop all motion, wait up to `within_s` for the stops, and close the connection."""
         self.scheduler.stop_all()
         self.scheduler.write_due()
         until_s = self._clock.now() + within_s
@@ -283,7 +284,7 @@ class GuardedConnection:
         except Exception as bug:  # supervisor: a third-party transport may raise anything
             return why_broken(bug)
         self._took_s.append(self._clock.now() - began_s)
-        # The shortest duration is the least affected by delays of this machine.
+        # The shortest duration is the least affected by delays on this machine.
         self._patience_s = min(max(_TIMES * min(self._took_s), _SHORTEST_S), _LONGEST_S)
         return ""
 
@@ -443,7 +444,7 @@ class GuardedConnection:
             self._waiting.cancel()
             self._waiting = None
 
-    # -- reports of the send queues
+    # -- reports from the send queues
 
     def _report_stop(self, control: str, reason: str, number: int) -> None:
         self._emit(messages.StopWritten(control, reason, number))  # type: ignore[arg-type]

@@ -25,14 +25,14 @@ class LivenessWatch:
         is_moving: Callable[[], bool],
         failed: Callable[[str], None],
     ) -> None:
-        """Prepare.
+        """Create the watch.
 
         Args:
             transport: the transport, which is probed if it implements `SupportsProbe`.
-            clock: the time.
+            clock: the time source.
             silent_s: maximum silence of an unprobed robot, in seconds; None for no limit.
             is_moving: function that returns whether a control is moving.
-            failed: callback with the reason when the program is frozen.
+            failed: callback that receives the reason when the program is frozen.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
         self._clock = clock
@@ -66,7 +66,7 @@ class LivenessWatch:
             self._asking = None
 
     def note_arrival(self) -> None:
-        """Record that bytes were received, or that this machine paused its reading."""
+        """Record that bytes were received, or that this machine paused reading."""
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:

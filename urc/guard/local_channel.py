@@ -25,7 +25,7 @@ class LocalChannel:
         Args:
             listener: the client.
             lines: the transports; a tunnel precedes the transports that it carries.
-            clock: the time.
+            clock: the time source.
         """
         self._listener = listener
         self._lines = tuple(lines)
@@ -50,7 +50,7 @@ class LocalChannel:
         """Do nothing, because messages are delivered immediately."""
 
     async def ready(self) -> None:
-        """Return at once."""
+        """Return immediately."""
 
     def now(self) -> float:
         """Return the clock's current time, in seconds."""

@@ -54,15 +54,17 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
-    """Name of the previously created tunnel that carries this transport; "" without a tunnel."""
+    """Name of the previously created tunnel that carries this transport; "" if there is no
+    tunnel."""
     stalled_s: float
     """Age of unsent motion data at which a connection counts as stalled and is reset, in seconds.
     """
     is_strict: bool
-    """Whether the transport is slow to open; if so, a frame is written only when no byte is unsent.
+    """Whether the transport is slow to open; if so, a frame is written only when no bytes are
+    unsent.
     """
     silent_s: float | None = None
-    """Maximum silence of a moving robot before the connection is reset, in seconds; None:
+    """Maximum silence of a moving robot before the connection is reset, in seconds; None means
     unlimited."""
 
 
@@ -91,7 +93,7 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
-    """Stop moving controls and close the connection. Answered by `LineClosed`."""
+    """Stop all moving controls and close the connection; the answer is `LineClosed`."""
 
     line: str
     turn: int
@@ -298,7 +300,7 @@ def _plain(value: object) -> object:
 
 
 def encoder() -> msgspec.msgpack.Encoder:
-    """Return a new encoder for messages of either side.
+    """Return a new encoder for messages from either side.
 
     For an unsupported body, the encoder raises `TypeError`, `OverflowError` or
     `NotImplementedError`, never `msgspec.EncodeError`.

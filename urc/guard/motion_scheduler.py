@@ -1,10 +1,10 @@
 """The scheduler of one connection's held commands, which writes frames and detects stalls.
 
-Theory of operation. `step` writes the due frames of every control. Stops are written first,
+Theory of operation. `write_due` writes the due frames of every control. Stops are written first,
 regardless of unsent data. Motion frames are written only if no earlier data has been waiting too
-long. `step` runs after every message, and when the next frame is due. Until the other side
-acknowledges a write, `step` also runs every few milliseconds, because the kernel does not report
-sent bytes.
+long. `write_due` runs after every message, and when the next frame is due. Until the other side
+acknowledges a write, `write_due` also runs every few milliseconds, because the kernel does not
+report sent bytes.
 
 A control is *in doubt* while a written frame may not have arrived at the robot. If the connection
 is lost while a control is in doubt, a stop becomes pending.
@@ -33,8 +33,8 @@ __all__ = ["MotionScheduler"]
 _LOOK_S: Final = 0.005
 """Minimum interval between checks of a connection with unsent data, in seconds."""
 _LONGEST_LOOK_S: Final = 0.02
-"""Maximum interval between checks of a connection with unsent data, in seconds. While no frame
-waits, the interval doubles after each check."""
+"""Maximum interval between checks of a connection with unsent data, in seconds. While no frame is
+waiting, the interval doubles after each check."""
 
 
 class MotionScheduler:
@@ -57,15 +57,15 @@ class MotionScheduler:
         Args:
             transport: the transport, with optional support for `SupportsUnsent`, `SupportsOffer`
                 and `SupportsForget`.
-            clock: the time.
+            clock: the time source.
             stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
             is_strict: whether motion waits until all earlier bytes are sent.
-            told: callback for each written stop, with the control, the reason and the number of the
-                newest tick.
-            failed: callback with the reason when the connection stalls or refuses data.
+            told: callback for each written stop; it receives the control, the reason and the number
+                of the newest tick.
+            failed: callback that receives the reason when the connection stalls or refuses data.
             sent_counters: counter values sent on the connection; None to create new counters.
-            counted: callback after the counters have changed, with the control and number of each
-                obsolete tick.
+            counted: callback after a change to the counters; it receives the control and number of
+                each obsolete tick.
         """
         self._clock = clock
         self._unsent = self._offer = self._forget = None
@@ -164,7 +164,7 @@ class MotionScheduler:
         self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
-        """Stop moving controls before the connection is closed."""
+        """Stop all moving controls before the connection is closed."""
         now = self._clock.now()
         for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
@@ -205,7 +205,7 @@ class MotionScheduler:
         """Record that the connection is closed, and drop all unsent frames.
 
         Returns:
-            Controls whose stops were reported as written, and may be lost with the connection.
+            Controls whose stops were reported as written but may be lost with the connection.
         """
         self._is_open = False
         for control, is_stop in self.queue.end():
@@ -319,7 +319,7 @@ class MotionScheduler:
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
-        """Return a motion frame at the head of the queue; None for used counter values."""
+        """Return a motion frame at the head of the queue; None if its counter values are used."""
         fits = self._sent_counters.fits(count)
         if fits:
             self._sent_counters.left(count)

@@ -1,7 +1,7 @@
 """One end of the pipe between the engine's process and the guard process.
 
 Each message on the wire is a four-byte length followed by the body. Writing never waits: unsent
-messages are queued. Urgent messages go first, and a newer message replaces an older one of the same
+messages are queued. Urgent messages go first, and a newer message replaces an older one in the same
 slot. The senders limit the length of the queue: flow-control credit limits replies, and the maximum
 number of pending requests limits requests.
 """
@@ -42,7 +42,7 @@ class Pipe:
         """Start reading; requires a running event loop that can watch sockets.
 
         Args:
-            line: connected.
+            line: the connected socket.
             encoder: encoder of posted messages.
             decoder: decoder of received messages.
             take: callback for each message.
@@ -64,7 +64,7 @@ class Pipe:
         self._is_behind = False
         """Whether received messages are waiting for the event loop's next iteration."""
         self._rest = b""
-        """Unsent bytes of a message that was written in part."""
+        """Unsent bytes of a partly written message."""
         self._urgent: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._newest: dict[str, bytes] = {}
@@ -77,7 +77,7 @@ class Pipe:
 
     @property
     def is_backed_up(self) -> bool:
-        """Whether messages are posted faster than the other side reads."""
+        """Whether messages are posted faster than the other side reads them."""
         return self._is_writing
 
     def post(self, message: object, *, slot: str = "", is_urgent: bool = False) -> int:

@@ -1,4 +1,4 @@
-"""The channel to a guard in a separate process, which it starts, watches and restarts.
+"""A channel that starts, watches and restarts a guard in a separate process.
 
 Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or has
 been silent for half a second, is killed and replaced immediately. A guard that waits for processor
@@ -83,7 +83,7 @@ class PipeChannel:
 
     @property
     def pid(self) -> int:
-        """The guard's process ID; 0 without a process."""
+        """The guard's process ID; 0 if there is no process."""
         return 0 if self._process is None else self._process.pid
 
     # -- messages
@@ -198,7 +198,7 @@ class PipeChannel:
             with suppress(TimeoutError):
                 async with asyncio.timeout(_FINISH_S):
                     await self._gone.wait()
-        if self._pipe is not None:  # it did not end in time
+        if self._pipe is not None:  # the guard did not end in time
             self._pipe.close()
             self._pipe = None
         self._listener.lost("the session was closed")

@@ -17,8 +17,8 @@ __all__ = ["CAN_INHERIT", "DOOR", "GuardAcceptor", "launch", "reap", "standing"]
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can pass an open socket to another process."""
 DOOR: Final = "door:"
-"""Prefix of the command-line argument with the port, on systems where the guard connects to the
-server."""
+"""Prefix of the command-line argument that contains the port, on systems where the guard connects
+to the server."""
 TOKEN_BYTES: Final = 64
 _LOOPBACK: Final = "127.0.0.1"
 _ADMIT_S: Final = 10.0
@@ -74,7 +74,7 @@ class GuardAcceptor:
         return hmac.compare_digest(said, self.token)
 
     def close(self) -> None:
-        """Close the port. A second call of this method does nothing."""
+        """Close the port; a second call does nothing."""
         self._listener.close()
 
 
@@ -104,7 +104,7 @@ def _visitor() -> tuple["subprocess.Popen[bytes]", GuardAcceptor]:
         process = _started(f"{DOOR}{door.port}", stdin=subprocess.PIPE)
         assert process.stdin is not None  # noqa: S101 - it was asked for
         with process.stdin as told:
-            told.write(door.token)  # not as an argument: every user can read those
+            told.write(door.token)  # not an argument: every user can read arguments
     except BaseException:
         door.close()
         raise

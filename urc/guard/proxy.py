@@ -20,8 +20,8 @@ __all__ = ["GuardedTransport"]
 
 _CLOSED: Final = "the connection is closed"
 START_S: Final = 60.0
-"""Maximum wait of a connection for the guard's start, in seconds. With many robots, guards start in
-turns."""
+"""Maximum time that a connection waits for the guard to start, in seconds. With many robots, guards
+start in turns."""
 _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4
@@ -46,7 +46,7 @@ class _Sent:
     """Future of the caller that waits for this data, or None."""
     counted: CountedFrame | None
     left: Callable[[Payload], None] | None
-    """Callback for the data that was handed to the transport, or None."""
+    """Callback that receives the data handed to the transport, or None."""
 
 
 class GuardedTransport:
@@ -60,15 +60,15 @@ class GuardedTransport:
         ready: Callable[[], Awaitable[None]],
         stands: Stands,
     ) -> None:
-        """Prepare.
+        """Create the proxy.
 
         Args:
             name: the transport's name.
             address: the robot's address, for display.
             post: function that sends a message to the guard without waiting.
             ready: function that waits until a guard is ready.
-            stands: callback with the transport's counters, and whether all frames with counters are
-                sent.
+            stands: callback that receives the transport's counters, and whether all frames with
+                counters are sent.
         """
         self._stands = stands
         self._name = name
@@ -78,7 +78,7 @@ class GuardedTransport:
         self._turn = 0
         self._is_open = False
         self._is_known = False
-        """Whether the guard may have unsent data for the present connection."""
+        """Whether the guard may have unsent data for the current connection."""
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
@@ -107,7 +107,7 @@ class GuardedTransport:
         """Wait for the guard, which may have to wait for its turn to start.
 
         Raises:
-            ConnectFailed: no guard has started in time.
+            ConnectFailed: no guard started in time.
         """
         try:
             async with asyncio.timeout(START_S):
@@ -209,10 +209,10 @@ class GuardedTransport:
         """Pass received data to `sink` until the connection is closed."""
         self._sink = sink
 
-    # -- messages of the guard
+    # -- messages from the guard
 
     def lost(self, reason: str) -> None:
-        """Record the guard's end, which closes every connection."""
+        """Record the end of the guard, which closes every connection."""
         self._end(reason)
         self._is_known = False
         if self._opening is not None and not self._opening.done():
@@ -321,7 +321,7 @@ class GuardedTransport:
                 again.append((sent, numbered))
                 continue
             log.warning("%s: a frame cannot be rendered with the next counter value", self._address)
-            sent.counted = sent.left = None  # settled together with the next frame that is sent
+            sent.counted = sent.left = None  # settled together with the next sent frame
         # Stops with the numbers after these frames must reach the guard before these frames.
         self._stands(self._name, said.stand, False)
         for sent, numbered in again:

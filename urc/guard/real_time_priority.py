@@ -62,7 +62,7 @@ class RealTimePriority:
     def __init__(self) -> None:
         """Create the object without requesting real-time priority."""
         self._again_s: float | None = None
-        """Time of the next request after an excessive run, in seconds; None without a pause.
+        """Time of the next request after an excessive run, in seconds; None if there is no pause.
         """
 
     def request(self) -> str:
@@ -87,7 +87,7 @@ class RealTimePriority:
 
 
 def why_not() -> str:
-    """Return the reason why a guard on this machine cannot get the priority; "" if it can."""
+    """Return why a guard on this machine cannot get real-time priority; "" if it can."""
     if os.environ.get(REAL_TIME, "").lower() == "no":
         return f"{REAL_TIME} is no"
     refusal = _ask()

@@ -60,7 +60,7 @@ class SendQueue(Generic[_Tag]):
 
         Args:
             sender: the transport.
-            clock: the time.
+            clock: the time source.
             done: callback for each frame; the arguments are the frame's tag, and the error or None.
             after: queue whose frames are sent before this queue's frames; None for no other queue.
         """
@@ -144,7 +144,7 @@ class SendQueue(Generic[_Tag]):
 
 
 def why_broken(bug: Exception) -> str:
-    """Log an unexpected error of a transport; return an error message for people."""
+    """Log an unexpected error from a transport; return an error message for people."""
     log.error("a transport failed in an unexpected way", exc_info=bug)
     return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"
 
@@ -152,9 +152,9 @@ def why_broken(bug: Exception) -> str:
 def tolerant(
     call: Callable[_P, _R], instead: _R, failed: Callable[[str], None]
 ) -> Callable[_P, _R]:
-    """Return `call` without exceptions: a failure is passed to `failed`, and `instead` returned.
+    """Return `call`, wrapped so that a failure calls `failed` and returns `instead`.
 
-    A third-party transport may raise anything. An exception must not end the timer of a lease.
+    A third-party transport may raise anything. An exception must not end a lease's timer.
     """
 
     def tried(*args: _P.args, **kwargs: _P.kwargs) -> _R:

@@ -21,10 +21,10 @@ it sees, so the number of processors alone is no limit."""
 
 
 class StartTurns:
-    """The starting guards, and those that wait for their turn, oldest first."""
+    """The guards that are starting, and the guards waiting for their turn, oldest first."""
 
     def __init__(self, at_once: int) -> None:
-        """Begin without starts.
+        """Begin with no guards.
 
         Args:
             at_once: maximum number of guards that start at the same time.
@@ -63,7 +63,7 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, StartTurns] = WeakKeyDictio
 
 
 def start_turns() -> StartTurns:
-    """Return the turns of the running event loop: one for each processor but one, at most four.
+    """Return the running event loop's turns: one for every processor except one, at most four.
 
     The remaining processor serves the driven robots.
     """

@@ -41,7 +41,7 @@ WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
 class Extent(NamedTuple):
-    """The size of a text in bytes, or the length of an array in items."""
+    """The size of text in bytes, or the length of an array in items."""
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0

@@ -1,4 +1,4 @@
-"""Maps a widget's output values to a command's arguments. Pure.
+"""The mapping of a widget's output values to a command's arguments. Pure.
 
 The loader and the dashboard both call `targets`, so both map output values in the same way.
 """

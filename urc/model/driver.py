@@ -1,4 +1,4 @@
-"""Driver of one kind of robot: transports, signals, commands, messages and polls."""
+"""The driver for one kind of robot: transports, signals, commands, messages and polls."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
@@ -46,10 +46,10 @@ class Timeouts(NamedTuple):
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Idle time before the connection is closed, in seconds; None means never."""
+    """Idle time after which the connection is closed, in seconds; None means never."""
     on_connect_s: float | None = None
-    """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the
-    timeouts of the steps apply."""
+    """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the steps'
+    own timeouts apply."""
 
 
 class Backoff(NamedTuple):
@@ -84,7 +84,8 @@ class TransportSpec(NamedTuple):
     on_close: tuple[Step, ...] = ()
     """Steps that run before the connection is closed in an orderly way."""
     stale_after_s: float | None = None
-    """Time without received data before the connection is stale, in seconds; None means never."""
+    """Time without received data after which the connection is stale, in seconds; None means
+    never."""
     tunnel: str = ""
     """Name of the transport that tunnels this connection; "" means no tunnel."""
     is_half_duplex: bool = False
@@ -194,11 +195,11 @@ class Command(NamedTuple):
     description: str = ""
     priority: Priority = "normal"
     is_latest_only: bool = False
-    """Whether a new call of the command replaces a queued one."""
+    """Whether a new call of the command replaces a queued call."""
     rate_per_s: float | None = None
     """Average rate limit in calls per second, with bursts of two calls; None means unlimited."""
     is_idempotent: bool = False
-    """Whether repeating the command has the same effect as sending the command once."""
+    """Whether repeating the command has the same effect as sending it once."""
     retries: int = 0
     """Maximum number of retries after a timeout of an idempotent command, or at the robot's
     request. The value 0 means `RESENDS` if the robot may request retransmissions."""
@@ -250,8 +251,8 @@ class Poll(NamedTuple):
     arguments: Mapping[str, Reading] = NOTHING
     """Arguments of the command in `run`, including defaults."""
     when: Template | None = None
-    """Condition for sending the request, using fresh signals and settings; None means that the poll
-    always sends."""
+    """Condition for sending the request, using fresh signals and settings; None means that the
+    request is always sent."""
     priority: Priority = "low"
     offline: Offline | None = None
 

@@ -68,7 +68,8 @@ class ErrorReply(NamedTuple):
 
     read: ReadSpec
     text: Template | None = None
-    """Message for the operator, a template using the reply fields; None means the raw reply."""
+    """Template for the message to the operator, using the reply fields; None means the raw
+    reply."""
 
 
 class ProvisionalReplies(NamedTuple):

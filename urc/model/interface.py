@@ -28,7 +28,7 @@ class WidgetUse(NamedTuple):
 
     slot: str
     widget: str
-    """Name of the widget, equal to the name of its folder."""
+    """Name of the widget, which is also the name of its folder."""
     inputs: Mapping[str, str] = NOTHING
     """Driver signals, keyed by widget input."""
     outputs: Mapping[str, str] = NOTHING

@@ -159,7 +159,7 @@ class ReadSpec(NamedTuple):
     every frame with the fields matches."""
     lines: int | Pattern | None = None
     """Number of frames in the reply, or a pattern that only the last frame matches. The reader
-    receives the frames of a reply as one text, joined by LF."""
+    receives the frames of a reply as one string, joined by LF."""
     topic: Template | None = None
     """Template for the source topic, which can use settings; only on message transports. None means
     any topic."""
@@ -169,7 +169,8 @@ class ReadSpec(NamedTuple):
     head: Mapping[str, str] = NOTHING
     """Lower-case names of HTTP response headers, or ``status``, keyed by field."""
     listen: Mapping[str, Value] = NOTHING
-    """Subscription options of `topic`, such as type, throttle in seconds and quality of service."""
+    """Subscription options for `topic`, such as type, throttle in seconds and quality of
+    service."""
 
 
 class WriteSpec(NamedTuple):

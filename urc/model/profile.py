@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Setting(NamedTuple):
-    """A robot's value, which the operator fills in on a page or sets with ``--set``."""
+    """A value of one robot, which the operator fills in on a page or sets with ``--set``."""
 
     name: str
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
@@ -89,7 +89,7 @@ class DialogueStep(NamedTuple):
     line: int = 1
     """Line of the step in the document, 1-based."""
     column: int = 1
-    """1-based."""
+    """Column of the step in the document, 1-based."""
     source: str = ""
     """Source line of the step in the document, for error messages."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
@@ -141,7 +141,7 @@ class DocumentTest(NamedTuple):
     file: str = ""
     """Path of the document file."""
     column: int = 1
-    """1-based."""
+    """Column of the test in the document, 1-based."""
     source: str = ""
     """Source line of the test in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
@@ -174,7 +174,7 @@ class Reaction(NamedTuple):
 
 
 class SimulatorRule(NamedTuple):
-    """A rule of the emulated robot, for matching frames or at fixed intervals."""
+    """A rule of the emulated robot, which applies to matching frames or at fixed intervals."""
 
     transport: str
     match: Pattern | ReadSpec | None = None

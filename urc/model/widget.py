@@ -50,7 +50,7 @@ class Widget(NamedTuple):
     """A widget, as declared in its ``widget.yaml``."""
 
     name: str
-    """Name of the widget, equal to the name of its folder."""
+    """Name of the widget, which is also the name of its folder."""
     title: str
     folder: Path
     inputs: Mapping[str, WidgetPort] = NOTHING
@@ -63,7 +63,7 @@ class Widget(NamedTuple):
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
-    """Minimum number of columns and rows of the slot."""
+    """Minimum number of columns and rows in the slot."""
     footprint: Footprint = "instrument"
     is_dead_man: bool = False
     """Whether the widget is a dead-man control; while it is released, no motion is sent."""

@@ -49,12 +49,12 @@ class Freshness:
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return the reason to refuse an input, or store a valid input's number and return "".
+        """Return the reason for refusing an input, or store a valid input's number and return "".
 
         Args:
             given: the numbers sent with the input.
             epoch: epoch of the current lease.
-            now: the time.
+            now: the current time.
             of: the control. Sequence numbers are checked separately for each control.
         """
         if given.epoch != epoch:
@@ -71,10 +71,10 @@ class Freshness:
         return ""
 
     def release(self, number: int, of: str = "") -> None:
-        """Store the number of a release, so that no earlier input of this control counts again.
+        """Store the number of a release, so that earlier inputs for this control no longer count.
 
         Args:
-            number: number of the release, which shares one count with the inputs; 0 for none.
+            number: number of the release, counted together with the inputs; 0 for none.
             of: the released control.
         """
         self._newest[of] = max(number, self._newest.get(of, 0))
@@ -84,8 +84,8 @@ class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.
 
     Only the first copy of a message takes effect. A page's numbers only increase, and each
-    connection preserves their order. A message with a lower or equal number is therefore a copy or
-    outdated. A delayed tick must not reactivate a control that was released over the other
+    connection preserves their order. A message with a lower or equal number is therefore either a
+    copy or outdated. A delayed tick must not reactivate a control that was released over the other
     connection.
     """
 
@@ -93,7 +93,7 @@ class DuplicateElimination:
         self._newest: dict[str, int] = {}
 
     def accept(self, about: str, number: int) -> bool:
-        """Return whether `number` is the highest number so far for `about`, and store it if so."""
+        """Return whether `number` is the highest number so far for `about`; if so, store it."""
         if number <= self._newest.get(about, 0):
             return False
         self._newest[about] = number

@@ -34,7 +34,7 @@ LONGEST_LEASE_S: Final = 1.0
 STOP_EVERY_S: Final = 0.05
 """Interval between repeated stops on lossy connections, in seconds."""
 STOP_FOR_S: Final = 0.5
-"""Duration of the repeated stops, in seconds."""
+"""Time for which stops are repeated, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 StopReport = Reason | Literal["lost"]
@@ -105,7 +105,7 @@ class HoldToRun:
 
     @property
     def deadline(self) -> float | None:
-        """Latest time to call `due` next; None while idle."""
+        """Latest time for the next call to `due`; None while idle."""
         if self.state == "moving":
             if self._waiting is None:
                 return self._expires_at
@@ -116,7 +116,7 @@ class HoldToRun:
         """Replace the terms, but keep a pending stop. A new period resets the rate limiter.
 
         Raises:
-            ValueError: as above.
+            ValueError: the lease or the period is out of range.
         """
         fresh = HoldToRun(terms)
         if terms.period_s != self.terms.period_s:
@@ -150,7 +150,7 @@ class HoldToRun:
         self._waiting = None
 
     def stop(self, reason: Reason, now: float) -> None:
-        """Stop.
+        """Stop the motion.
 
         A release has no effect unless the control is moving. Other stops always take effect.
         """
@@ -169,7 +169,7 @@ class HoldToRun:
         """Return the frame to write now, or None if no frame is due.
 
         Args:
-            now: the time.
+            now: the current time.
             is_clear: whether all bytes on the connection have been sent. A motion frame waits for a
                 clear connection; meanwhile, newer values replace the waiting value. A stop frame
                 never waits.

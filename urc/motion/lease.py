@@ -16,7 +16,7 @@ __all__ = ["LeaseChanged", "Operator", "Lease", "LeaseState", "LeaseRefused", "W
 
 WATCHES: Final = "this page only watches"
 SILENT_S: Final = 60.0
-"""How long the holder can send no input before losing the lease, in seconds."""
+"""How long the holder can go without sending input before losing the lease, in seconds."""
 SHORTEST_REQUEST_S: Final = 3.0
 REQUEST_S: Final = 10.0
 LONGEST_REQUEST_S: Final = 60.0
@@ -26,7 +26,7 @@ class Operator(NamedTuple):
     """A person at a dashboard page."""
 
     id: str
-    """Unique while connected."""
+    """Identifier, unique while connected."""
     name: str = ""
     """Name shown to other operators."""
     role: Role | None = "drive"
@@ -64,7 +64,7 @@ class LeaseState(NamedTuple):
 
 
 class LeaseChanged(NamedTuple):
-    """The lease changed."""
+    """A change to the lease."""
 
     state: LeaseState
     must_stop: bool
@@ -96,7 +96,7 @@ class Lease:
         return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
 
     def refusal(self, client: str, epoch: int) -> str:
-        """Return the reason to refuse motion requested by `client`, or ""."""
+        """Return the reason for refusing motion requested by `client`, or ""."""
         state = self.state
         if state.latched_by:
             return self.latched
@@ -109,7 +109,7 @@ class Lease:
         return ""
 
     def interlock(self, client: Operator, stops: int | None = None) -> str:
-        """Return the reason to refuse autonomous motion, or "".
+        """Return the reason for refusing autonomous motion, or "".
 
         Autonomous motion does not need a lease, because no control is held. A latched stop or
         another operator's lease prevents autonomous motion.
@@ -205,7 +205,7 @@ class Lease:
         """Reset the latch, so that operators can drive the robot again.
 
         A reset does not start motion, and does not undo a newer STOP. `stops` is the number of
-        STOPs that `client` knew. None means the current number.
+        STOPs that `client` knew of. None means the current number.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("viewers can stop the robot, but cannot reset it")

@@ -57,11 +57,11 @@ class StallWatch:
 
     @property
     def deadline(self) -> float | None:
-        """Time at which the connection is stalled, unless the oldest bytes are sent earlier."""
+        """Time at which the connection counts as stalled unless the oldest bytes are sent first."""
         return self._marks[0][0] + self.limit_s if self._marks else None
 
     def age_s(self, now: float) -> float:
-        """Return the age of the oldest unsent bytes in seconds; 0 without unsent bytes."""
+        """Return the age of the oldest unsent bytes in seconds; 0 if no bytes are unsent."""
         return now - self._marks[0][0] if self._marks else 0.0
 
     def saw(self, unsent: int, now: float) -> bool:
@@ -83,7 +83,7 @@ class StallWatch:
         return self.age_s(now) >= self.limit_s
 
     def wrote(self, size: int, now: float) -> None:
-        """Record a write of `size` bytes; the next call of `saw` records the exact number."""
+        """Record a write of `size` bytes; the next call to `saw` records the exact number."""
         self._written += size
         self._mark(now)
 

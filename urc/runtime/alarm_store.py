@@ -67,7 +67,7 @@ class AlarmStore:
         self._thread: threading.Thread | None = None
 
     def load(self, robot: str) -> list[AlarmRecord]:
-        """Return the records of a robot; [] if the file cannot be read.
+        """Return a robot's records; [] if the file cannot be read.
 
         Only the first call reads the file, at the start of the server.
         """
@@ -91,7 +91,7 @@ class AlarmStore:
         records: Mapping[str, AlarmRecord | None],
         events: Iterable[AlarmEvent],
     ) -> None:
-        """Queue events and changed records (by signal; None: no alarm), and return immediately."""
+        """Queue events, and changed records by signal (None for no alarm); return immediately."""
         with self._wakes:
             self._records |= {(robot, signal): one for signal, one in records.items()}
             if self._known is not None:
@@ -145,7 +145,7 @@ class AlarmStore:
                 base.close()
 
     def _next_batch(self) -> tuple[_Records, list[tuple[str, AlarmEvent]]] | None:
-        """Wait for changes, and return them; None after `close`."""
+        """Wait for changes and return them; return None after `close`."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()

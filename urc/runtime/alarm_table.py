@@ -67,7 +67,7 @@ class AlarmSearchTimeout(UrcError):
 
 
 class AlarmHistoryRow(NamedTuple):
-    """One event of the history, with its number."""
+    """One event in the history, with its number."""
 
     id: int
     event: AlarmEvent

@@ -1,4 +1,4 @@
-"""The writer of the audit log, an SQLite file of motion and administration by person and right.
+"""The writer of the audit log, an SQLite file of motion and administration, with person and right.
 
 Theory of operation. `AuditLog.add` puts an entry into a short queue and returns. The call never
 waits for a disk, because motion and STOP call `add`. A separate thread writes the queued entries
@@ -101,7 +101,7 @@ class AuditLog:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
+        """Close the writer."""
         self.close()
 
     # -- the thread

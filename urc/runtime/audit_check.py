@@ -1,6 +1,6 @@
 """Check the audit log's hash chain, and export the log as JSON Lines for later checks.
 
-Layer 4. All functions block: servers call them in a thread.
+Layer 4. All functions block, so servers call them in a thread.
 
 Each exported line has the link before its entry (``before``) and the entry's own link (``chain``).
 Each line can be checked on its own, so an export for selected robots can also be checked. Lines
@@ -26,7 +26,7 @@ _AT_ONCE: Final = 500
 """Number of entries per read transaction, so that a slow download does not delay the writer."""
 _SLICE: Final = 25
 _PAUSE_S: Final = 0.001
-"""Pause after every `_SLICE` entries, in seconds; otherwise, an export would delay motion."""
+"""Pause after every `_SLICE` entries, in seconds, so that an export does not delay motion."""
 LONGEST_LINE: Final = 100_000
 """Maximum length of an export line, in characters."""
 
@@ -104,7 +104,7 @@ def exported(file: Path, robots: frozenset[str] | None = None) -> Iterator[str]:
 
 
 def line_of(row: AuditRow, before: str | None) -> str:
-    """Return one line of an export; `before` is the link before the entry, None if unknown."""
+    """Return one line of an export; `before` is the link before the entry, or None if unknown."""
     head = {"id": row.id, "version": row.version, "before": before, "chain": row.chain}
     text = json.dumps(head | row.entry._asdict(), ensure_ascii=False)
     return printable_json(text) + "\n"

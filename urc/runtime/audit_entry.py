@@ -19,12 +19,12 @@ _LONGEST_TEXT: Final = 1000
 
 
 class AuditEntry(NamedTuple):
-    """One entry. The caller must remove secrets from all texts."""
+    """One entry. The caller must remove secrets from all text."""
 
     at: float
     """UTC time of this machine's clock, in seconds since 1970."""
     robot: str
-    """Name of the robot; "" for an event of the server."""
+    """Name of the robot; "" for a server event."""
     what: str
     """Kind of event, such as ``moved``, ``STOP`` or ``signed in``."""
     who: str = ""
@@ -44,7 +44,7 @@ class AuditEntry(NamedTuple):
     outcome: str = ""
     """Result as text for display."""
     times: int = 1
-    """Number of equal events that this entry represents."""
+    """Number of identical events that this entry represents."""
     lasted_s: float = 0.0
     principal: str = ""
     """Identifier of the person, device or program; "" if not signed in."""
@@ -74,7 +74,7 @@ def shown(data: bytes, most: int = 64) -> str:
 
 
 def cleaned(entry: AuditEntry) -> AuditEntry:
-    """Return an entry that the file can store unchanged: short UTF-8 texts and finite numbers."""
+    """Return an entry that the file can store unchanged: short UTF-8 strings and finite numbers."""
     return AuditEntry._make(
         _text(one) if isinstance(one, str) else _number(one) if isinstance(one, float) else one
         for one in entry._replace(at=float(entry.at), lasted_s=float(entry.lasted_s))

@@ -1,4 +1,4 @@
-"""Audit entries of one robot: two entries per motion, instead of one per tick.
+"""Audit entries for one robot: two per motion, not one per tick.
 
 Layer 4. The module is synchronous: callers pass the current time. The functions never block and
 never raise an exception, because motion code calls them. Each motion has a start entry and an end
@@ -75,13 +75,13 @@ class AuditRecorder:
         utc: Callable[[], float],
         secrets: Iterable[str] = (),
     ) -> None:
-        """Start without motion.
+        """Begin with no motion.
 
         Args:
             robot: name of the robot.
             note: callback for each entry; it must not block.
             utc: source of UTC time, in seconds since 1970.
-            secrets: texts to redact, such as the values of secret settings.
+            secrets: strings to redact, such as the values of secret settings.
         """
         self.robot = robot
         self.is_faulty = False
@@ -99,14 +99,14 @@ class AuditRecorder:
         self._cause: Operator | None = None
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Report each entry to the taps of a session's hub too.
+        """Also report each entry to the taps of a session's hub.
 
         Passing None as the hub ends the reports.
         """
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Add texts to redact from now on."""
+        """Add strings to redact from now on."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._disguises = SecretForms(self._secrets)
@@ -142,7 +142,7 @@ class AuditRecorder:
 
     @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
-        """Record the stop of a control, with the reason for the stop."""
+        """Record a control's stop and the reason for it."""
         motion = self._motions.pop(command, None)
         if motion is None:
             return
@@ -261,7 +261,7 @@ class AuditRecorder:
         return shown(shown_bytes) if shown_bytes else ""
 
     def _hidden(self, text: str) -> str:
-        """Return a text without the secrets, including their encoded forms."""
+        """Return text without the secrets, including their encoded forms."""
         return self._disguises.hide(text)
 
 

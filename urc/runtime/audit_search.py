@@ -1,6 +1,6 @@
-"""Search in the audit log.
+"""Search the audit log.
 
-Layer 4. All functions block: servers call them in a thread. The functions read the file of an
+Layer 4. All functions block, so servers call them in a thread. The functions read the file of an
 `AuditLog`, which may be writing at the same time.
 """
 

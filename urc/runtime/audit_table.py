@@ -1,6 +1,6 @@
 """The SQLite table of the audit log: creation, migration, writing and deletion of old entries.
 
-Layer 4. In a file of an older version, missing columns are added in place. Existing rows keep
+Layer 4. In a file from an older version, missing columns are added in place. Existing rows keep
 version 1, so their links stay valid. Deleting old entries adds an entry, which contains the link of
 the last deleted entry. The chain can therefore be checked from its new start.
 """
@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 PRUNED: Final = "pruned"
-"""Kind of the entry about deleted entries."""
+"""Kind of the entry that records deleted entries."""
 FOLLOWS: Final = "SELECT id, chain FROM entries ORDER BY id DESC LIMIT 1"
 _SHARE: Final = 10
 """Divisor for the number of rows to delete from a full file: 10 deletes a tenth of the rows."""
@@ -70,8 +70,8 @@ class Retention(NamedTuple):
     most_age_s: float = 90 * 86_400.0
     """Maximum age of an entry, in seconds."""
     fewest: int = 1000
-    """Number of newest entries to keep regardless of their age. Even if the clock jumps ahead by
-    years, the whole log is therefore not deleted."""
+    """Number of newest entries to keep regardless of their age. The whole log is therefore not
+    deleted, even if the clock jumps ahead by years."""
     group: int = 100
     """Minimum number of old entries to delete at once."""
 
@@ -96,7 +96,7 @@ def connected(file: Path) -> sqlite3.Connection:
 
 
 def select(base: sqlite3.Connection) -> str:
-    """Return the start of a query for `row_of`, which also suits tables of older versions."""
+    """Return the start of a query for `row_of`, which also suits tables from older versions."""
     has = _columns(base)
     later = [name if name in has else f"'' AS {name}" for name in COLUMNS[FIRST_COLUMNS:]]
     version = "version" if is_migrated(base) else "1 AS version"
@@ -153,7 +153,7 @@ def is_migrated(base: sqlite3.Connection) -> bool:
 
 
 def _migrate(base: sqlite3.Connection) -> None:
-    """Create the table, or add the columns that a table of an older version lacks."""
+    """Create the table, or add the columns that a table from an older version lacks."""
     base.execute("BEGIN IMMEDIATE")
     try:
         if not _columns(base):

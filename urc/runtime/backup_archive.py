@@ -1,8 +1,8 @@
 """A backup archive: one private ZIP file with the permanent content of a data folder.
 
-Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files of a backup. Other
+Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Other
 names, links and large files are refused, so a foreign archive cannot write outside the data folder.
-Copies of SQLite files are consistent, even while a server writes.
+Copies of SQLite files are consistent, even while a server is writing.
 """
 
 import os
@@ -53,7 +53,7 @@ LEFT_OUT: Final = re.compile(
 MANIFEST: Final = "urc-backup.json"
 MOST_FILES: Final = 20_000
 MOST_BYTES: Final = 2_000_000_000
-"""Maximum size of all files together, in bytes."""
+"""Maximum total size of all files, in bytes."""
 _MANIFEST_BYTES: Final = 4096
 _BLOCK: Final = 1 << 20
 _END_BYTES: Final = 22
@@ -62,7 +62,7 @@ _ENTRY_BYTES: Final = 512
 _DAMAGE: Final = (
     zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, RuntimeError, OverflowError,
 )  # fmt: skip
-"""Exceptions of `zipfile` for damaged archives."""
+"""Exceptions that `zipfile` raises for damaged archives."""
 _READABLE: Final = 0o644
 _PRIVATE: Final = 0o600
 
@@ -82,7 +82,7 @@ class BackupManifest(msgspec.Struct, frozen=True):
 
 
 class BackupFile(NamedTuple):
-    """One file of an archive."""
+    """One file in an archive."""
 
     path: str
     """Path relative to the data folder, with ``/``."""
@@ -92,9 +92,9 @@ class BackupFile(NamedTuple):
 
 
 def parts_in(data: Path) -> tuple[list[str], list[str]]:
-    """Return the files of a data folder that belong to a backup, and all unknown files.
+    """Return the files in a data folder that belong in a backup, and all unknown files.
 
-    Links are unknown files.
+    Links count as unknown files.
     """
     parts: list[str] = []
     unknown: list[str] = []
@@ -153,7 +153,7 @@ def _write_parts(archive: zipfile.ZipFile, data: Path, work: Path) -> tuple[list
                     source = _copy_of_base(source, work)
                 total += _write_part(archive, _entry(path, mode), source, MOST_BYTES - total)
             except FileNotFoundError:
-                continue  # removed by the running server since
+                continue  # since removed by the running server
             written.append(path)
     return written, unknown
 
@@ -169,7 +169,7 @@ def _still(packages: Path) -> Iterator[None]:
 
 
 def _copy_of_base(source: Path, work: Path) -> Path:
-    """Return a consistent copy of an SQLite file, even while other processes write the file."""
+    """Return a consistent copy of an SQLite file, even while other processes write to it."""
     copy = work / source.name
     with (
         closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as old,
@@ -224,7 +224,7 @@ class BackupReader:
             raise BackupError(f"{name}: this is not a URC backup")
         self.manifest = self._manifest(entries[0])
         self.files = [self._checked(entry) for entry in entries[1:]]
-        """All files of the archive."""
+        """All files in the archive."""
         paths = [one.path for one in self.files]
         if len(set(map(str.casefold, paths))) != len(paths):
             raise BackupError(f"{name}: a file occurs twice")
@@ -283,7 +283,7 @@ class BackupReader:
             raise BackupError(f"{self._name}: {path!r} is not an ordinary file")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise BackupError(f"{self._name}: {path!r} uses an unknown compression method")
-        # Only files of packages may be readable to others: a changed mode must not expose a key.
+        # Only package files may be readable by others: a changed mode must not expose a key.
         allowed = _READABLE if path.startswith("packages/") else _PRIVATE
         return BackupFile(path, entry.file_size, mode & allowed | _PRIVATE)
 

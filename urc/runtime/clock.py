@@ -13,7 +13,7 @@ class Timer(Protocol):
     """A scheduled call that can be cancelled."""
 
     def cancel(self) -> None:
-        """Cancel the call; do nothing if the call was already made."""
+        """Cancel the call; do nothing if the call has already been made."""
 
 
 class Clock(Protocol):

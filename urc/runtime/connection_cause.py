@@ -114,7 +114,7 @@ def cause_of(text: str, address: str = "") -> Cause:
     """Return the cause of a failed connection.
 
     Args:
-        text: error message of the transport.
+        text: error message from the transport.
         address: target of the connection as text, such as ``tcp 10.0.0.5:6789``.
     """
     found = _known(text, address)

@@ -55,27 +55,27 @@ class _Stored(msgspec.Struct, frozen=True):
 class ContactStore:
     """The contact times of all robots of a server.
 
-    Emulated robots have their own times: `key` distinguishes them from real robots of the same
+    Emulated robots have their own times: `key` distinguishes them from real robots with the same
     name.
     """
 
     def __init__(self, file: Path | None = None) -> None:
-        """Read the file; a missing or damaged file counts as empty. None stores nothing."""
+        """Read the file; a missing or damaged file counts as empty. None means no file."""
         self._file = file
         self._times: dict[str, ContactTimes] = {}
         self._is_changed = False
         self._lock = threading.Lock()
-        """Only one thread writes the file at a time."""
+        """Lock that lets only one thread write the file at a time."""
         if file is not None:
             self._load(file)
 
     @staticmethod
     def key(robot: str, *, is_emulated: bool) -> str:
-        """Return the key of a robot in the store."""
+        """Return a robot's key in the store."""
         return f"emulated/{robot}" if is_emulated else robot
 
     def of(self, key: str) -> ContactTimes:
-        """Return the times of a robot; an unknown robot has no times."""
+        """Return a robot's times; an unknown robot has no times."""
         return self._times.get(key, NO_CONTACT)
 
     def note(self, key: str, now: float, *, is_used: bool, is_seen: bool) -> None:

@@ -27,7 +27,7 @@ class Coverage(NamedTuple):
 
 
 def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Coverage:
-    """Return the coverage of a driver by its tests."""
+    """Return how much of a driver its tests cover."""
     declared: list[Exercised] = [
         *(("command", name) for name in driver.commands),
         *(("poll", poll.name) for poll in driver.polls),
@@ -38,7 +38,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return a short text about the untested parts, or "" if everything is tested."""
+    """Return a short summary of the untested parts, or "" if everything is tested."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

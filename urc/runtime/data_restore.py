@@ -61,7 +61,7 @@ def check_target(data: Path, *, replaces: bool) -> None:
 
 
 def is_interrupted(data: Path) -> bool:
-    """Return whether a power failure interrupted the restore of a backup."""
+    """Return whether a power failure interrupted a restore."""
     return any(data.glob(_OLD))
 
 

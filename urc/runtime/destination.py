@@ -27,8 +27,8 @@ _MANNERS: Final = frozenset(
         "replies",
     )
 )
-"""Transport options that do not affect the destination. Any other option counts as part of the
-destination, including options of third-party transports."""
+"""Transport options that do not affect the destination. Any other option, including those of
+third-party transports, counts as part of the destination."""
 
 
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:

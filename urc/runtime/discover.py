@@ -1,4 +1,4 @@
-"""The topics of a rosbridge robot, and their YAML for a document."""
+"""The topics of a rosbridge robot, and the YAML that declares them in a document."""
 
 import asyncio
 import re

@@ -59,11 +59,11 @@ class PendingCommands:
 
     @property
     def is_full(self) -> bool:
-        """Whether the maximum number of pending commands is reached."""
+        """Whether the maximum number of pending commands has been reached."""
         return len(self._all) >= MAX_WAITING
 
     def add(self, request: Request, answer: asyncio.Future[Answer], now: float) -> None:
-        """Add and return the future of a request made at the time `now`."""
+        """Add the future of a request made at the time `now`."""
         name = request.command
         limit_s = self._limits_s.get(name)
         if limit_s is None:
@@ -199,7 +199,7 @@ class Dispatcher:
         sequence_control: Mapping[str, SequenceControl] = NOTHING,
         motion: Callable[[MotionEvent], None] | None = None,
     ) -> None:
-        """Create the dispatcher of an engine.
+        """Create the dispatcher for an engine.
 
         Args:
             engine: the engine, which other code must not call from now on.
@@ -360,7 +360,7 @@ class Dispatcher:
                 self._change(event)
         if samples:
             self._hub.publish(samples)
-        # After the hub, because a caller with a reply must find the readings there.
+        # After the hub, because a caller that receives a reply must find the readings there.
         for answer in answers:
             self._waiting.settle(answer)
         if is_changed:
@@ -381,8 +381,8 @@ class Dispatcher:
 
     def _arm_after(self, now: float) -> None:
         """Call `_arm` unless the timer will fire early enough."""
-        # Without this check, a text poll costs 1.32 times as much as a hand-written driver, not 1.2
-        # times (decision 30).
+        # Without this check, a text poll costs 1.32 times as much as a hand-written driver, instead
+        # of 1.2 times (decision 30).
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
 

@@ -94,7 +94,7 @@ def _problem(profile: Profile, test: DocumentTest, complaint: _Complaint) -> Pro
 def _run(
     driver: Driver, settings: Mapping[str, Value], test: DocumentTest, used: set[Exercised]
 ) -> _Complaint:
-    """Return the failure text, or "" if the test passes; add the used parts to `used`."""
+    """Return the failure message, or "" if the test passes; add the used parts to `used`."""
     used |= _asked(driver, test)
     try:
         trial = TestEngine(_narrowed(driver, test), settings, driver.polls)
@@ -260,7 +260,7 @@ def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
-    """Report a missing declared failure, and discard other events of the step."""
+    """Report a missing declared failure, and discard the step's other events."""
     failures = list(trial.failures)
     if step.of:
         ended = [one for one in trial.ended if one.command == step.of]

@@ -37,7 +37,7 @@ def start_guard_client(
     *,
     is_guarded: bool,
 ) -> GuardClient:
-    """Return the guard client of a robot, with its transports.
+    """Return a robot's guard client, with its transports.
 
     Args:
         driver: the loaded driver.
@@ -79,11 +79,11 @@ def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
-    """Return the seconds of silence after which a transport is reset during motion; None for never.
+    """Return how long a transport may be silent during motion, in seconds; None means no limit.
 
-    The result is slightly shorter than the engine's timeout, because otherwise the engine's output
-    would queue up behind the motion frames. A connectionless transport has no send buffer that a
-    reset could discard.
+    The result is slightly shorter than the engine's timeout, so that the engine's output does not
+    queue up behind the motion frames. A connectionless transport has no send buffer that a reset
+    could discard.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

@@ -76,7 +76,7 @@ class MotionBackend(Protocol):
         """Stop all motion immediately; `stops` maps each held command to its stop frame."""
 
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
-        """Wait for written or lost stop frames; return the command and the report of each frame.
+        """Wait for written or lost stop frames; return the command and the report for each frame.
 
         The returned list is in order and never empty. Cancelling the wait loses no stop. After the
         transport has accepted the stop frame, a control that was stopped by `stop` is reported as
@@ -154,7 +154,7 @@ class HeldControl:
 
 
 def control_of(driver: Driver, command: Command) -> HeldControl:
-    """Return the initial state, at rest, of one of the held commands of `driver`."""
+    """Return the initial state, at rest, for a held command of `driver`."""
     hold = command.hold
     assert hold is not None  # noqa: S101 - callers pass only held commands
     slew, defaults = None, {}

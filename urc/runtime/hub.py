@@ -82,7 +82,7 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return, for each signal in `names`, the sequence number of its oldest reading there."""
+        """Return, by signal, the sequence number of each signal's oldest reading in `names`."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
@@ -91,7 +91,7 @@ LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 """In the state ``idle``, no connection has been requested yet. In the state ``silent``, the link is
 connected, but data is overdue. In the state ``lost``, the link is not connected."""
 NOTHING_YET: Final = "connected; nothing received yet"
-"""Detail of a connecting link whose login has ended, and which awaits the robot's first data."""
+"""Detail of a connecting link whose login has ended and that awaits the robot's first data."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
@@ -106,7 +106,7 @@ class LinkStatus:
     state: LinkState
     address: str
     since_s: float
-    """Monotonic time at which the present state began, in seconds."""
+    """Monotonic time at which the current state began, in seconds."""
     detail: str = ""
     """Reason for an abnormal state, in one line."""
     attempts: int = 0
@@ -144,7 +144,7 @@ class Traffic:
     direction: Literal["sent", "received"]
     data: bytes
     envelope: Envelope | None = None
-    """On a transport with messages, the message to which the bytes belong."""
+    """Message to which the bytes belong, on a transport that carries messages."""
 
 
 class HubSubscription:
@@ -213,7 +213,7 @@ class EventTap:
 
     def __init__(self) -> None:
         self.dropped = 0
-        """Number of events lost because the reader was too slow, since the tap was opened."""
+        """Number of events lost since the tap was opened, because the reader was too slow."""
         self._kept: deque[Tapped] = deque()
         self._event = asyncio.Event()
 
@@ -248,7 +248,7 @@ class Hub:
         redactor: Redactor | None = None,
         streams: Iterable[str] = (),
     ) -> None:
-        """Start without values.
+        """Begin with no values.
 
         Args:
             signals: the driver's signals.

@@ -23,7 +23,7 @@ TOTAL_S: Final = 60.0
 PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.isolation")
-"""Command-line arguments of Python; ``-P`` prevents imports from the working folder."""
+"""Command-line arguments for Python; ``-P`` prevents imports from the working folder."""
 _ANSWER_BYTES: Final = 16 << 20
 
 
@@ -40,8 +40,8 @@ def look_apart(
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: the document refers to a file outside the folder, or exceeds the limits of memory
-            or time.
+        UrcError: the document refers to a file outside the folder, or exceeds the memory or time
+            limit.
     """
     asked = json.dumps([str(document), str(folder), list(widgets)])
     command = [sys.executable, *COMMAND]

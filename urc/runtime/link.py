@@ -8,9 +8,9 @@ connection. Every connection ends through `_end`, and only `_serve` stops the re
 
 A connection counts as good after its first valid frame, and only a good connection resets the
 backoff. URC therefore does not flood a robot that accepts every connection and then closes it. If
-there are ``on_connect`` steps, frames do not count until these are done, because a robot may refuse
-the login after a greeting. Pages show the `LinkState`. During failed attempts, only the number of
-attempts in the `LinkState` changes.
+there are ``on_connect`` steps, frames do not count until the steps are done, because a robot may
+refuse the login after a greeting. Pages show the `LinkStatus`. During failed attempts, only its
+number of attempts changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
@@ -43,7 +43,7 @@ from urc.transports.base import (
 __all__ = ["Link"]
 
 SLICE_BYTES = 4096
-"""Maximum number of bytes that the engine processes before other tasks of the loop run."""
+"""Maximum number of bytes that the engine processes before the loop's other tasks run."""
 SLICE_S = 0.001
 """Maximum time that the engine can process bytes before other tasks run, in seconds; a slower
 engine gets fewer bytes."""
@@ -113,7 +113,7 @@ class Link:
         self._hurried_s = float("-inf")
         """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """Future for the reason why the connection ended; None if there is no connection."""
+        """Future for the reason that the connection ended; None if there is no connection."""
         self._forget_connection()
         self._is_overdue = False
         """Whether the robot has been silent since the last request."""
@@ -166,7 +166,7 @@ class Link:
         if self._ended is None:
             return
         # Recorded even after the end of the connection, because the engine has already removed the
-        # connection and must not receive its end.
+        # connection and must not be told that it ended.
         self._close_reason = reason
         if reason:
             self._end(reason)
@@ -265,7 +265,7 @@ class Link:
                 alarm.cancel()
 
     async def _connection(self) -> None:
-        """Make one connection attempt; on success, serve the connection until its end."""
+        """Make one connection attempt; on success, serve the connection until it ends."""
         if self._report.state == "idle":
             self._report.show("connecting")
             self.publish()
@@ -297,7 +297,7 @@ class Link:
         return ""
 
     async def _serve(self) -> None:
-        """Serve the open connection until its end, then set the state."""
+        """Serve the open connection until it ends, then set the state."""
         self._ended = asyncio.get_running_loop().create_future()
         self._forget_connection()
         transport, prompt = self._transport, None
@@ -360,7 +360,8 @@ class Link:
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff
-        # The exponent is limited, because after a night of attempts, 2 ** attempts exceeds a float.
+        # The exponent is limited, because 2 ** attempts would overflow a float after a night of
+        # attempts.
         doublings = min(self._report.attempts - 1, 30)
         wait_s = min(backoff.max_s, backoff.initial_s * 2**doublings)
         self._retry_s = self._clock.now() + wait_s * (1 - backoff.jitter * self._random())
@@ -474,7 +475,7 @@ class Link:
             self._report.show("live")
 
     def _check_idle(self) -> float | None:
-        """Close a connection that was silent for too long, or else return the remaining time."""
+        """Close a connection that has been silent too long, or else return the remaining time."""
         limit_s = self._spec.timeouts.idle_s or 0.0
         left_s = self._heard_s + limit_s - self._clock.now()
         if left_s > 0:
@@ -483,6 +484,6 @@ class Link:
         return None
 
     def _mistake(self, bug: Exception) -> str:
-        """Log an unexpected exception of a transport; return the message for the operator."""
+        """Log an unexpected exception from a transport; return the message for the operator."""
         log.error("%s failed in an unexpected way", self._transport.address, exc_info=bug)
         return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"

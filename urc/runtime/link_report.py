@@ -106,7 +106,7 @@ class LinkReport:
         self.log("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def log(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
-        """Add a log entry, within the rate limit of its kind."""
+        """Add a log entry, within the rate limit for its kind."""
         untold = self._limiter.admit(kind)
         if untold is None:
             return

@@ -1,7 +1,7 @@
 """Detect host names of this machine or of a device attached to it.
 
-A package with a fixed local host would connect to local programs of the person who installs it. A
-package may therefore address this machine only through a setting.
+A package with a fixed local host would connect to programs on the computer of the person who
+installs it. A package may therefore address this machine only through a setting.
 """
 
 import ipaddress
@@ -40,7 +40,7 @@ def is_near(host: str) -> bool:
 
 
 def check_hosts(profile: Profile) -> None:
-    """Raise `UrcError` if a package's document contains this machine as a fixed host."""
+    """Raise `UrcError` if a package's document names this machine as a fixed host."""
     for spec in profile.driver.transports.values():
         if spec.tunnel or spec.options.get("mode") == "listen":
             continue  # resolved on another machine, or the robot connects to URC

@@ -1,4 +1,4 @@
-"""A watchdog for the event loop, because a blocked loop delays all work of this process.
+"""A watchdog for the event loop, because a blocked loop delays all work in this process.
 
 If the loop is blocked, the guard stops motion when the lease expires. The watchdog detects, counts
 and reports each delay. After a long delay, operators must start a new gesture.
@@ -27,12 +27,12 @@ class LoopWatchdog:
     """A periodic check for a blocked event loop."""
 
     def __init__(self, clock: Clock, late: Callable[[float, bool], None]) -> None:
-        """Prepare.
+        """Create the watchdog.
 
         Args:
             clock: source of time.
-            late: callback with each counted delay in seconds, and with whether it is the first of a
-                series.
+            late: callback that receives each counted delay in seconds, and whether it is the first
+                of a series.
         """
         self._clock = clock
         self._late = late

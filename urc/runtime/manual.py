@@ -348,7 +348,7 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str
 
 
 def _plain(text: str) -> str:
-    """Return text from a document with escaped Markdown characters."""
+    """Return text from a document, with Markdown characters escaped."""
     return printable(" ".join(text.split())).translate(_MARKUP)
 
 

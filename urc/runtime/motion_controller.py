@@ -9,7 +9,7 @@ frame, so that a stop needs neither the engine nor the document.
 If a control stops without a release, it stays disarmed until its page sends a release. A stick that
 is still held after a reconnection does not move the robot.
 
-A controller outlives the sessions of its robot, because the latch persists while the robot is
+A controller outlives its robot's sessions, because the latch persists while the robot is
 disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
 
 This module is synchronous: callers pass the current time. The backend reports each written stop by
@@ -84,15 +84,15 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._due: set[str] = set()
-        """Held commands whose stops no backend has, or has sent too early."""
+        """Held commands whose stop no backend has, or whose stop was sent too early."""
         self._ended: MotionBackend | None = None
         """Backend of the previous session, which may deliver its stops while it ends."""
         self.on_change: Callable[[LeaseState], None] = _ignore
-        """Callback after each change of the lease, and after a stop is confirmed."""
+        """Callback after each change to the lease, and after a stop is confirmed."""
         self.on_moved: Moved = _unseen
         """Callback for each tick passed to the backend; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
-        """Callback with the control and the message when the robot refuses to move."""
+        """Callback that receives the control and the message when the robot refuses to move."""
 
     @property
     def can_move(self) -> bool:
@@ -197,7 +197,7 @@ class MotionController:
         self._screens[client.id] = _Screen(client)
 
     def change(self, client: Operator) -> None:
-        """Replace the rights of a page; if it may not drive, its lease and its motion end."""
+        """Replace a page's rights; if the page may not drive, its lease and its motion end."""
         screen = self._screens.get(client.id)
         if screen is None:
             return
@@ -226,7 +226,7 @@ class MotionController:
     ) -> str:
         """Apply a page's lease request; return the reason for a refusal, or "".
 
-        `stops` is the number of STOPs that the page knew at a reset; see `Lease.reset`.
+        `stops` is the number of STOPs that the page knew of at a reset; see `Lease.reset`.
         """
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
@@ -276,7 +276,7 @@ class MotionController:
         return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 
     def expire(self, now: float) -> None:
-        """Apply the timeouts of the lease."""
+        """Apply the lease's timeouts."""
         self._settle(self.lease.expire(now))
 
     # -- motion
@@ -345,7 +345,8 @@ class MotionController:
     def release(self, client: str, command: str, number: int = 0) -> None:
         """Handle the release of a control; only its holder may release it.
 
-        `number` is the number of the release: ticks with lower numbers no longer count; 0 for none.
+        `number` is the number of the release, or 0 for none. Ticks with lower numbers no longer
+        count.
         """
         holder = self.lease.state.holder
         control = self._controls.get(command)
@@ -390,7 +391,7 @@ class MotionController:
         if reason == "lost":
             self._lose_stop(command, control)
             return
-        if control.motion_state == "ending":  # otherwise, it already moves again
+        if control.motion_state == "ending":  # otherwise, it is already moving again
             control.motion_state = "rest"
         if reason not in ("released", "stopped"):
             self._close(control, _CUT if reason == "revoked" else LET_GO)
@@ -403,7 +404,7 @@ class MotionController:
     def _lose_stop(self, command: str, control: HeldControl) -> None:
         """Record that a written stop may not have reached the robot; the backend writes it again.
 
-        While STOP is latched, it is no longer confirmed.
+        A latched STOP is then no longer confirmed.
         """
         if control.motion_state == "rest":
             control.motion_state = "ending"

@@ -37,7 +37,7 @@ class MotionInterlock:
         Args:
             data: data folder of URC.
             robot: name of the profile.
-            clock: monotonic seconds.
+            clock: source of monotonic time, in seconds.
         """
         self._data = data
         self._robot = robot
@@ -49,7 +49,7 @@ class MotionInterlock:
         self._ask_s = float("-inf")
         self._driven = ""
         self.why = ""
-        """Reason for refusing motion at the last call of `check`; "" if motion is allowed."""
+        """Reason for refusing motion at the last call to `check`; "" if motion is allowed."""
 
     async def check(self) -> str:
         """Read the interlocks, update `why`, and return its value."""

@@ -144,7 +144,7 @@ class OneShotCommands:
         return role_refusal(client, known.role if known is not None else "drive")
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return the reason for refusing to control a sequence.
+        """Return the reason for refusing control of a sequence.
 
         Any operator may pause or end a sequence.
         """

@@ -22,7 +22,8 @@ MAX_QUEUED_BYTES = 262_144
 """Maximum size of the buffer, in bytes; beyond it, the connection is closed with a message.
 """
 STUCK_S = 5.0
-"""How long the robot can accept no bytes before the connection counts as stalled, in seconds."""
+"""How long the robot can go without accepting bytes before the connection counts as stalled, in
+seconds."""
 
 
 class _BufferedOutput(NamedTuple):
@@ -89,7 +90,7 @@ class OutputBuffer:
         self._bytes = 0
         self._has_some = asyncio.Event()
         self._is_idle = False
-        """Whether the writer waits for data."""
+        """Whether the writer is waiting for data."""
 
     @property
     def is_full(self) -> bool:
@@ -142,7 +143,7 @@ class OutputBuffer:
         return True
 
     def _left(self, item: _BufferedOutput, data: Payload) -> None:
-        """Report a frame as sent, because its counters may differ from the rendered frame."""
+        """Report the frame that was sent; its counters may differ from the rendered frame's."""
         self._report.saw("sent", data if item.shown is item.data else item.shown)
 
     def wake(self) -> None:

@@ -28,7 +28,7 @@ _FAULT_LONGEST: Final = 500
 
 
 def examine(document: Path) -> list[str]:
-    """Return the errors of a package's document, one line per error.
+    """Return the errors in a package's document, one line per error.
 
     Args:
         document: path of the document, such as ``TOP/drivers/puppet/driver.yaml``; ``TOP`` also
@@ -69,11 +69,11 @@ def problems(document: Path) -> list[Problem]:
 
 
 def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
-    """Return the errors of a third-party document, found by a separate process with limits.
+    """Return the errors in a third-party document, found by a separate process with limits.
 
     Args:
         document: path of the document, as for `examine`.
-        total_s: maximum time of the process, in seconds.
+        total_s: maximum time for the process, in seconds.
     """
     command = [sys.executable, "-P", "-m", "urc.runtime.package_check", str(document)]
     try:

@@ -27,7 +27,7 @@ __all__ = ["PackagePreview", "look", "permissions", "risks_of"]
 
 
 def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
-    """Return the permissions of a package, one per line.
+    """Return a package's permissions, one per line.
 
     Args:
         document: the document of the package.
@@ -39,7 +39,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
         UrcError: the document refers to a file outside the folder.
     """
     checked = check(document, built_in_catalog(), widget_folder_of(document))
-    _check_inside(checked, folder)  # first, because a problem would show a line of an outside file
+    _check_inside(checked, folder)  # first, because a problem would show a line in an outside file
     errors = [problem for problem in checked.problems if problem.severity == "error"]
     if errors:
         raise ProblemsError(errors)
@@ -240,7 +240,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
     risks = risks_of(checked.profile)
     text = resolve(str(document), registry, checked.profile).text
     data = parse_document(text.encode(), "resolved").data
-    assert isinstance(data, dict)  # noqa: S101 (a document that was loaded is a mapping)
+    assert isinstance(data, dict)  # noqa: S101 (a loaded document is a mapping)
     wire = {key: value for key, value in data.items() if key not in _NOT_WIRE}
     return PackagePreview(allowed, dict(_flat(wire, "")), risks)
 

@@ -21,7 +21,7 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""Maximum duration of a test of any driver, in seconds, not including the orderly close."""
+"""Maximum duration of a test for any driver, in seconds, excluding the orderly close."""
 _ANSWER_S: Final = 4.0
 """Time within which a connected robot must send a frame, in seconds."""
 _FIRST_S: Final = 1.0
@@ -38,7 +38,7 @@ class ProbeResult(NamedTuple):
     transport: str
     type: str
     address: str
-    """Address for people."""
+    """Address for display."""
     verdict: Verdict
     """The result ``answers`` means that the transport is live. The result ``opens`` means that it
     is connected but the robot sends no data, and ``fails`` means that there is no connection."""
@@ -104,7 +104,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
     """Return whether the test result of a transport is final.
 
     Args:
-        status: present state of the transport.
+        status: current state of the transport.
         since_s: time since the start of the test, in seconds.
         connected_s: time since the connection opened, in seconds; 0 before it opens.
     """

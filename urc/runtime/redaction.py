@@ -53,7 +53,7 @@ def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
 
 
 class Redactor:
-    """A filter that replaces secrets in frames, texts and streams."""
+    """A filter that replaces secrets in frames, text and streams."""
 
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
         """Prepare the redaction of `secrets` in the given encodings; empty secrets are ignored."""
@@ -71,8 +71,8 @@ class Redactor:
             for text in texts
             if len(text.encode("utf-8", "replace")) < _SHORTEST
         )
-        """Short secrets, which are redacted only as whole words in text; otherwise, most texts
-        would be unreadable."""
+        """Short secrets, which are redacted only as whole words in text; otherwise, most text would
+        be unreadable."""
         self._numbers = frozenset(
             int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
         )
@@ -80,7 +80,7 @@ class Redactor:
 
     @classmethod
     def of(cls, profile: Profile, settings: Mapping[str, Value]) -> "Redactor":
-        """Return the redactor for the secret settings of a robot."""
+        """Return the redactor for a robot's secret settings."""
         secrets = secret_texts(profile, settings)
         encodings = (spec.encoding for spec in profile.driver.transports.values())
         return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
@@ -100,7 +100,7 @@ class Redactor:
         return data
 
     def text(self, text: str) -> str:
-        """Return the redacted form of a text, which may end with a truncated secret."""
+        """Return the redacted form of `text`, which may end with a truncated secret."""
         if not self._all:
             return text
         if any(word.search(text) for word in self._short):
@@ -180,7 +180,7 @@ def _base64(secret: bytes) -> list[bytes]:
 
 
 def _without_cut(secret: bytes, shown: bytes) -> bytes:
-    """Return `text` without a truncated secret at the end or before a quotation mark."""
+    """Return `shown` without a truncated secret at the end or before a quotation mark."""
     at = shown.find(secret[:_SHORTEST_PART])
     while at >= 0 and len(secret) > _SHORTEST_PART:
         size = _SHORTEST_PART

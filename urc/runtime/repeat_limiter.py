@@ -1,7 +1,7 @@
-"""Limit the entries about a repeated event to one entry per second, which contains a count.
+"""Limit the entries for a repeated event to one per second, with a count.
 
-Layer 4. Pure. A token bucket limits the entries about all events together. Hostile visitors with
-many addresses therefore cannot push older entries out of the log.
+Layer 4. Pure. A token bucket limits the entries for all events combined. Hostile visitors with many
+addresses therefore cannot push older entries out of the log.
 """
 
 from collections.abc import Hashable, Iterator
@@ -27,7 +27,7 @@ class RepeatLimiter(Generic[_Key]):
     """A counter for repeated events that do not have an entry yet."""
 
     def __init__(self, burst: int = 16, per_s: float = 16.0) -> None:
-        """Start without events.
+        """Begin with no events.
 
         Args:
             burst: maximum number of entries at once.
@@ -48,7 +48,7 @@ class RepeatLimiter(Generic[_Key]):
         """Count an event; return the count for an entry, or 0 if no entry may be written now.
 
         Args:
-            key: the kind of event; equal events are counted together.
+            key: the kind of event; identical events are counted together.
             now: monotonic time in seconds.
         """
         known = self._known.get(key)

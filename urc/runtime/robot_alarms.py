@@ -1,4 +1,4 @@
-"""The alarms of one robot, which are detected from its hub's samples, stored and announced.
+"""One robot's alarms, which are detected from its hub's samples, stored and announced.
 
 Layer 4. Each sample includes its alarm, so a sample costs one comparison, and only changes are
 processed. The object belongs to a robot, not to a session. If there is no session, all values are
@@ -30,7 +30,7 @@ LOOK_S: Final = 1.0
 FIRST_VALUES_S: Final = 5.0
 """How long an alarm waits for the first values of its `suppressed_when`, in seconds."""
 LOST_S: Final = 30.0
-"""How long a monitored robot's connection must be lost to cause an alarm, in seconds."""
+"""How long a monitored robot's connection must stay lost to cause an alarm, in seconds."""
 CONNECTION: Final = Signal(
     "connection",
     "string",
@@ -48,7 +48,7 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""URC's own alarm about a monitored robot, which prevents a silent robot from seeming to work."""
+"""URC's own alarm for a monitored robot, so that a silent robot does not seem to work."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 
@@ -59,7 +59,7 @@ class AlarmMemory(Protocol):
     """The store of all robots' alarms; see `urc.runtime.alarm_store.AlarmStore`."""
 
     def load(self, robot: str) -> list[AlarmRecord]:
-        """Return the stored records of a robot."""
+        """Return a robot's stored records."""
 
     def save(
         self,
@@ -99,7 +99,7 @@ class RobotAlarms:
             clock: the clock of the readings.
             utc: source of UTC time, in seconds since 1970.
             key: name of the robot in the store.
-            memory: the store; None stores nothing.
+            memory: the store; None means that nothing is stored.
             is_monitored: whether the robot stays connected for its alarms; if so, a lost connection
                 also causes an alarm.
         """
@@ -109,7 +109,7 @@ class RobotAlarms:
         """Name of the robot in the store."""
         self.memory = memory
         self.on_change: Callable[[], None] = _nothing
-        """Callback after each change of the list, on the event loop."""
+        """Callback after each change to the list, on the event loop."""
         self.on_events: Callable[[Sequence[AlarmEvent]], None] = _nothing_of
         """Callback for new events in the history, on the event loop."""
         self._hub: Hub | None = None
@@ -165,12 +165,12 @@ class RobotAlarms:
     # The session
 
     def start(self) -> None:
-        """Begin to make scheduled changes; call this method on the event loop."""
+        """Start making scheduled changes; call this method on the event loop."""
         if self._timer is None and (self._limits or self.list.records):
             self._timer = PeriodicTimer(self._clock, LOOK_S, self._check)
 
     def stop(self) -> None:
-        """End scheduled changes."""
+        """Stop making scheduled changes."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -203,7 +203,7 @@ class RobotAlarms:
         """Update the suppression, and then process the samples whose alarm has changed."""
         if self._inputs:
             self._update_inputs(samples)
-        # Most samples end at this comparison, so it avoids calls and field names. Alarms from
+        # Most samples need only this comparison, so it avoids calls and field names. Alarms from
         # limits have no condition here. Several alarm states can share one alarm, so their samples
         # are processed.
         seen = self._seen

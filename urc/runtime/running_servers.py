@@ -27,14 +27,14 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A dashboard that is running, or was running during a power failure."""
+    """A dashboard that is running, or was running when the power failed."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""
     key: str
     """Start key."""
     pid: int
-    """Process id."""
+    """Process ID."""
     public: str = ""
     """Base address for other devices; "" if the server accepts clients on this machine only."""
     certificate: str = ""
@@ -44,7 +44,7 @@ class RunningServer(NamedTuple):
 
 
 def headers(server: RunningServer) -> dict[str, str]:
-    """Return the HTTP headers of a program's requests to `server`."""
+    """Return the HTTP headers for a program's requests to `server`."""
     return {"authorization": f"Bearer {server.key}"}
 
 
@@ -53,7 +53,7 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
 
     Args:
         server: the server.
-        timeout_s: time limit of each step, in seconds.
+        timeout_s: time limit for each step, in seconds.
 
     Raises:
         OSError: the certificate file cannot be read.
@@ -68,7 +68,7 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
 class _Verified(HTTPSConnection):
     """A connection that trusts one certificate, and expects one name in the server's certificate.
 
-    An operator's own certificate may not include the server's listening address.
+    An operator's own certificate might not include the server's listening address.
     """
 
     def __init__(
@@ -90,11 +90,11 @@ class _Verified(HTTPSConnection):
 
 @contextmanager
 def announced(data: Path, name: str, server: RunningServer) -> Iterator[None]:
-    """Announce `server` to other programs of the user while the context is open.
+    """Announce `server` to the user's other programs while the context is open.
 
     Args:
         data: URC's data folder.
-        name: unique name of the server, used as file name.
+        name: unique name of the server, used as the file name.
         server: the server.
 
     Raises:

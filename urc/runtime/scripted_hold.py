@@ -1,4 +1,4 @@
-"""Run a held command from a script for a limited time, under the normal rules of motion.
+"""Run a held command from a script for a limited time, under the normal motion rules.
 
 The script does not sample input, but renews the lease with regular ticks. If the script hangs, is
 killed or loses its connection, the lease expires, and the guard writes the stop.

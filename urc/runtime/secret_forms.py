@@ -15,11 +15,10 @@ _LONGEST = 4096
 
 
 class SecretForms:
-    """Searches for secrets in plain text and in JSON, URL, hex and base64 encoding.
+    """A search for secrets in plain text and in JSON, URL, hex and base64 encodings.
 
-    A secret in base64 may be part of a longer text, such as ``user:password`` in a header. In
-    base64, the whole encoded text is hidden, because neighbouring bytes change the first and last
-    letters.
+    A secret in base64 may be part of longer text, such as ``user:password`` in a header. In base64,
+    the whole encoded text is hidden, because neighbouring bytes change the first and last letters.
     """
 
     def __init__(self, secrets: Iterable[str] = ()) -> None:

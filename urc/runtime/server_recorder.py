@@ -1,6 +1,6 @@
-"""Audit entries of one server: sign-ins, people, settings, packages, recordings, start and end.
+"""Audit entries for one server: sign-ins, people, settings, packages, recordings, start and end.
 
-Layer 4. Sign-ins and STOP call the methods, so the methods are thread-safe, never block and never
+Layer 4. Sign-ins and STOP call these methods, which are therefore thread-safe and never block or
 raise an exception. Failed sign-ins and STOPs by unknown visitors are combined into one entry per
 second and address, with a count.
 
@@ -30,8 +30,8 @@ CLOCK_JUMP_S: Final = 5.0
 _BURST: Final = 60
 """Maximum number of entries about unknown visitors in one burst."""
 _PER_S: Final = 0.1
-"""Rate of entries about unknown visitors during a long attack: in a day, they use 3 MB of the log's
-100 MB."""
+"""Rate of entries about unknown visitors during a long attack: these entries use 3 MB of the log's
+100 MB in a day."""
 _MOST_SECRETS: Final = 256
 _USERINFO: Final = re.compile(r"//[^/@\s\"]*@")
 """User name and passphrase in a URL."""
@@ -46,7 +46,7 @@ class Actor(NamedTuple):
     principal: str = ""
     """Identifier; "" for an unknown visitor."""
     kind: str = ""
-    """``person``, ``device``, ``program`` or ``guest``."""
+    """Kind of the actor: ``person``, ``device``, ``program`` or ``guest``."""
     role: str = ""
     way: str = ""
     """Sign-in method, such as ``passkey``; ``terminal`` for a command on this machine."""
@@ -78,13 +78,13 @@ class ServerRecorder:
         now: Callable[[], float] = time.monotonic,
         secrets: Iterable[str] = (),
     ) -> None:
-        """Start without events.
+        """Begin with no events.
 
         Args:
             note: callback for each entry; must not block.
             utc: source of UTC time, in seconds since 1970.
             now: source of monotonic time, in seconds.
-            secrets: texts to redact, such as the start key.
+            secrets: strings to redact, such as the start key.
         """
         self.is_faulty = False
         """Whether a bug in URC has prevented the recording of an entry."""
@@ -99,7 +99,7 @@ class ServerRecorder:
         self.hide(secrets)
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Add texts to redact from now on."""
+        """Add strings to redact from now on."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._forms = SecretForms(self._secrets)
@@ -107,13 +107,13 @@ class ServerRecorder:
     # Sign-ins
 
     def signed_in(self, actor: Actor, agent: str = "") -> None:
-        """Record a sign-in; `agent` is a text with the browser and the system."""
+        """Record a sign-in; `agent` is text that names the browser and the system."""
         self._record("signed in", actor, outcome=agent)
 
     def sign_in_failed(
         self, way: str, place: str, reason: str, *, name: str = "", principal: str = ""
     ) -> None:
-        """Record a failed attempt to sign in or pair; equal attempts are counted.
+        """Record a failed attempt to sign in or pair; identical attempts are counted.
 
         Args:
             way: sign-in method of the attempt, such as ``passphrase``.
@@ -149,7 +149,7 @@ class ServerRecorder:
     # Administration
 
     def access_changed(self, actor: Actor, command: str, **about: object) -> None:
-        """Record a change of people, devices, programs or their roles.
+        """Record a change to people, devices, programs or their roles.
 
         Args:
             actor: the administrator.
@@ -176,7 +176,7 @@ class ServerRecorder:
     def package_changed(
         self, actor: Actor, command: str, packages: Iterable[str], outcome: str = "done"
     ) -> None:
-        """Record a change of packages or repositories.
+        """Record a change to packages or repositories.
 
         Args:
             actor: the person.
@@ -195,7 +195,7 @@ class ServerRecorder:
         file: str,
         outcome: str = "",
     ) -> None:
-        """Record an event of a recording; `file` is its name without a folder."""
+        """Record a recording's event; `file` is the recording's file name without a folder."""
         self._record("recording", actor, step, robot, {"file": file}, outcome)
 
     def alarm(
@@ -225,7 +225,7 @@ class ServerRecorder:
         self._record("server", NO_ACTOR, step, arguments={"version": version, **about})
 
     def stopped_by_unknown(self, robot: str, place: str) -> None:
-        """Record a press of STOP by a visitor who is not signed in; equal presses are counted."""
+        """Record a press of STOP by a visitor without a sign-in; identical presses are counted."""
         actor = Actor(place=place)
         self._repeat(_Repeated("STOP", actor, robot, "", "pressed without a sign-in"))
 
@@ -303,7 +303,7 @@ class ServerRecorder:
 
 
 def terminal_actor() -> Actor:
-    """Return this process's user, who may administer URC because of access to the data folder."""
+    """Return this process's user, who may administer URC through access to the data folder."""
     return Actor(f"{_user()} on this computer", "local", "person", "administer", "terminal")
 
 

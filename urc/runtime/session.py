@@ -69,8 +69,8 @@ process can stop the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Function that creates named tuples faster than their constructors; each command creates several
-named tuples."""
+"""Function that creates named tuples faster than their constructors do; each command creates
+several named tuples."""
 _GRACE_S = 2.0
 """Tolerance added to the sum of a command's declared waits, in seconds."""
 
@@ -82,7 +82,7 @@ def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:
 
 
 class Session:
-    """One robot, connected while the context is open. It opens once.
+    """One robot, connected while the context is open. A session opens only once.
 
     ``async with Session(profile, settings, catalog.transports) as session:`` starts the links and
     returns immediately; `hub` publishes their state.
@@ -210,7 +210,7 @@ class Session:
     ) -> None:
         try:
             if self.backend is not None:
-                # Before the steps of on_close, which may take time.
+                # Before the on_close steps, which may take time.
                 self.backend.stop_all(self.frames.stop_frame)
             await self._say_goodbye()
             await self._end(kind, error, trace)
@@ -265,7 +265,7 @@ class Session:
             name: name of the command in the driver.
             arguments: values of the arguments, by name; missing arguments use their defaults.
             confirmed_by: people who confirmed the command, for the two-person rule.
-            on_sent: callback with each sent payload, except secrets and sequence payloads.
+            on_sent: callback that receives each sent payload, except secrets and sequence payloads.
 
         Raises:
             CommandFailed: the command was refused, timed out, or lost its connection.

@@ -50,12 +50,12 @@ def resolve_settings(
 
     Args:
         profile: profile with the settings.
-        given: texts of settings from ``--set``, by name, which override all other sources.
+        given: values from ``--set`` as text, by setting name; they override all other sources.
         environ: environment variables; ``URC_SET_NAME`` overrides the default of a setting.
         allows_any_port: whether to permit port 0, for a server that lets the system choose.
 
     Raises:
-        UrcError: a name is unknown, or a text is invalid.
+        UrcError: a name is unknown, or a value is invalid.
     """
     for name in given:
         if name not in profile.settings:
@@ -120,7 +120,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 
 
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
-    """Return the options of a transport, with templates evaluated over ``settings``.
+    """Return a transport's options, with templates evaluated over ``settings``.
 
     An option that consists only of an empty setting is omitted.
 

@@ -18,8 +18,8 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "StoredSettings", "SettingsStore", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages with settings, in order of precedence for equal names: a robot takes precedence
-over a driver."""
+"""Kinds of packages with settings, in order of precedence if several have the same name: a robot
+takes precedence over a driver."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -33,9 +33,9 @@ class StoredSettings(msgspec.Struct, frozen=True):
     version: _Name = ""
     """Chosen version of the installed package; "" for the newest version."""
     interface: _Name = ""
-    """Interface to show first; "" for the first interface of the document."""
+    """Interface to show first; "" for the first interface in the document."""
     settings: dict[_Name, _Text] = {}
-    """Text of each setting from the operator, by name; missing settings use their defaults."""
+    """The operator's text for each setting, by name; missing settings use their defaults."""
     destination: _Name = ""
     """Destination for which the secrets were entered, from `urc.runtime.destination`. "" means an
     unknown destination; the secrets must then be entered again."""
@@ -120,7 +120,7 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
     """Return the installed package for the robot `name`, or None.
 
     The result is the version chosen by the operator, or else the newest version. A robot takes
-    precedence over a driver of the same name.
+    precedence over a driver with the same name.
 
     Args:
         folder: folder with the settings files.
@@ -143,7 +143,7 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
 
 
 def pin(folder: Path, lock: Lock) -> None:
-    """Before an installation, pin a robot to its current version; raise `UrcError` on failure.
+    """Pin a robot to its current version before an installation; raise `UrcError` on failure.
 
     Args:
         folder: folder with the settings files.

@@ -1,4 +1,4 @@
-"""Open SQLite files that several servers may write."""
+"""Open SQLite files that several servers may write to."""
 
 import os
 import sqlite3
@@ -42,7 +42,7 @@ def open_for_writing(file: Path) -> sqlite3.Connection:
 
 @contextmanager
 def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a file that a server may be writing, for reading; yield None without a file or tables.
+    """Open, for reading, a file that a server may be writing; yield None without a file or tables.
 
     Raises:
         OSError: the file cannot be read.
@@ -77,7 +77,7 @@ def set_aside(file: Path) -> Path:
 
 
 def _use_write_ahead_log(base: sqlite3.Connection) -> None:
-    # SQLite does not wait here, unlike for transactions. Two servers that start together would each
+    # Unlike for transactions, SQLite does not wait here. Two servers that start together would each
     # get an error immediately. https://sqlite.org/c3ref/busy_handler.html
     end = time.monotonic() + LOCKED_S
     while True:

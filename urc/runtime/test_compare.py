@@ -77,7 +77,7 @@ def _wanted(state: ExpectedState) -> str:
 def check_bytes(
     trial: TestEngine, driver: Driver, sent: Mapping[str, Fed | tuple[Fed, ...]]
 ) -> Iterator[str]:
-    """Yield a message for each transport that sent unexpected data; discard compared data."""
+    """Yield a message for each transport that sent unexpected data; discard the compared data."""
     for name, text in sent.items():
         found = trial.sent.pop(name, [])
         pieces = pieces_of(text)

@@ -1,6 +1,6 @@
-"""A test bench for an engine, with a simulated clock, and transports that always connect.
+"""A test bench for an engine, with a simulated clock and transports that always connect.
 
-Layer 4. The module uses neither I/O nor asyncio. All output of the engine is collected for the
+Layer 4. The module uses neither I/O nor asyncio. All of the engine's output is collected for the
 test.
 """
 
@@ -42,9 +42,9 @@ Exercised = tuple[Kind, str]
 _TWO_PEOPLE: Final = ("author of the test", "operator")
 """Confirmations by two people, so that tests can run every command."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
-"""Transport types with objects as messages; all other types transfer bytes."""
+"""Transport types whose messages are objects; all other types transfer bytes."""
 _MOST_TICKS: Final = 20_000
-"""Maximum number of deadlines to handle during one wait of a test."""
+"""Maximum number of deadlines to handle during one wait in a test."""
 
 
 class _RecordingEngine(Engine):
@@ -101,7 +101,7 @@ class TestEngine:
         """Simulated time, in seconds."""
         self.samples: dict[str, Sample] = {}
         self.fresh: set[str] = set()
-        """Signals set since the last call to `forget`, with their samples."""
+        """Names of the signals set since the last call to `forget`."""
         self.fed: dict[str, bytes] = {}
         """All bytes received from the robot since the connection was opened, by transport."""
         self.sent: dict[str, list[Payload]] = {}
@@ -134,7 +134,7 @@ class TestEngine:
         self.perform(self.engine.start(transport, self.now))
 
     def close(self, transport: str) -> None:
-        """Close a connection as if the robot closed it."""
+        """Close a connection as if the robot had closed it."""
         self.perform(self.engine.closed(transport, "", self.now))
 
     def leave(self) -> None:
@@ -173,7 +173,7 @@ class TestEngine:
         self.ended.append(failed)
 
     def feed(self, transport: str, piece: Fed) -> None:
-        """Pass data to the engine as if the robot sent it."""
+        """Pass data to the engine as if the robot had sent it."""
         data: Payload
         if isinstance(piece, Envelope):
             data = self._envelope(transport, piece)

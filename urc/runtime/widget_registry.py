@@ -1,4 +1,4 @@
-"""The widgets available to a document: built-in widgets, and widgets of the document's package."""
+"""The widgets available to a document: built-in widgets, and widgets from its package."""
 
 from os import PathLike
 from pathlib import Path
@@ -87,15 +87,15 @@ class WidgetRegistry(WidgetFolder):
         return [self._brought.place(name) for name in self._brought.names() if self._hides(name)]
 
     def _hides(self, name: str) -> bool:
-        """Return whether a built-in widget hides an installed widget of this name."""
+        """Return whether a built-in widget hides an installed widget with this name."""
         if not (super().has(name) and self._brought.has(name)):
             return False
         return super().place(name).resolve() != self._brought.place(name).resolve()
 
     def has(self, name: str) -> bool:
-        """Return whether a widget of this name exists."""
+        """Return whether a widget with this name exists."""
         return super().has(name) or self._brought.has(name)
 
     def place(self, name: str) -> Path:
-        """Return the folder of a widget, by name."""
+        """Return the folder of the widget with this name."""
         return super().place(name) if super().has(name) else self._brought.place(name)

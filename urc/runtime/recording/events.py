@@ -25,7 +25,7 @@ def is_state(topic: str) -> bool:
 
 
 def topic_of(signal: str) -> str:
-    """Return the topic of a signal."""
+    """Return a signal's topic."""
     return SIGNALS + signal
 
 
@@ -36,7 +36,7 @@ def event_of(
 
     Args:
         topic: topic of the message in the recording.
-        data: its JSON.
+        data: JSON text of the message.
         time_s: time of the event, in monotonic seconds.
         signals: signals of the displayed profile, which may differ from the recorded profile.
     """

@@ -100,7 +100,7 @@ class Player:
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback runs, or will run as soon as a page is open."""
+        """Whether the playback is running, or will run as soon as a page is open."""
         return self._wants_to_run
 
     @property
@@ -135,7 +135,7 @@ class Player:
 
     @asynccontextmanager
     async def session(self) -> AsyncIterator["PlaybackSession"]:
-        """Open a session for a dashboard; playback continues at the last position."""
+        """Open a session for a dashboard; playback continues from the last position."""
         played = PlaybackSession(self.profile, self.settings)
         playing = asyncio.create_task(self._play(played.hub))
         self._is_open = True
@@ -151,7 +151,7 @@ class Player:
     # -- the task
 
     async def _play(self, hub: Hub) -> None:
-        """Play while a page is open; on an error, report the error and pause."""
+        """Play while a page is open; on an error, report it and pause."""
         while True:
             try:
                 await self._play_on(hub)
@@ -270,7 +270,7 @@ class PlaybackSession:
     """A session that plays a recording; the session refuses every command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
-        """Start without values."""
+        """Begin with no values."""
         self.hub = Hub(profile.driver.signals)
         self.frames: MotionFrames = Engine(profile.driver, settings).motions
         self.backend: MotionBackend | None = None

@@ -1,6 +1,6 @@
-"""A reader of recordings, including incomplete files left by killed processes.
+"""A reader for recordings, including incomplete files left by killed processes.
 
-Layer 4. The reader provides the recorded document, its time range, and its messages in order from
+Layer 4. The reader provides the recorded document, the time range, and the messages in order from
 any start time. Files of any length are processed in sections.
 """
 
@@ -27,10 +27,10 @@ damaged file."""
 
 
 class RecordedMessage(NamedTuple):
-    """One message of a recording."""
+    """One message in a recording."""
 
     time_ns: int
-    """Nanoseconds since 1970."""
+    """Time in nanoseconds since 1970."""
     topic: str
     data: bytes
 

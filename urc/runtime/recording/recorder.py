@@ -1,11 +1,11 @@
-"""The recorder for one session, which writes an MCAP file.
+"""The recorder, which writes one session to an MCAP file.
 
-Layer 4. Theory of operation. `Recorder.put` queues events and returns immediately. `put` never
-waits for a disk, because motion uses the same event loop. A separate thread does all slow work:
-reading the document, creating the file, and writing. The thread flushes the file once a second, so
-a killed process loses at most one second of events and the end of the file. If the queue is full,
-new events are lost, and the file contains a count of the lost events. If the disk is full, the
-recording ends, and `fault` contains the reason.
+Layer 4. Theory of operation. `Recorder.record` queues events and returns immediately. `record`
+never waits for a disk, because motion uses the same event loop. A separate thread does all slow
+work: reading the document, creating the file, and writing. The thread flushes the file once a
+second, so a killed process loses at most one second of events and the end of the file. If the queue
+is full, new events are lost, and the file contains a count of the lost events. If the disk is full,
+the recording ends, and `fault` contains the reason.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ from urc.runtime.widget_registry import widget_folder_of
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
 RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
-"""Callback with the step of a recording, its file name, and the result as text."""
+"""Callback that receives the step of a recording, its file name, and the result as text."""
 _SUFFIX: Final = ".mcap"
 MOST_WAITING: Final = 50_000
 """Maximum number of queued events."""
@@ -95,7 +95,7 @@ class Recorder:
         self._is_folder = is_folder
         self._profile = profile
         self._document = document
-        # The whole file has one offset, because a change of the system clock must not shift its
+        # The whole file has one offset, because a change to the system clock must not shift its
         # times.
         offset_ns = time.time_ns() - time.monotonic_ns()
         self._shapes = RecordingEncoder(
@@ -179,7 +179,7 @@ class Recorder:
         profile, document = self._profile, self._document
         if document is None:
             document = resolve(profile.file, widget_folder_of(profile.file), profile).text
-            # Comments of the document show where each key comes from; the home folder is private.
+            # Comments in the document show where each key comes from; the home folder is private.
             document = document.replace(f"# {Path(profile.file).parent}{os.sep}", "# ")
         writer: Any = Writer(stream, chunk_size=_CHUNK_BYTES)
         self._writer = writer
@@ -232,7 +232,7 @@ class Recorder:
             self._write(self._shapes.messages(event))
         except OSError:
             raise
-        except Exception:  # supervisor: an unexpected event loses only itself
+        except Exception:  # supervisor: only the unexpected event is lost
             if not self._is_faulty:
                 log.exception("%s lacks an event of kind %s", self.file, type(event).__name__)
                 text = "an event is missing here because it could not be written; see URC's log"
@@ -266,7 +266,7 @@ def _size(event: Tapped) -> int:
 
 
 def named(folder: Path, robot: str, number: int = 1, utc_s: float | None = None) -> Path:
-    """Return the path of a recording, such as ``puppet-20261123T141502Z.mcap``.
+    """Return the path for a recording, such as ``puppet-20261123T141502Z.mcap``.
 
     If a name is already in use, the suffix ``-2`` or a higher number is added.
     """
@@ -294,7 +294,7 @@ async def recorded(
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
-        on_step: callback for when the file is created, and for when it ends.
+        on_step: callback for the creation and for the end of the file.
         document: the whole profile as one document; "" means no document, and None means to read
             the profile's file.
     """

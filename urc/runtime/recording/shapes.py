@@ -219,7 +219,8 @@ class RecordingEncoder:
     def _now(self, time_s: float) -> int:
         """Return the later of `time_s` and the last used time, so that times never decrease.
 
-        A reading's time is when its first byte arrived; the time of traffic is when it arrived.
+        A reading's time is the arrival time of its first byte; traffic's time is its own arrival
+        time.
         """
         time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
         self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)
@@ -257,7 +258,7 @@ def _json(told: Mapping[str, object]) -> bytes:
     try:
         return _encode(told)
     except (UnicodeEncodeError, OverflowError):
-        # A lone surrogate in a robot's text, or an integer of more than 64 bits.
+        # The cause is a lone surrogate in a robot's text, or an integer of more than 64 bits.
         return json.dumps(_mended(told), allow_nan=False).encode()
 
 
