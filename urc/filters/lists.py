@@ -51,7 +51,7 @@ def _text(value: object) -> str:
 
 
 def sliced(value: Any, start: Any, stop: Any) -> Any:
-    """Return a slice of text, a list or bytes; None as `start` or `stop` sets no bound."""
+    """Return a slice of text, a list or bytes; None for `start` or `stop` sets no bound."""
     if not isinstance(value, (str, list, tuple, bytes)):
         raise TypeError(f"expected text, a list or bytes, found {_short(value)}")
     for place in (start, stop):
@@ -136,5 +136,5 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
+"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
 value."""

@@ -1,4 +1,4 @@
-"""Filters of expressions for angles, roots and rounding.
+"""Expression filters for angles, roots and rounding.
 
 Private to `urc.filters.table`. Angles are in radians. An undefined result, such as the root of a
 negative number, raises ValueError, as in all expressions.
@@ -50,5 +50,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
+"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
 value."""

@@ -47,12 +47,12 @@ def _check_count(count: int, what: str) -> None:
 
 
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
-    """Return one column of all rows, by name, or by position in a list or separated text."""
+    """Return one column of all rows, chosen by name, or by position in a list or separated text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):
             raise ValueError("'column' needs a separator for rows of text")
-        # Count before splitting: one text may be in the list many times.
+        # Count before splitting: the same text may be in the list many times.
         rows = [_text(row) for row in rows if row]
         _check_count(sum(row.count(between) + 1 for row in rows), "parts")
     found = []
@@ -83,7 +83,7 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Split a text into numbers of `width` digits each, with the most significant digit first."""
+    """Split text into numbers of `width` digits each, with the most significant digit first."""
     text, size = _text(value), _whole(width, "the width", 1, 16)
     radix = _whole(base, "the base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """Error: the data has too few bytes for the number."""
+    """An error: the data has too few bytes for the number."""
 
 
 @cache  # there are few type names
@@ -128,7 +128,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
-    """Return the number of a given type at a byte offset."""
+    """Decode the number at a byte offset as the given type."""
     read = _reader(_text(name))
     data, place = _bytes(value), _whole(at, "the offset", 0, MAX_PARTS)
     try:
@@ -174,5 +174,5 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Function of each filter, with its minimum and maximum argument counts, excluding the filtered
+"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
 value."""

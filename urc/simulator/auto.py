@@ -1,8 +1,9 @@
 """Automatic replies of an emulated robot to every request that the driver declares.
 
 The module does not use sockets or clocks. Each received frame is matched against all requests that
-the driver can send on its transport. Each reply is encoded from plausible values, with the driver's
-declaration for decoding the reply. A command argument with the name of a signal sets that signal.
+the driver can send on its transport. Each reply is encoded from plausible values, using the
+declaration with which the driver decodes the reply. A command argument with the name of a signal
+sets that signal.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -114,7 +115,7 @@ class DefaultResponder:
         """Return the robot's side of one transport.
 
         Args:
-            transport: its name.
+            transport: name of the transport.
             framing: framing of data sent and received by the robot.
             talks: whether the robot sends unsolicited messages.
         """
@@ -142,7 +143,7 @@ class DefaultResponder:
                 raw = round(raw)
             is_number = isinstance(raw, (int, float, tuple, list)) or is_set
             (numbers if is_number else others)[name] = raw
-        # A field `_kind` of the document takes the value `kind` of the robot's state.
+        # A document's field `_kind` takes the value of `kind` from the robot's state.
         state = self.values.state
         own: dict[str, object] = {
             name: state[name[1:]]
@@ -176,7 +177,7 @@ class DefaultConnection:
             ]
 
     def greet(self, now_s: float) -> list[Payload]:
-        """Return the frames that the robot sends to a new client; raise `Unanswered`."""
+        """Return the frames that the robot sends to a new client, or raise `Unanswered`."""
         return [data for one in self.opening for data in self.render(one, now_s)]
 
     def answer(self, frame: Frame, now_s: float) -> list[Payload] | None:
@@ -192,7 +193,7 @@ class DefaultConnection:
         return self.answers(asked, now_s)
 
     def answers(self, asked: ReceivedRequest, now_s: float) -> list[Payload]:
-        """Return the declared replies to a request; raise `Unanswered`."""
+        """Return the declared replies to a request, or raise `Unanswered`."""
         known, label = asked.arguments, asked.request.label
         try:
             said = [
@@ -220,7 +221,7 @@ class DefaultConnection:
     def render(
         self, answer: SimulatedReply, now_s: float, known: Mapping[str, object] = NOTHING
     ) -> list[Payload]:
-        """Return the frames of one reply or message; raise `Unanswered`."""
+        """Return the frames of one reply or message, or raise `Unanswered`."""
         if answer.prompt is not None:
             return [example(answer.prompt, {}).encode(self._spec.encoding, "replace")]
         if answer.reader is None or self._robot.values.faults.drops(
@@ -243,7 +244,7 @@ class DefaultConnection:
         raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> ReceivedRequest | None:
-        """Return the request and the arguments of a frame. Exact matches take priority.
+        """Return a frame's request and arguments. Exact matches take priority.
 
         Args:
             frame: the received frame.
@@ -267,9 +268,9 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`, or None.
 
-        A better match with arguments or a reply excludes all other commands. Otherwise, `frame`
-        may mean several commands. Two of a driver's declarations often have the same stop frame:
-        the release of a held command, a close message, a command without a reply.
+        A better match with arguments or a reply excludes all other commands. Otherwise, `frame` may
+        mean several commands. A driver's declarations often share a stop frame: the release of a
+        held command, a close message, a command without a reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:

@@ -24,7 +24,7 @@ async def stand_in(
     Args:
         profile: profile of the robot.
         settings: values of the profile's settings.
-        emulated_robot: emulated robot to use; if None, one is created from the profile.
+        emulated_robot: emulated robot to use; None to create one from the profile.
 
     Raises:
         UrcError: a transport cannot be emulated.

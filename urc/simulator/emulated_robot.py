@@ -120,7 +120,7 @@ class EmulatedRobot:
         return self._values.body
 
     def prepare(self) -> None:
-        """Load the image modules early, so as not to delay the first image; the call may block."""
+        """Load the image modules early, so the first image is not delayed; the call may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
@@ -265,7 +265,7 @@ class EmulatedConnection:
         Args:
             data: bytes from any position in the stream, or an envelope on a message transport.
             now_s: current time in seconds since the epoch, available to templates as ``now``.
-            limit: maximum number of replies; further requests are dropped. None: no limit.
+            limit: maximum number of replies; further requests are dropped. None for no limit.
         """
         return self._flawed(self._receive(data, now_s, limit, self._answer_or_lose), now_s)
 
@@ -297,7 +297,7 @@ class EmulatedConnection:
         return answers
 
     def advance(self, dt_s: float, now_s: float) -> list[Payload]:
-        """Advance the time by `dt_s` seconds and return the robot's unsolicited frames.
+        """Advance time by `dt_s` seconds and return the robot's unsolicited frames.
 
         A periodic rule sends at most once per call, so a late call does not cause a burst of
         frames.
@@ -397,7 +397,7 @@ class EmulatedConnection:
         return said or []
 
     def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Run all due reactions, and schedule the remaining reactions."""
+        """Run all due reactions, and schedule the rest."""
         said: list[Payload] = []
         while running_rule.ready_reactions and not self.is_over:
             reaction = running_rule.ready_reactions[0]

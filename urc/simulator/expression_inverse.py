@@ -2,7 +2,7 @@
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
 first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. An
-expression without an inverse has the result None.
+expression without an inverse results in None.
 """
 
 import ast
@@ -79,7 +79,7 @@ Step = tuple[str, tuple[Any, ...]]
 
 
 def _chain(python: str) -> list[Step]:
-    """Return the filters of the expression, last filter first; [] for any other expression."""
+    """Return an expression's chain of filters, last filter first; [] for any other form."""
     node, steps = ast.parse(python, mode="eval").body, list[Step]()
     while isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
         subject, *rest = node.args
@@ -96,7 +96,7 @@ def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
     at = 0
     for name, arguments in chain:
         if name in _TEXTS:
-            break  # several expressions may read bytes of one text
+            break  # several expressions may read bytes of the same text
         match name, arguments:
             case "unpack", (type_name, *place):
                 value, at = _packed(type_name, value), int(place[0]) if place else 0

@@ -16,7 +16,7 @@ __all__ = ["inject", "mend"]
 
 
 def inject(fault: Fault, values: Values, now_s: float) -> None:
-    """Inject `fault` into the emulated robot with the given values.
+    """Inject `fault` into the emulated robot whose values are `values`.
 
     Raises:
         UrcError: the fault is impossible for this robot.
@@ -53,7 +53,7 @@ def _check_signal(fault: Fault, values: Values) -> None:
 
 
 def _dropped(name: str, values: Values) -> Iterator[str]:
-    """Yield the signals that lose their value when the signal or sensor `name` fails."""
+    """Yield the signals that lose their values when the signal or sensor `name` fails."""
     body = values.body
     if body is not None and name not in values.driver.signals and name in READINGS:
         body.world.dropped.add(name)

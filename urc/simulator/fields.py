@@ -25,8 +25,8 @@ class Fields(NamedTuple):
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own
-        # Some fields exclude each other: add fields one by one while a frame with all of them
-        # exists.
+        # Some fields exclude each other: add fields one by one, as long as a frame can contain them
+        # all.
         most = dict(self.own)
         for name, raw in (self.numbers | self.others).items():
             for value in (raw, whole.get(name, raw)):

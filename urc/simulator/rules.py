@@ -230,7 +230,7 @@ class RuleSet:
             name: one.evaluate(names) if isinstance(one, Template) else one
             for name, one in what.sets.items()
         }
-        for name, value in values.items():  # all use the values from before
+        for name, value in values.items():  # all expressions use the old values
             self._values.set(name, value)
 
     def _written(
@@ -251,7 +251,7 @@ class RuleSet:
 
 
 def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
-    """Return the names in a frame, read by the rule's pattern or form; None without a match."""
+    """Return the names in a frame, read by the rule's pattern or form; None if nothing matches."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:
         if rule.reader is not None:

@@ -52,7 +52,7 @@ async def serve(
         now: function that returns the current time, in seconds since the epoch; templates read the
             time as ``now``.
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
-        emulated_robot: emulated robot to serve; if None, one is created from the profile.
+        emulated_robot: emulated robot to serve; None to create one from the profile.
 
     Returns:
         Endpoint of each transport, keyed by transport name.

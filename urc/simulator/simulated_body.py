@@ -1,7 +1,7 @@
 """The body of an emulated robot. The robot's state drives the body, and the body provides signals.
 
-The module uses no sockets and no clock. The fail-safe works with and without a connection. The
-fail-safe is declared in the document (`failsafe`) or derived from held commands (`watchdog`).
+The module uses no sockets and no clock. The fail-safe works with and without a connection. It is
+declared in the document (`failsafe`) or derived from held commands (`watchdog`).
 """
 
 import logging
@@ -21,8 +21,8 @@ __all__ = ["SimulatedBody", "failsafe_of", "has_rendering", "rendered_signals"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that stay active when the fail-safe stops the body, because these inputs cause no motion.
-For example, a drone without commands stays in the air."""
+"""Inputs that stay active when the fail-safe stops the body, because they cause no motion. For
+example, a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
 """Pattern for references to sensors that need numpy or Pillow."""
@@ -65,7 +65,7 @@ class SimulatedBody:
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Restart the fail-safe's timer if a received frame has one of the timer's commands.
+        """Restart the fail-safe's timer if a received frame may be one of the timer's commands.
 
         Args:
             labels: commands that the frame may mean.
@@ -78,7 +78,7 @@ class SimulatedBody:
         """Load the laser and camera modules if a signal needs them; the call may block."""
         if has_rendering() and rendered_signals(self.spec):
             import urc.simulator.world.laser
-            import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
+            import urc.simulator.world.picture  # noqa: F401  # imported only to load it
 
     def view(self, now_s: float) -> SensorView:
         """Return the sensor view of the world at `now_s`."""

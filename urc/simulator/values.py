@@ -35,7 +35,7 @@ _PIXEL: Final = a2b_base64(
 
 
 def plausible(signal: Signal, now_s: float) -> Reading:
-    """Return a value of `signal` at `now_s` within all limits."""
+    """Return a value for `signal` at `now_s` that is within all limits."""
     if signal.type in ("image", "blob"):
         return _PIXEL if signal.size is None or signal.size >= len(_PIXEL) else b""
     if signal.type == "object":
@@ -180,7 +180,7 @@ class Values:
         return plausible(signal, now_s)
 
     def evaluate(self, template: Template, now_s: float) -> object:
-        """Return the value of a template with the robot's values; raise `ExpressionError`."""
+        """Evaluate a template with the robot's values, or raise `ExpressionError`."""
         return template.evaluate(Names(self, now_s))
 
 
@@ -240,7 +240,7 @@ def _sensed(body: SimulatedBody, signal: Signal, now_s: float) -> Reading:
 
 
 def _kept(signal: Signal, value: object) -> Reading:
-    """Return the stored form of `value` for `signal`; raise `BadValue`."""
+    """Return the stored form of `value` for `signal`, or raise `BadValue`."""
     words = dict(signal.states)
     if words and value is not None:
         word = str(value)

@@ -1,1 +1,1 @@
-"""Public fakes for tests of URC, of third-party transports and of third-party widgets."""
+"""Public fakes for testing URC, third-party transports and third-party widgets."""

@@ -65,7 +65,7 @@ class FakeClock:
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Advance the time without running calls, then run overdue calls, like a blocked loop."""
+        """Advance time without running calls, then run overdue calls, as a blocked loop does."""
         self._now += seconds
         await self.advance(0)
 

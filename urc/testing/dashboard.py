@@ -88,7 +88,7 @@ def dashboard_profile(
 ) -> Profile:
     """Return a profile with all slots in one row; by default, it shows the puppet's battery signal.
 
-    A widget's missing options have the defaults from its manifest.
+    A widget's missing options take the defaults from its manifest.
     """
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
@@ -132,7 +132,7 @@ class FakeRobot:
         self.confirmed_by: list[tuple[str, ...]] = []
         """Names of the people who confirmed each command."""
         self.pulls: list[tuple[str, Pull]] = []
-        """Requests to sequences."""
+        """Requests about sequences."""
         self.reconnects = 0
         """Number of requests to reopen the connections immediately."""
         self.latched: list[str] = []

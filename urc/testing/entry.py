@@ -1,6 +1,6 @@
 """Access to a test's dashboard, with known keys and the cookies of browsers that have access.
 
-For tests alone.
+For tests only.
 """
 
 from pathlib import Path

@@ -67,7 +67,7 @@ class FakeFrames:
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        """Return the motion frame with the command's arguments, after the checks of the engine."""
+        """Return the motion frame with the command's arguments, after the engine's checks."""
         if self.refusal:
             raise UrcError(self.refusal)
         values = check_arguments(self.driver.commands[command], arguments)
@@ -145,7 +145,7 @@ class FakeMotionBackend:
         return command in self._backend and self._backend[command].state != "idle"
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether the command is moving the robot or its stop is not written yet."""
+        """Return whether the command is moving the robot or its stop has not been written yet."""
         return self.is_stopping(command)
 
     def is_open(self, command: str) -> bool:

@@ -11,10 +11,10 @@ __all__ = ["MemoryTransport", "table_of"]
 
 
 class MemoryTransport:
-    """A replacement for any transport, in the test's memory.
+    """A replacement for any transport, held in the test's memory.
 
-    The transport receives bytes from `feed`, and from `answer`. The callback `answer` gets all sent
-    data, and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
+    The transport receives bytes from `feed` and `answer`. The callback `answer` gets all sent data
+    and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
     `hang_up` closes the connection, `refuse` rejects connection attempts, and `stall_open` and
     `stall_sends` block `open` and `send`.
     """
@@ -27,7 +27,7 @@ class MemoryTransport:
         address: str = "memory",
     ) -> None:
         self.address = address
-        """Address for people."""
+        """Address as display text."""
         self.sent: list[bytes] = []
         """All pieces of data sent over all connections."""
         self.opens = 0
@@ -109,7 +109,7 @@ class MemoryTransport:
 
 
 def table_of(**transports: Transport) -> Table:
-    """Return a table with these transports by name; the transports ignore all options."""
+    """Return a table of these transports, keyed by name; the transports ignore all options."""
     return _GivenTable(transports)
 
 

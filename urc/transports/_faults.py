@@ -9,7 +9,7 @@ from urc.transports.own_listeners import OwnAddressError
 __all__ = ["CLOSED", "HUNG_UP", "broke", "explain", "late", "one_line", "place_of", "reason"]
 
 CLOSED = "the connection is closed"
-"""Closed by URC."""
+"""The message for a connection that URC has closed."""
 HUNG_UP = "the robot closed the connection"
 
 

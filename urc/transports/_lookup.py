@@ -19,13 +19,13 @@ _Connected = TypeVar("_Connected")
 class AddressLookup:
     """A repeatable address lookup for one host and port.
 
-    The event loop's thread pool delays the program's exit, and a resolver without a network may
-    take half a minute. Each lookup therefore runs in a separate thread. Only one lookup runs at a
-    time; a retry waits for the running lookup.
+    The event loop's thread pool would delay the program's exit, and without a network a resolver
+    may take half a minute. Each lookup therefore runs in a separate thread. Only one lookup runs at
+    a time; a retry waits for the running lookup.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Prepare a lookup for sockets of `kind`, but do not start the lookup."""
+        """Prepare a lookup for sockets of type `kind`, without starting the lookup."""
         self._host = host
         self._port = port
         self._kind = kind
@@ -76,7 +76,7 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
         known.set_result(given)
         return known
     answer = in_daemon(partial(_resolve, host, port, kind), f"look up {host}")
-    # Without a waiting task, the error of a failed lookup is retrieved here.
+    # If no task is waiting, this callback retrieves the error of a failed lookup.
     answer.add_done_callback(lambda done: done.cancelled() or done.exception())
     return answer
 

@@ -62,7 +62,7 @@ def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -
 def choice(
     kind: str, options: Mapping[str, object], key: str, among: tuple[str, ...], default: str
 ) -> str:
-    """Return an option that must be one of the words in `among`; `default` for a missing option.
+    """Return an option that must be a word in `among`, or `default` for a missing option.
 
     Raises:
         TransportError: the value is not one of the words.

@@ -36,7 +36,7 @@ process in one step.
 """
 _DRAIN_S, _LOOK_S = 0.3, 0.01
 """Maximum wait for unsent bytes before a port closes, in seconds. `_LOOK_S` is the interval between
-the checks for unsent bytes."""
+checks for unsent bytes."""
 
 
 async def open_port(
@@ -70,14 +70,14 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """An RFC 2217 connection that does not wait for the confirmation of unused notifications.
+    """An RFC 2217 connection that does not wait for confirmation of unused notifications.
 
-    The library would wait for a confirmation until its timeout, because the common server ser2net
-    never sends a confirmation.
+    The library would wait until its timeout, because ser2net, a common server, never sends this
+    confirmation.
     """
 
     def _data_received(self, data: bytes) -> None:
-        """Process received data; invalid data and too many unsent replies end the connection."""
+        """Process received data; end the connection on invalid data or too many unsent replies."""
         for start in range(0, len(data), _AT_ONCE):
             line, serial = self._tcp_transport, self._serial
             if line is None or serial is None or line.is_closing():
@@ -106,7 +106,7 @@ class _Rfc2217(RFC2217SerialTransport):
 
 
 class SerialStream(asyncio.Protocol):
-    """A `ByteStream` of a serial port, with `unsent` and `reset`.
+    """A `ByteStream` over a serial port, which also provides `unsent` and `reset`.
 
     The port is read only while a task reads the stream.
     """
@@ -121,7 +121,7 @@ class SerialStream(asyncio.Protocol):
         self._gone = asyncio.Event()
         self._transport: BaseSerialTransport
         self.socket: socket.socket | None = None
-        """Socket of a port behind a server; None for a local port."""
+        """The socket for a port on a server; None for a local port."""
 
     # -- called by the library
 
@@ -169,7 +169,7 @@ class SerialStream(asyncio.Protocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Wait for space, then pass `data` to the system; raise `PeerClosed` on an error."""
+        """Wait for buffer space, then pass `data` to the system; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._transport.write(data)
@@ -178,19 +178,19 @@ class SerialStream(asyncio.Protocol):
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Wait briefly for unsent bytes, then close the port; never raises."""
+        """Wait briefly for unsent bytes to be transmitted, then close the port. Never raises."""
         with suppress(TimeoutError):
             async with asyncio.timeout(_DRAIN_S):
-                # The system does not report the transmission of the last byte.
+                # The system does not report when the last byte has been transmitted.
                 while self._ended is None and self._writable.is_set() and self.unsent():  # noqa: ASYNC110
                     await asyncio.sleep(_LOOK_S)
-        # A pseudo terminal reports no unsent bytes, but discards unread ones.
+        # A pseudo-terminal reports no unsent bytes, but discards unread bytes.
         if self.socket is None and self.unsent():
             self._forget_unsent()
         await self._close()
 
     async def reset(self) -> None:
-        """Close the port immediately and discard the unsent bytes; never raises."""
+        """Close the port immediately and discard the unsent bytes. Never raises."""
         self._forget_unsent()
         await self._close()
 

@@ -1,8 +1,8 @@
 """An open TCP connection as a stream, and a base class for transports that use a stream.
 
-Each connection stores received data in one buffer of fixed size. While the buffer is full, the
-socket is not read, so a flooding robot fills only its own send queue. `write` returns after the
-kernel has accepted every byte, so the connection may be closed immediately after the last write.
+Each connection stores received data in one fixed-size buffer. While the buffer is full, the socket
+is not read, so a flooding robot fills only its own send queue. `write` returns after the kernel has
+accepted every byte, so the connection may be closed immediately after the last write.
 """
 
 import asyncio
@@ -46,9 +46,10 @@ READ_AHEAD_BYTES = 65536
 _KEEPALIVE_IDLE_S, _KEEPALIVE_EVERY_S, _KEEPALIVE_COUNT = 5, 2, 3
 _UNANSWERED_MS = 5000
 """Timeout for TCP acknowledgements, in milliseconds; the timeout detects half-open connections and
-pulled cables."""
+unplugged cables."""
 _UNSENT_BYTES = 16384
-"""Maximum number of unsent bytes in the kernel; further data would only become outdated."""
+"""Maximum number of unsent bytes in the kernel; further data would be outdated by the time it was
+sent."""
 _UNSENT = array("i", [0])
 """Output buffer for the system call that returns the number of unsent bytes."""
 _CAN_WRITE = os.name == "posix"
@@ -59,15 +60,15 @@ _LINGER_NOT = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 class TcpStream(asyncio.BufferedProtocol):
     """One open connection.
 
-    `asyncio.Protocol` is not used, because that class would allocate 256 KiB for every read.
+    `asyncio.Protocol` is not used, because it would allocate 256 KiB for every read.
     """
 
     def __init__(self, read_ahead_bytes: int = READ_AHEAD_BYTES) -> None:
-        """Initialise for `adopt`."""
+        """Initialise a stream that `adopt` connects."""
         self._buffer = memoryview(bytearray(read_ahead_bytes))
         self._filled = 0
         self._ended: str | None = None
-        """Reason why the stream ended; None while the connection is open."""
+        """Why the stream ended; None while the connection is open."""
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()
         self._writable.set()
@@ -79,14 +80,14 @@ class TcpStream(asyncio.BufferedProtocol):
         self._number = -1
         """The socket's file descriptor; -1 after the connection has ended."""
         self.sink: Callable[[bytes], bool] | None = None
-        """Callback that receives data while the buffer is empty. The callback returns whether the
-        data was accepted."""
+        """Callback that receives data while the buffer is empty. The callback returns whether it
+        accepted the data."""
 
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Store the opened connection's transport."""
-        # No isinstance check: the transports of uvloop have another base class.
+        # No isinstance check: uvloop's transports have a different base class.
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(high=0)
         self._line = line = self._transport.get_extra_info("socket")
@@ -141,7 +142,7 @@ class TcpStream(asyncio.BufferedProtocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
+        """Wait for buffer space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         await self._until_writable()
         self._transport.write(data)
         await self._until_writable()
@@ -150,7 +151,7 @@ class TcpStream(asyncio.BufferedProtocol):
         """Close the connection immediately, discarding data that the kernel has not accepted."""
         self.end(CLOSED)
         self._transport.abort()
-        await self._gone.wait()  # one turn of the event loop, after which the socket is closed, too
+        await self._gone.wait()  # one turn of the event loop; the socket is then closed, too
 
     # -- further methods
 
@@ -178,7 +179,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
     def unsent(self) -> int:
         """Return the number of bytes that the other side has not acknowledged."""
-        # Called before each motion: a writable connection has an empty buffer of its own.
+        # Called before each motion: a writable connection's own buffer is empty.
         waiting = 0 if self._writable.is_set() else self._transport.get_write_buffer_size()
         return waiting if self._line is None else waiting + unsent_in(self._line)
 
@@ -196,7 +197,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport.abort()
 
     def end(self, why: str) -> None:
-        """Wake all waiting tasks with the reason why the stream ended; keep the first reason."""
+        """Wake all waiting tasks and tell them why the stream ended; keep the first reason."""
         if self._ended is None:
             self._ended = why
         self._arrived.set()
@@ -221,7 +222,7 @@ class StreamTransport:
         return await self._stream.read()
 
     async def send(self, data: Payload) -> None:
-        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
+        """Wait for buffer space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         await self._stream.write(as_bytes(data))
@@ -253,7 +254,7 @@ class StreamTransport:
 
 
 async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -> TcpStream:
-    """Return a stream for a connected socket; the stream becomes the owner of the socket."""
+    """Return a stream for a connected socket; the stream takes ownership of the socket."""
     loop = asyncio.get_running_loop()
     _, stream = await loop.create_connection(lambda: TcpStream(read_ahead_bytes), sock=line)
     return stream
@@ -277,7 +278,7 @@ def tune(line: socket.socket) -> None:
 
 
 def as_bytes(payload: Payload) -> bytes:
-    """Return `payload` for a connection that carries bytes.
+    """Return `payload` as bytes, for a connection that carries bytes.
 
     Raises:
         TransportError: the payload is an envelope.
@@ -296,8 +297,8 @@ def forget_unsent(line: socket.socket) -> None:
 def unsent_in(line: socket.socket) -> int:
     """Return the number of bytes in the kernel that the other side has not acknowledged.
 
-    The result is 0 if the number is unknown. The result is 1 for a closed socket, because its last
-    bytes may not have arrived.
+    The result is 0 if the number is unknown, and 1 for a closed socket, whose last bytes may not
+    have arrived.
     """
     number = line.fileno()
     if sys.platform == "linux":

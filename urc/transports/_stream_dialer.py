@@ -30,7 +30,7 @@ class StreamDialer:
         self.host = host
         self.port = port
         self.place = place_of(host, port)
-        """For people."""
+        """Host and port as display text."""
         self._tunnel = tunnel
         self._tls = tls
         self._read_ahead_bytes = read_ahead_bytes

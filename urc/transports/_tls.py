@@ -1,6 +1,6 @@
 """TLS over any stream: a socket, or a tunnelled connection.
 
-The TLS implementation of the standard library uses two memory buffers, which are connected to the
+The standard library's TLS implementation uses two memory buffers, which are connected to the
 underlying stream. The minimum version is TLS 1.2, and certificates are verified unless verification
 is disabled.
 """
@@ -33,7 +33,7 @@ _PEM = "-----BEGIN"
 _EXPIRED, _NOT_YET = 10, 9
 _WRONG_NAME = (62, 64)
 _UNKNOWN = (2, 18, 19, 20, 21)
-"""OpenSSL error numbers (``X509_V_ERR_…``) of invalid certificates."""
+"""OpenSSL error numbers (``X509_V_ERR_…``) for invalid certificates."""
 
 
 class Tls:
@@ -42,7 +42,10 @@ class Tls:
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Store the settings; the peer's certificate must match `server_name`, or else the host."""
+        """Store the settings.
+
+        The peer's certificate must match `server_name`, or the host if `server_name` is empty.
+        """
         self._context = context
         self._server_name = server_name
         self._is_server = is_server
@@ -55,8 +58,8 @@ class Tls:
             kind: the transport's type, for error messages.
             option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
                 ``server_name`` and ``verify``. The values of ``ca``, ``cert`` and ``key`` are file
-                names or PEM texts.
-            is_server: whether the robot connects to URC, so that URC presents its certificate.
+                names or PEM text.
+            is_server: whether the robot connects to URC, so URC presents its certificate.
 
         Raises:
             TransportError: an option or a file is invalid.
@@ -103,7 +106,7 @@ class _TlsStream:
             self._arrived, self._leaving, server_side=name is None, server_hostname=name
         )
         self._turn = asyncio.Lock()
-        """Lock that keeps TLS records in the order of their encryption."""
+        """Lock that keeps TLS records in the order in which they were encrypted."""
 
     async def shake_hands(self) -> None:
         while True:
@@ -113,7 +116,7 @@ class _TlsStream:
                 await self._flush()
                 self._arrived.write(await self._stream.read())
             except ssl.SSLError:
-                await self._flush()  # the alert, which reports the reason to the other side
+                await self._flush()  # the alert, which tells the other side the reason
                 raise
             else:
                 await self._flush()
@@ -212,8 +215,8 @@ def _load_own(
             raise TransportError(f"{where} needs a certificate as cert")
         return
     try:
-        # The library reads only files, but a key may be a secret setting. The key is therefore on
-        # the disk only during the call, in a private folder.
+        # The library reads only from files, but a key may be a secret setting. The key is therefore
+        # on disk only during the call, in a private folder.
         with tempfile.TemporaryDirectory(prefix="urc-") as folder:
             files = [Path(folder, name) for name in ("cert", "key")]
             files[0].write_text(_pem(certificate), "ascii")

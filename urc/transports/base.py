@@ -1,7 +1,7 @@
 """Interfaces for transports, and the errors that transports raise.
 
 A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
-messages. A transport converts every exception of a library into one of the errors in this module.
+messages. A transport converts every library exception into one of the errors in this module.
 
 Only `urc.runtime.link` uses transports, including transports in another process.
 """
@@ -40,10 +40,9 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of notices, which are messages that a transport itself creates. A notice's body is a
-one-line text about an error that the robot does not report. Notices are written to the robot's log
-and do
-not prove that the robot is alive.
+"""The verb for notices, which are messages that the transport itself creates. A notice's body is
+one line of text about an error that the robot does not report. Notices are written to the robot's
+log and do not prove that the robot is alive.
 """
 
 
@@ -91,7 +90,7 @@ class Transport(Protocol):
 
 
 def bytes_of(data: Payload) -> bytes:
-    """Return `data` for a connection that carries bytes; raise `TransportError` for an envelope."""
+    """Return `data` as bytes; raise `TransportError` for an envelope."""
     if isinstance(data, bytes):
         return data
     raise TransportError(f"a byte transport cannot carry a message ({data.verb})")
@@ -131,7 +130,7 @@ class TransportSetup(NamedTuple):
     name: str
     """The transport's name in the driver."""
     options: Mapping[str, object] = NOTHING
-    """Options with evaluated templates: plain values, and lists and mappings of values."""
+    """Options after template evaluation: plain values, and lists and mappings of values."""
     subscriptions: tuple[TopicSubscription, ...] = ()
     tunnel: Tunnel | None = None
     """Tunnel that carries the connection; None for this machine's own network."""
@@ -143,7 +142,7 @@ class TransportSetup(NamedTuple):
 
 @runtime_checkable
 class SupportsReady(Protocol):
-    """A transport that needs preparation by URC, which does not count as connecting."""
+    """A transport that URC must prepare first; preparation does not count as connecting."""
 
     async def ready(self) -> None:
         """Wait until the transport can connect; raise `ConnectFailed` if it cannot be prepared."""
@@ -221,7 +220,7 @@ class Prompt(SupportsOffer, Protocol):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data is still unwritten; ``send(b"")`` waits until all is written."""
+        """Whether accepted data is still unwritten; ``send(b"")`` waits until it is written."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink` until the connection is closed.
@@ -240,7 +239,7 @@ class SupportsReset(Protocol):
 
 @runtime_checkable
 class SupportsEnd(Protocol):
-    """A stream that URC can end, stating a reason to display."""
+    """A stream that URC can end with a reason to display."""
 
     def end(self, why: str) -> None:
         """Make `read` and `write` raise `PeerClosed` with the reason `why` from now on."""
@@ -254,5 +253,5 @@ def unsent_of(stream: ByteStream | None) -> int:
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream; discard unsent data if the stream supports discarding."""
+    """Close a stream, and discard unsent data if the stream supports this."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

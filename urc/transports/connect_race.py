@@ -70,7 +70,7 @@ async def _once(family: int, address: object) -> socket.socket:
         tune(line)
         await loop.sock_connect(line, address)  # type: ignore[arg-type] # a result of getaddrinfo
         if line.getsockname() == line.getpeername():
-            # The kernel chose an unused port of this machine as both ends of the connection.
+            # The kernel chose an unused port on this machine for both ends of the connection.
             raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
         OWN_DOORS.check(line)
     except BaseException:

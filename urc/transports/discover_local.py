@@ -1,4 +1,4 @@
-"""Detection of listening ports: connect briefly to each port, without sending data."""
+"""Detection of listening ports by connecting briefly to each port, without sending data."""
 
 import asyncio
 from collections.abc import Iterable

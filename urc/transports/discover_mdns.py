@@ -1,4 +1,4 @@
-"""Discovery of announced services with multicast DNS.
+"""Multicast DNS discovery of announced services.
 
 The library zeroconf (extra ``mdns``) is imported only when needed.
 """
@@ -73,7 +73,7 @@ async def announced(
 
 
 async def _resolve(zeroconf: Any, kind: str, name: str) -> list[ServiceAnnouncement]:
-    """Return the addresses of a service; empty for an announcement without an address."""
+    """Return a service's addresses; an empty list if the announcement has no address."""
     from zeroconf import IPVersion
     from zeroconf.asyncio import AsyncServiceInfo
 

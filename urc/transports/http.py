@@ -30,11 +30,11 @@ MAX_BODY_BYTES = 8_388_608
 IN_FLIGHT = 4
 ANSWER_S = 10.0
 PATIENCE_S = 1.0
-"""Maximum wait of a new request before the oldest request is dropped, in seconds."""
+"""Maximum time that a new request waits before the oldest request is dropped, in seconds."""
 
 
 class HttpTransport:
-    """One robot's web server, which may be opened several times."""
+    """A transport to one robot's web server, which may be opened several times."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -152,7 +152,8 @@ class _OpenConnection:
         self._number = 0
         self._is_looking = False
         self._requests: dict[int, asyncio.Task[None]] = {}
-        """Requests that are in progress or have an unread response, by number, oldest first."""
+        """Requests that are in progress or have an unread response, keyed by request number; the
+        oldest request comes first."""
         self._has_place = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
         """All running tasks, including the tasks of dropped requests."""

@@ -13,7 +13,7 @@ __all__ = ["body_of", "complaint", "fault_of", "read_body"]
 
 _COMPLAINT_BYTES: Final = 65536
 _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
-"""Window bits for zlib by Content-Encoding; the values select gzip or automatic detection."""
+"""zlib window bits for each Content-Encoding; the values select gzip or automatic detection."""
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
@@ -37,7 +37,8 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
         raise HttpFault(f"the response has the encoding {packing[:40]!r}, which was not requested")
     unpacker = zlib.decompressobj(_FORMATS[packing])
     try:
-        # One byte more than the limit reveals a longer body, and limits the decompression.
+        # Requesting one byte more than the limit reveals a longer body and bounds the
+        # decompression.
         plain = unpacker.decompress(body, max_bytes + 1)
     except zlib.error as fault:
         raise HttpFault(f"the response is not valid {packing} ({fault})") from fault
@@ -63,7 +64,7 @@ async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def fault_of(response: httpx2.Response) -> str:
-    """Return a stream request's error, or "" on success; a successful body is not read."""
+    """Return a stream request's error, or "" on success; the body is read only on failure."""
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return ""
     return complaint(response, await body_of(response, _COMPLAINT_BYTES))

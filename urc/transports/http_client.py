@@ -1,7 +1,7 @@
 """An HTTP/1.1 client for one server, based on the library `httpx2`: connections, logins, errors.
 
-The client replaces the library's connection handling. Every connection is opened to the document's
-server, even if a request names another host. Proxy settings from the environment and redirects are
+The client replaces the library's connection handling. Every connection goes to the document's
+server, even if a request names another host. Redirects and proxy settings from the environment are
 ignored. Address lookups do not delay the program's exit.
 """
 
@@ -150,13 +150,14 @@ class HttpClient:
     async def answer(
         self, request: httpx2.Request, silence_s: float | None = None
     ) -> AsyncIterator[httpx2.Response]:
-        """Send `request`, and yield its response for the context; the body is not read yet.
+        """Send `request`, and yield its response before the body is read.
 
         Every error inside the context is raised as `HttpFault`.
 
         Args:
             request: a request returned by `request` or `follow`.
-            silence_s: maximum time between two parts of the response, in seconds; None: unlimited.
+            silence_s: maximum time between two parts of the response, in seconds; None for no
+                limit.
         """
         if silence_s is not None:
             request.extensions["timeout"] = {**request.extensions["timeout"], "read": silence_s}
@@ -256,7 +257,7 @@ class _Bearer(httpx2.Auth):
     def __init__(self, header: str) -> None:
         self._header = header
 
-    def auth_flow(self, request: httpx2.Request) -> Any:  # a generator with types of the library
+    def auth_flow(self, request: httpx2.Request) -> Any:  # a generator with the library's types
         request.headers["Authorization"] = self._header
         yield request
 
@@ -354,8 +355,8 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes; 0 if unknown.
 
-        The result is 0 for a connection that the robot has closed, even while the library keeps the
-        connection.
+        The result is 0 for a connection that the robot has closed, even if the library still holds
+        the connection.
         """
         stream = self._stream
         return 0 if isinstance(stream, TcpStream) and stream.has_ended else unsent_of(stream)
@@ -407,7 +408,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
 
 
 class _PoolTransport(httpx2.AsyncBaseTransport):
-    """A transport for the library, which uses URC's connection pool and raises errors unchanged."""
+    """A library transport that uses URC's connection pool and raises errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

@@ -33,14 +33,14 @@ class LineSplitter:
     """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Create a splitter; lines above `max_bytes` are skipped or replaced by `instead`."""
+        """Create a splitter; lines over `max_bytes` long are skipped or replaced by `instead`."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
         self._is_skipping = False
         self._was_cr = False
         self.left_out = 0
-        """Number of skipped lines so far."""
+        """Number of lines skipped so far."""
 
     def feed(self, data: bytes) -> list[bytes]:
         """Process the next part of the body and return the completed lines."""
@@ -93,7 +93,7 @@ class EventStreamParser:
     """An incremental parser of an event stream."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Skip events longer than `max_bytes`; `last_id` is the last id of the old connection."""
+        """Skip events longer than `max_bytes`; `last_id` is the previous connection's last id."""
         self._most = max_bytes
         self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
@@ -103,9 +103,9 @@ class EventStreamParser:
         self._is_too_long = False
         self._next_id = last_id
         self.last_id = last_id
-        """The newest event's id, sent as the header Last-Event-ID."""
+        """The newest event's id, sent in the Last-Event-ID header."""
         self.left_out = 0
-        """Number of skipped events so far."""
+        """Number of events skipped so far."""
         self.retry_s: float | None = None
         """Retry delay requested by the robot, in seconds; None if the robot has requested none."""
 

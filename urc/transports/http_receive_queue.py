@@ -21,7 +21,7 @@ class HttpReceiveQueue:
 
     def __init__(self) -> None:
         self._waiting: dict[object, Envelope] = {}
-        """Queued envelopes by key: an image's topic, or a number for other envelopes."""
+        """Queued envelopes; the key is an image's topic, or a number for other envelopes."""
         self._number = 0
         self._events = 0
         self._events_bytes = 0
@@ -33,7 +33,7 @@ class HttpReceiveQueue:
         """Number of images that were replaced by newer images."""
 
     def answer(self, place: int, envelope: Envelope) -> None:
-        """Add the response to a request; the limit of requests also limits the responses."""
+        """Add the response to a request; the limit on requests also limits the responses."""
         self._waiting["answer", place] = envelope
         self._arrived.set()
 
@@ -67,7 +67,7 @@ class HttpReceiveQueue:
 
     @property
     def ended(self) -> str | None:
-        """Reason why the queue ended; None while the connection is open."""
+        """Why the queue ended; None while the connection is open."""
         return self._ended
 
     async def pop(self) -> tuple[Envelope, int | None]:

@@ -36,8 +36,8 @@ SHORTEST_RETRY_S: Final = 0.2
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""Minimum silence of all streams, in seconds, before a refused connection means that the robot is
-unreachable."""
+"""Time for which all streams must be silent, in seconds, before a refused connection means that the
+robot is unreachable."""
 
 log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ class LastActivity:
         self._beat_s = self._clock()
 
     def heartbeat(self) -> None:
-        """Record received data."""
+        """Record that data has arrived."""
         self._beat_s = self._clock()
 
     @property
@@ -202,7 +202,7 @@ class HttpStream:
             await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Pass an event to the topic with its name; without such a topic, to the path's topic."""
+        """Pass an event to the topic with its name, or otherwise to the path's topic."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:

@@ -1,6 +1,6 @@
 """Trusted SSH host keys, from URC's own file and from the transport options.
 
-URC's file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys to this file,
+URC's file uses the format of OpenSSH's ``known_hosts``. Only `remember` adds keys to this file,
 after a person has confirmed the key with ``urc trust``.
 """
 
@@ -28,7 +28,7 @@ class HostKeyStatus(NamedTuple):
 
 
 def own_file() -> Path:
-    """Return the path of URC's file of confirmed host keys."""
+    """Return the path of the file in which URC stores confirmed host keys."""
     return data_folder() / "known_hosts"
 
 
@@ -72,7 +72,7 @@ class HostKeys:
         return found
 
     def judge(self, key: asyncssh.SSHKey, known: HostKeyStatus) -> str:
-        """Return "" for a trusted `key`; otherwise a fingerprint, ``revoked`` or ``unknown``."""
+        """Return "" for a trusted `key`, or a trusted fingerprint, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
         if key in known.revoked:
@@ -114,7 +114,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> HostKeySta
     except (OSError, UnicodeError) as fault:
         raise TransportError(f"cannot read the known-hosts file {file} ({_why(fault)})") from fault
     try:
-        # With a port, asyncssh would accept the key of port 22 for any other port.
+        # Given a port, asyncssh would accept the key for port 22 on any other port.
         found = asyncssh.match_known_hosts(
             asyncssh.import_known_hosts(text), _name(host, port), "", None
         )
@@ -125,7 +125,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> HostKeySta
 
 
 def _write(file: Path, text: str) -> None:
-    """Replace the whole file, readable only by its owner."""
+    """Replace the whole file with a file that only its owner can read."""
     put_private(file, text.encode())
 
 

@@ -1,9 +1,9 @@
 """A transport for robots behind an MQTT broker, with MQTT version 5 or 3.1.1.
 
 Theory of operation. The library paho implements the protocol, but URC opens the network connection.
-Each `open` connects a socket and creates a paho client for this connection only. No message of an
-earlier connection can therefore be sent late. A reused paho client would store unacknowledged
-messages and send the messages again. The transport starts no thread.
+Each `open` connects a socket and creates a paho client for this connection only. A message from an
+earlier connection can therefore never be sent late. A reused paho client would store unacknowledged
+messages and send them again. The transport starts no threads.
 
 Every connection starts a clean MQTT session. The broker publishes the last will whenever the
 connection ends, even if URC closes it. A will that repeats a stop is harmless.
@@ -55,7 +55,7 @@ class MqttTransport:
     """A transport to one broker, which may be opened several times."""
 
     def __init__(self, options: MqttOptions, dialer: Dialer) -> None:
-        """Store the options and the dialer of a broker, without connecting."""
+        """Store the options and the dialer for a broker, without connecting."""
         self._options = options
         self._dialer = dialer
         self._session: _MqttSession | None = None
@@ -318,7 +318,7 @@ class _MqttSession:
             self._lose(self._client.fault or HUNG_UP)
 
     def _lose(self, reason: str) -> None:
-        """Wake all waiting tasks with the reason why the connection ended."""
+        """Wake all waiting tasks and tell them why the connection ended."""
         self.queue.end(reason)
         self._forget(self.line)
         if not self._answered.done():
@@ -344,10 +344,10 @@ class _PahoClient(Client):
         self._options = options
         self._given = line
         self.fault = ""
-        """The system's reason why the connection ended, which paho only logs."""
+        """The system's reason for the end of the connection, which paho only logs."""
 
     def start(self) -> None:
-        """Send the log-in."""
+        """Send the login request."""
         options = self._options
         properties: Properties | None = None
         if options.is_v5:
@@ -388,7 +388,7 @@ class _PahoClient(Client):
         """Read part of a message, because paho would allocate memory for the whole declared size.
 
         Raises:
-            BlockingIOError: the declared size exceeds the limit, see `excess`; nothing is read.
+            BlockingIOError: the declared size exceeds the limit (see `excess`); nothing is read.
         """
         if bufsize > MAX_BYTES:
             raise BlockingIOError

@@ -83,7 +83,7 @@ def read_options(setup: TransportSetup) -> MqttOptions:
 
 
 def body_bytes(body: object) -> bytes:
-    """Encode a message body: bytes stay unchanged, all other values become JSON.
+    """Encode a message body: bytes stay unchanged, and all other values become JSON.
 
     Raises:
         TransportError: the value cannot be written as JSON.

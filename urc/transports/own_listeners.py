@@ -1,8 +1,8 @@
 """The listening addresses of URC's own dashboard, to which no transport may connect.
 
 A document that connects to the dashboard would have a local program's rights. The address of each
-open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
-address. Connections forwarded by a router, a proxy or another machine are not detected.
+open connection is checked, so a host name, a redirect or an unusual notation cannot hide it.
+Connections forwarded by a router, a proxy or another machine are not detected.
 """
 
 import ipaddress
@@ -57,7 +57,7 @@ class OwnListeners:
             self.check_place(_address(peer[0]), peer[1])
 
     def check_place(self, address: Address, port: int, *, is_near: bool = True) -> None:
-        """Raise `OwnAddressError` if a connection to that address would reach URC's own dashboard.
+        """Raise `OwnAddressError` if a connection to `address` would reach URC's own dashboard.
 
         Args:
             address: target address.

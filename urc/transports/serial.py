@@ -32,7 +32,7 @@ class SerialSettings(NamedTuple):
     """Settings of a serial port."""
 
     baud: int = 115_200
-    """Bits a second."""
+    """Bits per second."""
     data_bits: int = 8
     parity: str = "none"
     stop_bits: float = 1

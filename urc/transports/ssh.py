@@ -1,8 +1,8 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
 A shared SSH connection has several users: the transport's own channel, and all transports that name
-this transport in ``tunnel``. The first user opens the connection, the last user closes the
-connection, and a lost connection disconnects all users.
+this transport in ``tunnel``. The first user opens the connection, the last user closes it, and its
+loss disconnects all users.
 """
 
 import asyncio
@@ -145,7 +145,7 @@ lines."""
 
 
 class SshTransport:
-    """A transport over one SSH server, which can also serve as a `Tunnel` for other transports."""
+    """A transport to one SSH server, which can also serve as a `Tunnel` for other transports."""
 
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
@@ -185,7 +185,7 @@ class SshTransport:
         return await self._connection.ended()
 
     async def send(self, data: Payload) -> None:
-        """Wait for space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
+        """Wait for buffer space, then pass `data` to the kernel; raise `PeerClosed` on an error."""
         if self._connection is None:
             raise PeerClosed(CLOSED)
         if self._channel is None:
@@ -250,7 +250,7 @@ class SshTransport:
                 await self._outer.leave()
 
     async def join(self, timeout_s: float) -> asyncssh.SSHClientConnection:
-        """Return the asyncssh connection for a tunnelled connection; afterwards, call `leave`."""
+        """Return the asyncssh connection for a tunnelled connection; call `leave` afterwards."""
         return (await self._shared.join(timeout_s)).ssh
 
     async def leave(self) -> None:

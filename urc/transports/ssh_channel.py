@@ -1,4 +1,4 @@
-"""A channel of an SSH connection as a byte stream.
+"""An SSH channel as a byte stream.
 
 Received data is buffered up to `READ_AHEAD_BYTES`. If the buffer is full, the channel is not read,
 and SSH flow control stops the sender. `write` returns after the kernel has accepted every byte.
@@ -22,7 +22,7 @@ WINDOW = 262_144
 """SSH window size of the channel, excluding the receive buffer, in bytes."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
-"""Maximum wait until a program that has closed its output exits, in seconds."""
+"""Maximum wait for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
 """Maximum size of standard error output in the message about a program's end, in bytes."""
 
@@ -46,7 +46,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._last_words = b""
         self._outcome = ""
         self._ended: str | None = None
-        """Reason why the channel ended; None while the channel is open."""
+        """Why the channel ended; None while the channel is open."""
         self._late: asyncio.TimerHandle | None = None
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()

@@ -21,12 +21,12 @@ from urc.transports.topic_socket import Address
 __all__ = ["SshConnection", "SharedConnection"]
 
 _GONE_WITHIN_S = 0.5
-"""Maximum wait until a closed connection has ended, in seconds."""
+"""Maximum wait for a closed connection to end, in seconds."""
 _LOOK_UP_S = 2.0
 
 
 class SshConnection:
-    """An open SSH connection after the login."""
+    """An open SSH connection after login."""
 
     def __init__(
         self, ssh: asyncssh.SSHClientConnection, wire: SshSocket, address: Address
@@ -37,7 +37,7 @@ class SshConnection:
         self._address = address
         self._strays: set[asyncio.Task[Any]] = set()
         self.when_closed: Callable[[], Awaitable[None]] | None = None
-        """Callback after `close` that releases the outer tunnel; called once."""
+        """Callback that releases the outer tunnel after `close`; called once."""
 
     @property
     def is_up(self) -> bool:
@@ -46,7 +46,7 @@ class SshConnection:
 
     @property
     def fault(self) -> str:
-        """Reason why the connection ended; "" while the connection is open."""
+        """Why the connection ended; "" while the connection is open."""
         return self._wire.fault
 
     async def ended(self) -> NoReturn:
@@ -113,7 +113,7 @@ class SshConnection:
             return False
 
     async def close(self) -> None:
-        """Close the connection immediately, with every channel."""
+        """Close the connection and all its channels immediately."""
         self._wire.end(CLOSED)
         self.ssh.abort()
         with suppress(TimeoutError):
@@ -135,7 +135,7 @@ class SshConnection:
     ) -> SshChannel:
         """Open `channel`; after a cancellation, close the channel as soon as possible.
 
-        asyncssh forgets a channel after a cancelled opening, but the server keeps the channel open.
+        If the opening is cancelled, asyncssh forgets the channel, but the server keeps it open.
         """
         task = asyncio.ensure_future(begin(channel))
         try:
@@ -165,10 +165,10 @@ class SharedConnection:
     """A shared SSH connection, opened by the first user and closed by the last user."""
 
     def __init__(self, dial: Callable[[float], Awaitable[SshConnection]]) -> None:
-        """Initialise.
+        """Initialise without connecting.
 
         Args:
-            dial: function that opens a connection within the given number of seconds; frees all
+            dial: function that opens a connection within the given number of seconds, and frees all
                 resources if cancelled.
         """
         self._dial = dial
@@ -194,7 +194,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the shared connection; after the last user, close the connection."""
+        """Release the shared connection, and close it after the last user."""
         self._users -= 1
         if self._users:
             return

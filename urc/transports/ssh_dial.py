@@ -28,12 +28,12 @@ class OfferedHostKey(NamedTuple):
 
     @property
     def fingerprint(self) -> str:
-        """``SHA256:…``."""
+        """The fingerprint, as ``SHA256:…``."""
         return fingerprint(self.key)
 
     @property
     def algorithm(self) -> str:
-        """``ssh-ed25519`` …."""
+        """The algorithm's name, such as ``ssh-ed25519``."""
         return self.key.algorithm.decode("ascii")
 
 
@@ -82,7 +82,7 @@ async def dial(
             limit.
 
     Raises:
-        ConnectFailed: connecting or the login failed; the message may include a hint.
+        ConnectFailed: the connection or the login failed; the message may include a hint.
     """
     client = _SshClient(target, _known(target), only_looks=False)
     async with credentials(target.login) as secrets:
@@ -92,11 +92,11 @@ async def dial(
 async def look_at_key(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> OfferedHostKey:
-    """Return the server's host key without logging in; `dial` describes the parameters."""
+    """Return the server's host key without logging in; see `dial` for the parameters."""
     client = _SshClient(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})
-        await connection.close()  # trusted by the signature of an authority
+        await connection.close()  # trusted because an authority has signed the key
     except ConnectFailed:
         if client.offer is None:
             raise
@@ -124,7 +124,7 @@ async def _connect(
             target.address.host,
             target.address.port,
             client_factory=lambda: client,
-            config=None,  # ignore ~/.ssh/config, because a document must work equally for all users
+            config=None,  # ignore ~/.ssh/config, so that a document works the same for all users
             tunnel=through,
             known_hosts=([], list(known.authorities), list(known.revoked)),
             server_host_key_algs=host_key_algorithms(

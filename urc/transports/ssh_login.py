@@ -23,7 +23,7 @@ _CERTIFICATES = tuple(
     for name in ("ssh-ed25519", "ecdsa-sha2-nistp256", "rsa-sha2-512", "rsa-sha2-256")
 )
 _LEGACY = {
-    # Algorithms of servers from 2005 to 2015; weak, and used only on request of the document.
+    # Weak algorithms of servers from 2005 to 2015, used only if the document requests them.
     "kex_algs": "+diffie-hellman-group14-sha1,diffie-hellman-group1-sha1,"
     "diffie-hellman-group-exchange-sha1",
     "encryption_algs": "+aes256-cbc,aes192-cbc,aes128-cbc,3des-cbc",
@@ -46,7 +46,7 @@ class Login(NamedTuple):
     """Whether to accept legacy algorithms that are no longer secure."""
 
     def __repr__(self) -> str:
-        """Return a text with only the user name, so that no secret enters a log."""
+        """Return text with only the user name, so that no secret enters a log."""
         return f"Login({self.username!r})"
 
 
@@ -54,7 +54,7 @@ def algorithms(login: Login) -> dict[str, Any]:
     """Return asyncssh options for the accepted algorithms, except for host key algorithms."""
     if not login.legacy:
         return {}
-    # 'legacy: true' is a deliberate choice; the warning would disturb other output.
+    # 'legacy: true' is a deliberate choice; the warning would clutter other output.
     warnings.filterwarnings("ignore", message="Diffie-Hellman over finite fields")
     return dict(_LEGACY)
 
@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the accepted host key types, the types of known keys first."""
+    """Return the accepted host key types, with the types of known keys first."""
     familiar = [
         name.decode("ascii")
         for key in known

@@ -26,7 +26,7 @@ delay lets asyncssh read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return a one-line message about why a connection ended, as in other transports."""
+    """Return one line that says why a connection ended, as in other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
             return "the connection broke (the robot no longer answers)"
@@ -40,7 +40,7 @@ class SshSocket(asyncio.BufferedProtocol):
     """A protocol that passes bytes between asyncssh and the socket; see `is_full` and `fault`."""
 
     def __init__(self, inner: asyncio.Protocol) -> None:
-        """Initialise below `inner`."""
+        """Initialise a socket for the asyncssh protocol `inner`."""
         self._inner = inner
         self._buffer = memoryview(bytearray(_READ_BYTES))
         self._room = asyncio.Event()
@@ -49,7 +49,7 @@ class SshSocket(asyncio.BufferedProtocol):
         self._transport: Any
         self._untaken = 0
         self.fault = ""
-        """Reason why the whole connection ended; "" while the connection is open."""
+        """Why the whole connection ended; "" while the connection is open."""
 
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged."""
@@ -100,7 +100,7 @@ class SshSocket(asyncio.BufferedProtocol):
         self.passes(bytes(self._buffer[:nbytes]))
 
     def passes(self, data: bytes) -> None:
-        """Pass on received data; too many unsent replies close the connection."""
+        """Pass on received data; close the connection after too many unsent replies."""
         before = self._transport.get_write_buffer_size()
         self._inner.data_received(data)
         after = self._transport.get_write_buffer_size()
@@ -138,7 +138,7 @@ class SshSocket(asyncio.BufferedProtocol):
 
     def _no_more_comes(self) -> None:
         self._inner.eof_received()
-        self.end(HUNG_UP)  # unless asyncssh has a better reason; later errors follow from this end
+        self.end(HUNG_UP)  # unless asyncssh gave a better reason; later errors are consequences
         self._transport.close()
 
     def _lost(self, exc: Exception | None) -> None:
@@ -148,7 +148,7 @@ class SshSocket(asyncio.BufferedProtocol):
 
 
 class TunnelAdapter:
-    """An asyncssh tunnel that provides the connection for the SSH connection to use."""
+    """An asyncssh tunnel that supplies the connection under an SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
         """Create a tunnel over a connected socket, or over another forwarding SSH connection."""

@@ -113,7 +113,7 @@ class _TelnetStream:
         self._inner = inner
         self._talk = talk
         self._line = line
-        self._put = inner.write  # the path of every message, looked up once
+        self._put = inner.write  # used for every message, so looked up only once
         self._encode = talk.encode
 
     async def read(self) -> bytes:

@@ -114,7 +114,7 @@ class TelnetNegotiation:
         return frozenset(self._theirs.active)
 
     def requests(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:
-        """Return the bytes that request `options`."""
+        """Return the bytes that request the options `ours` and `theirs`."""
         wishes = [self._ours.request(option) for option in ours]
         return b"".join(wishes + [self._theirs.request(option) for option in theirs])
 
@@ -136,13 +136,13 @@ class TelnetNegotiation:
 
     def encode(self, data: bytes) -> bytes:
         """Return `data` in encoded form: a single CR becomes CR NUL, and byte 255 is doubled."""
-        # Searching for a number is ten times as fast as for a byte string.
+        # Searching for a number is ten times as fast as searching for a byte string.
         if _CR in data and BINARY not in self._ours.active:
             data = _BARE_CR.sub(b"\r\0", data)
         return data.replace(_IAC_BYTE, b"\xff\xff") if _IAC in data else data
 
     def _as_meant(self, text: bytes) -> bytes:
-        """Return text without NUL characters, which only follow a CR or serve as padding."""
+        """Return text without NUL characters, which appear only after a CR or as padding."""
         return text if BINARY in self._theirs.active else text.translate(None, b"\0")
 
     # -- states of the parser; each consumes bytes from `at` and returns the next offset

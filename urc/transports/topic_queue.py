@@ -35,20 +35,20 @@ class TopicReceiveQueue:
 
     def __init__(self) -> None:
         self._waiting: dict[int, Envelope] = {}
-        """Queued envelopes by sequence number, in order of arrival."""
+        """Queued envelopes in order of arrival, keyed by sequence number."""
         self._topics: dict[str, deque[tuple[int, int]]] = {}
-        """Sequence number and size of each queued message, by topic."""
+        """Sequence number and size of each queued message, keyed by topic."""
         self._sizes: dict[str, int] = {}
         self._bytes = 0
         self._messages = 0
         self._answers: dict[int, int] = {}
-        """Size of each queued response, by sequence number."""
+        """Size of each queued response, keyed by sequence number."""
         self._answers_bytes = 0
         self._number = 0
         self._arrived = asyncio.Event()
         self._ended: str | None = None
         self.dropped = 0
-        """Number of dropped envelopes so far."""
+        """Number of envelopes dropped so far."""
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
         """Add a message of `topic`; drop old messages if necessary."""
@@ -86,7 +86,7 @@ class TopicReceiveQueue:
 
     @property
     def ended(self) -> str | None:
-        """Reason why the connection ended; None while the connection is open."""
+        """Why the connection ended; None while the connection is open."""
         return self._ended
 
     @property
@@ -116,7 +116,7 @@ class TopicReceiveQueue:
         return self._number
 
     def _drop(self, topic: str, number: int) -> None:
-        """Drop the oldest message of `topic`, with the sequence number `number`."""
+        """Drop the oldest message of `topic`, which has the sequence number `number`."""
         del self._waiting[number]
         self._forget(topic)
         self.dropped += 1
@@ -135,5 +135,5 @@ class TopicReceiveQueue:
         self._messages -= 1
         if queue:
             self._sizes[topic] -= size
-        else:  # the number of topics behind a wildcard is unlimited
+        else:  # a wildcard may match any number of topics
             del self._topics[topic], self._sizes[topic]

@@ -24,9 +24,10 @@ class Address:
         self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def dial(self, timeout_s: float) -> socket.socket:
-        """Return a connected non-blocking socket; every address has an equal share of the time.
+        """Return a connected non-blocking socket; every address gets an equal share of the time.
 
-        OSError, UnicodeError: connecting failed; `explain` returns a message.
+        Raises:
+            OSError, UnicodeError: the connection failed; `explain` returns a message.
         """
         return await self._lookup.first(connected, timeout_s)
 

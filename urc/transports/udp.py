@@ -1,7 +1,7 @@
 """The UDP transport; every payload is one datagram, and every datagram is one frame.
 
 UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
-The transport reports errors that UDP can detect: a closed port of the robot, and a missing route.
+The transport reports errors that UDP can detect: a closed port on the robot, and a missing route.
 If the options contain no address, opening waits for the first datagram, and its sender becomes the
 robot.
 
@@ -36,7 +36,7 @@ _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IP
 """Linux socket option IP_RECVERR, which Python does not define. IP_RECVERR also reports refusals on
 unconnected sockets."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""Errors that report a datagram lost on this machine; UDP permits such losses."""
+"""Errors that report the loss of a datagram on this machine; UDP permits such losses."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
@@ -62,7 +62,7 @@ class UdpTransport:
             port: the robot's port, 1 to 65535; 0 to use the source port of the robot's datagrams.
             listen: local port; 0 lets the system choose.
             bind: local address; "" for all addresses of this machine.
-            accepts_any: whether to accept datagrams from any sender, instead of only from `host`.
+            accepts_any: whether to accept datagrams from any sender, not only from `host`.
             is_broadcast: whether `host` is a broadcast address.
         """
         self._host = host
@@ -84,7 +84,7 @@ class UdpTransport:
         self._ended = CLOSED
         self._changed = asyncio.Event()
         self.dropped = 0
-        """Number of dropped datagrams since the transport was created."""
+        """Number of datagrams dropped since the transport was created."""
 
     @property
     def address(self) -> str:
@@ -139,10 +139,7 @@ class UdpTransport:
                 self._take_fault(fault, len(payload))
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` without waiting; return whether the data was sent.
-
-        Never waits.
-        """
+        """Send `data` without waiting; return whether the data was sent."""
         if self._line is None or self._ended or self._robot is None:
             return False
         try:
@@ -174,7 +171,7 @@ class UdpTransport:
                 rows = await self._lookup.addresses()
             except (OSError, UnicodeError) as fault:
                 raise ConnectFailed(explain(self._host, self._host, fault)) from fault
-            # The working address of a name is unknown, and robots use IPv4.
+            # It is unknown which of a name's addresses works, and robots use IPv4.
             family, address = min(rows, key=lambda row: row[0] != socket.AF_INET)
             self._allowed = frozenset(str(one[0]).partition("%")[0] for _, one in rows)
             self._robot = tuple(address) if self._port else None  # type: ignore[arg-type]
@@ -241,7 +238,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the connection because of an error, and raise this error.
+        """End the connection because of an error, and raise the error.
 
         Raises:
             TransportError: always.

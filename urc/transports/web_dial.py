@@ -34,7 +34,7 @@ class Dialer:
     """A dialer for one web server, which may be used several times."""
 
     def __init__(self, place: WebOrigin, *, tls: Tls | None, tunnel: Tunnel | None) -> None:
-        """Store the origin `place`, the TLS settings, and the tunnel of future connections."""
+        """Store the origin `place`, the TLS settings, and the tunnel for future connections."""
         self._reach = StreamDialer(place.host, place.port, tunnel=tunnel, tls=tls)
         is_plain = tls is None and tunnel is None
         self._address = Address(place.host, place.port) if is_plain else None

@@ -1,6 +1,6 @@
 """Options that `http` and `websocket` share: URL, TLS, credentials and headers.
 
-The server is fixed when the transport is created, so no robot's response can redirect requests
+The server is fixed when the transport is created, so a robot's response cannot redirect requests
 elsewhere.
 """
 
@@ -32,7 +32,7 @@ class WebOrigin(NamedTuple):
 
     @property
     def authority(self) -> str:
-        """Host and port in the notation of the header Host."""
+        """Host and port in the notation of the Host header."""
         return place_of(self.host, self.port)
 
 
@@ -45,7 +45,7 @@ class OptionReader:
         self._options = options
 
     def part(self, name: str) -> "OptionReader":
-        """Return the options inside the mapping option `name`; empty for a missing option."""
+        """Return a reader of the mapping option `name`; it is empty for a missing option."""
         found = self._options.get(name)
         if found is None:
             return OptionReader(self.kind, {})
@@ -54,7 +54,7 @@ class OptionReader:
         return OptionReader(self.kind, found)
 
     def entries(self) -> Iterable[tuple[str, object]]:
-        """Return all options as a mapping."""
+        """Return all options as pairs of name and value."""
         return self._options.items()
 
     def tokens(self, name: str) -> list[str]:
@@ -84,7 +84,7 @@ class OptionReader:
         return found
 
     def flag(self, name: str, default: bool) -> bool:
-        """Return a boolean."""
+        """Return a boolean option."""
         found = self._options.get(name, default)
         if not isinstance(found, bool):
             raise TransportError(f"{self.kind} needs true or false as {name}, not {found!r}")

@@ -33,7 +33,7 @@ READ_AHEAD_MESSAGES = 4
 """Maximum number of messages that are read ahead."""
 MAX_MESSAGE_BYTES = 1_048_576
 UNTAKEN_BYTES = 1_048_576
-"""Maximum number of bytes of unsent ping replies."""
+"""Maximum number of unsent bytes in ping replies."""
 _NORMAL = CloseCode.NORMAL_CLOSURE
 _CLOSE_S = 0.2
 """Timeout for an orderly close, in seconds; afterwards, the connection is reset."""
@@ -71,7 +71,7 @@ class WebSocketTransport:
 
     @property
     def subprotocol(self) -> str | None:
-        """Subprotocol that the server has selected; None without a selection."""
+        """Subprotocol that the server has selected; None if it has selected no subprotocol."""
         return None if self._socket is None else self._socket.subprotocol
 
     async def open(self, timeout_s: float) -> None:
@@ -181,7 +181,7 @@ class WebSocketTransport:
         try:
             # Our own timeout covers connecting and the handshake.
             return await _Connect(
-                f"ws://{place.authority}{place.path}",  # any TLS is below
+                f"ws://{place.authority}{place.path}",  # TLS, if any, is in the layer below
                 sock=line,
                 create_connection=_LimitedConnection,
                 subprotocols=self._subprotocols or None,
@@ -226,7 +226,7 @@ class _LimitedConnection(ClientConnection):
             self._sign.set_result(None)
 
     def data_received(self, data: bytes) -> None:
-        """Process received data; too many unsent ping replies end the connection."""
+        """Process received data; end the connection after too many unsent ping replies."""
         self._give_sign()
         before = self.transport.get_write_buffer_size()
         super().data_received(data)
@@ -250,7 +250,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 async def _hang_up(connection: ClientConnection) -> None:
-    """Close the connection in order; after a timeout or a cancellation, reset the connection."""
+    """Close the connection in an orderly way; reset it after a timeout or a cancellation."""
     try:
         with suppress(TimeoutError):
             async with asyncio.timeout(2 * _CLOSE_S):
@@ -279,7 +279,7 @@ def _refusal(fault: Exception, where: str) -> str:
 
 
 def _end(ended: ConnectionClosed) -> str:
-    """Return a one-line message with the reason why the connection ended."""
+    """Return a one-line message that says why the connection ended."""
     theirs, ours, cause = ended.rcvd, ended.sent, ended.__cause__
     if theirs is not None and ended.rcvd_then_sent is not False:
         said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""

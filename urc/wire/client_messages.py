@@ -1,4 +1,4 @@
-"""The shapes of client messages, by their tag ``t``.
+"""The shapes of client messages, identified by their tag ``t``.
 
 Layer 3½. Pure: `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
 limit the nesting depth: the decoder refuses values nested more deeply than a map of plain
@@ -47,7 +47,7 @@ _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as sent by the client."""
 Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-"""A request about the lease, or the reset of STOP."""
+"""A request about the lease, or a reset of STOP."""
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
@@ -73,7 +73,7 @@ class CommandRequest(
 class ImageSelection(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """The selection of the images that the page shows; the server sends no other images."""
+    """The images that the page shows; the server sends no others."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
@@ -81,7 +81,7 @@ class ImageSelection(
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """The answer to question `n`; the asking page withdraws the question with False."""
+    """The answer to question `n`; the asking page sends False to withdraw the question."""
 
     n: int
     yes: bool
@@ -138,7 +138,7 @@ class Drive(
     for_s: float = REQUEST_S
     """Time for the holder's answer, in seconds."""
     stops: int | None = None
-    """Number of STOPs in the lease that the operator saw. A reset is refused if STOP was pressed
+    """Number of STOPs that the operator saw in the lease. A reset is refused if STOP was pressed
     again meanwhile; null means the current number."""
 
 
@@ -158,7 +158,7 @@ class Release(
     """The release of a held control.
 
     Releases and ticks share one count: after a release, ticks with lower numbers have no effect. A
-    program that sends both in order may send 0.
+    program that sends both in order may send 0 as the number.
     """
 
     command: str
@@ -174,7 +174,7 @@ class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True
 class JoinRedundant(
     msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
 ):
-    """First message of a redundant socket, with the key from the page's lease."""
+    """The first message on a redundant socket, with the key from the page's lease."""
 
     key: str
 
@@ -213,6 +213,6 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     Release: "drive",
     Stop: None,
 }
-"""The lowest role that may send each message; None means that every page may send it. A command may
-require a
-higher role (see `urc.model.driver.Command`). Taking the controls by force requires ``maintain``."""
+"""The lowest role that may send each message; None means that every page may send the message. A
+command may require a higher role (see `urc.model.driver.Command`). Taking the controls by force
+requires ``maintain``."""

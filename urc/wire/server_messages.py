@@ -1,4 +1,4 @@
-"""The shapes of server messages, by their tag ``t``.
+"""The shapes of server messages, identified by their tag ``t``.
 
 Layer 3½. Pure: `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
 milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
@@ -101,10 +101,10 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
 
 class ValuesMessage(Outbound, tag="v", frozen=True):
-    """Changed signals: `i` indexes into the names, `v` values, `s` alarms (None if all are normal).
+    """Changed signals: `i` holds name indexes, `v` values and `s` alarms (None if all are normal).
 
-    A signal with a history may have several values, oldest first; `e` contains the number of its
-    first value, by index. `n` is the server's time in milliseconds.
+    A signal with a history may have several values, oldest first; `e` maps its index to the number
+    of its first value. `n` is the server's time in milliseconds.
     """
 
     n: int
@@ -127,7 +127,7 @@ class LinkRow(msgspec.Struct, frozen=True):
     attempts: int
     faults: int
     cause: str = ""
-    """Cause of a lost connection, by name; "" for an unknown cause."""
+    """Name of the cause of a lost connection; "" for an unknown cause."""
 
 
 class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):
@@ -146,7 +146,7 @@ class LogRow(msgspec.Struct, frozen=True):
 
 
 class LogMessage(Outbound, tag="log", omit_defaults=False, frozen=True):
-    """New lines of the log, oldest first; a gap in the numbers shows dropped lines."""
+    """New lines of the log, oldest first; a gap in the numbers means that lines were dropped."""
 
     first: int
     """Number of the first log line within the session, from 0."""
@@ -210,7 +210,7 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     spare: str
     """Secret key for the page's redundant socket; "" for watchers."""
     role: Role | None = None
-    """The page's role for the robot; None without any rights."""
+    """The page's role for the robot; None if the page has no rights."""
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):
@@ -340,4 +340,4 @@ ServerMessage = (
     | ProgressMessage
     | AlarmsMessage
 )
-"""Every text message of the server."""
+"""Every text message that the server sends."""

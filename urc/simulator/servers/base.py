@@ -39,7 +39,7 @@ class Endpoint(NamedTuple):
     driver's options.
     """
     path: str = ""
-    """Path of the device file of a serial port."""
+    """Path of a serial port's device file."""
 
 
 class LastPeer:
@@ -70,7 +70,7 @@ class ServerContext(NamedTuple):
     is_anywhere: bool = False
     """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
-    """Function that returns the current world image for the given topic names; None without an
+    """Function that returns the current world image for the given topic names; None if there is no
     image."""
     last_peer: LastPeer | None = None
     """Host that last sent data, shared by all of the robot's servers; None means that the host is

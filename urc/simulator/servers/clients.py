@@ -1,8 +1,8 @@
 """The clients of a simulated server, and their conversations with the robot.
 
 Each client has a separate `EmulatedConnection`. The number of clients, the size of input buffers
-and the write timeout are limited. When the limit is reached, a new client replaces the client that
-has been silent longest. Half-open connections therefore cannot block the server.
+and the write timeout are limited. At the maximum number of clients, a new client replaces the
+client that has been silent longest. Half-open connections therefore cannot block the server.
 """
 
 import asyncio

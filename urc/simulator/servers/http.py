@@ -61,10 +61,10 @@ _SIZE: Final = (8 * _BLOCKS[1]).to_bytes(2, "big") + (8 * _BLOCKS[0]).to_bytes(2
 _HEAD: Final = (
     b"\xff\xd8"
     + _segment(0xE0, b"JFIF\0\x01\x01\0\0\x01\0\x01\0\0")
-    # All quantisers are 8: the mean of a block is then encoded unchanged.
+    # All quantisers are 8, so a block's mean is encoded unchanged.
     + _segment(0xDB, b"\0" + b"\x08" * 64)
     + _segment(0xC0, b"\x08" + _SIZE + b"\x03\x01\x11\0\x02\x11\0\x03\x11\0")
-    # The lengths 0 to 11 as codes of four bits, and "nothing else in this block" as one bit.
+    # The lengths 0 to 11 as four-bit codes, and "nothing else in this block" as one bit.
     + _segment(0xC4, b"\0" + b"\0\0\0\x0c" + b"\0" * 12 + bytes(range(12)))
     + _segment(0xC4, b"\x10" + b"\x01" + b"\0" * 15 + b"\0")
     + _segment(0xDA, b"\x03\x01\0\x02\0\x03\0\0\x3f\0")
@@ -83,7 +83,7 @@ _TYPES = {
 
 
 class HttpRequest(NamedTuple):
-    """One request of a client."""
+    """One request from a client."""
 
     method: str
     target: str
@@ -126,7 +126,7 @@ class HttpServer(UrlServer, StreamServer):
 
 
 class _HttpConversation:
-    """Serve one connection, request by request. The last request may start a stream."""
+    """One connection's conversation, request by request. The last request may start a stream."""
 
     def __init__(
         self,
@@ -310,7 +310,7 @@ class _HttpConversation:
 
 
 def _written(answer: Envelope) -> tuple[int, list[tuple[str, str]], bytes]:
-    """Return status, headers and body of the robot's reply."""
+    """Return the status, headers and body of the robot's reply."""
     attributes, body = answer.attributes, answer.body
     is_ok = bool(attributes.get("ok", True))
     status = attributes.get("status")

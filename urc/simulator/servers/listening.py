@@ -27,7 +27,7 @@ class Listener(NamedTuple):
     address: tuple[Any, ...]
     """Host and port, followed by system-specific values."""
     close: Callable[[], None]
-    """Stops accepting connections."""
+    """Function that stops accepting connections."""
     wait_closed: Callable[[], Awaitable[None]]
 
 

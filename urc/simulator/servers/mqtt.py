@@ -1,7 +1,7 @@
 """The emulated robot as a client of a real MQTT broker.
 
 A broker must run at the configured address, as for the real robot. The emulated robot publishes the
-driver's subscribed topics. The emulated robot receives the messages of all other topics.
+topics to which the driver subscribes, and receives the messages of all other topics.
 """
 
 import asyncio
@@ -56,7 +56,7 @@ class MqttRobot:
         return Endpoint(host, port, f"mqtt through the broker {where}")
 
     async def close(self) -> None:
-        """Leave the broker."""
+        """Disconnect from the broker."""
         await self._clients.close()
         if self._transport is not None:
             await self._transport.close()
@@ -83,7 +83,7 @@ class MqttRobot:
             return None
 
         async def put(said: Sequence[Payload]) -> None:
-            with suppress(TransportError):  # the broker is gone: `take` notices it, too
+            with suppress(TransportError):  # the broker is gone: `take` notices this, too
                 for payload in said:
                     if isinstance(payload, Envelope) and payload.verb == "message":
                         topic = payload.attributes.get("topic")

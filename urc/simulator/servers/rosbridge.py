@@ -46,7 +46,7 @@ class Bridge:
     """The state shared by all clients of one bridge."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Create the bridge with the type of each of the robot's topics, by name; "" if unknown."""
+        """Create the bridge; `declared` maps the robot's topics to their types; "" if unknown."""
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
@@ -140,7 +140,7 @@ class BridgeClient:
             )
 
     def show(self, topic: str, message: object, now_s: float) -> None:
-        """Send a message to a subscribed client, limited by its throttle rate."""
+        """Send a message to the client if it subscribes, limited by its throttle rate."""
         wanted = self.wanted.get(topic)
         if wanted is None:
             return
@@ -390,8 +390,8 @@ def _png(data: bytes) -> str:
 MAX_BYTES = 10_000_000
 """Maximum frame size in bytes, equal to the default of the real server."""
 MAX_UNSENT_BYTES = 4_194_304
-"""Maximum number of unsent bytes per client. While a client is above the limit, messages to the
-client are dropped."""
+"""Maximum number of unsent bytes per client. While a client is above the limit, messages to it are
+dropped."""
 
 
 class RosbridgeServer(MessageServer):
@@ -421,7 +421,7 @@ class RosbridgeServer(MessageServer):
         clock = asyncio.get_running_loop().time
 
         def send(frame: str | bytes) -> None:
-            # No wait: a message to one client must not delay the others.
+            # Do not wait: a message to one client must not delay the others.
             if socket.transport.get_write_buffer_size() <= MAX_UNSENT_BYTES:
                 broadcast([socket], frame)
 

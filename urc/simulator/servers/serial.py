@@ -37,7 +37,7 @@ class SerialServer:
         )
 
     async def open(self) -> Endpoint:
-        """Make the port."""
+        """Create the port."""
         return await self._server.open()
 
     async def close(self) -> None:

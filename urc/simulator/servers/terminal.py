@@ -1,4 +1,4 @@
-"""The terminal of a simulated shell, with input echo and normalization of line endings.
+"""The terminal of a simulated shell, with input echo and normalised line endings.
 
 A terminal program sends CR, while a driver may send LF. Real terminals accept both CR and LF.
 """

@@ -23,8 +23,8 @@ from urc.simulator.servers.clients import ClientConnection, Clients, converse
 __all__ = ["UdpServer"]
 
 FORGOTTEN_S = 300.0
-"""Timeout for silent clients in seconds; it does not apply to the port on which the driver
-listens."""
+"""Timeout for silent clients, in seconds; the timeout does not apply to the port on which the
+driver listens."""
 _WAITING = 256
 """Maximum number of queued datagrams per client; further datagrams are dropped."""
 

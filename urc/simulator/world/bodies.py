@@ -177,7 +177,7 @@ def _swimmer(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> Non
     motion.phase = (motion.phase + body.frequency * motion.drive * dt_s) % 1.0
     target = body.speed * motion.drive * (1 - 0.4 * abs(motion.bend))
     motion.forward = _toward(motion.forward, target, body.acceleration * dt_s)
-    # A bent body only turns while the wave runs.
+    # A bent body turns only while the wave runs.
     motion.turn = body.turn * motion.bend * motion.drive
     motion.told_forward, motion.told_turn = motion.forward, motion.turn
     motion.effort = motion.drive
@@ -201,7 +201,7 @@ def _quadrotor(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> N
     if motion.z == 0.0 and motion.climb <= 0:
         motion.climb, motion.forward, motion.sideways, motion.turn = 0.0, 0.0, 0.0, 0.0
         motion.is_up = False
-    # It leans into its acceleration, and a little against the drag.
+    # The body leans into its acceleration, and a little against the drag.
     along = (motion.forward - before[0]) / dt_s + 0.4 * motion.forward
     across = (motion.sideways - before[1]) / dt_s + 0.4 * motion.sideways
     motion.pitch += (math.atan(along / GRAVITY) - motion.pitch) * 0.2

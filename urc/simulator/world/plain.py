@@ -112,7 +112,7 @@ def sweep(plan: WorldMap, moment: SensorInput) -> Mapping[str, object]:
 def _echoes(
     edge: Edge, x: float, y: float, first: float, step: float, rays: int
 ) -> Iterator[tuple[int, float]]:
-    """Yield the number and the distance of each ray that hits an edge."""
+    """Yield the number and distance of each ray that hits an edge."""
     start = math.atan2(edge.y1 - y, edge.x1 - x)
     swept = math.remainder(math.atan2(edge.y2 - y, edge.x2 - x) - start, math.tau)
     low, size = (start, swept) if swept >= 0 else (start + swept, -swept)
@@ -211,7 +211,7 @@ def _columns(ground: str, width: int, height: int, view: float, z: float) -> lis
 
 
 def _shades(ground: tuple[int, int, int], z: float, steepest: float) -> Channels:
-    """Return the colours from the slope `steepest` down to its negative."""
+    """Return the colours for the slopes from `steepest` down to its negative."""
     above, horizon = _SKY
     planes = [bytearray(_SHADES + 1) for _ in range(3)]
     for place in range(_SHADES + 1):
@@ -236,7 +236,7 @@ def _blend(one: Colour, other: Colour, share: float) -> Colour:
 
 
 def _row(column: _Column, height: int, slope: float) -> int:
-    """Return the image's first row whose ray is not above `slope`."""
+    """Return the first image row whose ray is not above `slope`."""
     return min(height, max(0, math.ceil(height / 2 - 0.5 - slope / column.scale)))
 
 

@@ -1,6 +1,6 @@
 """The map of the world: obstacle edges and holes.
 
-Pure. Lengths in metres.
+Pure. Lengths are in metres.
 """
 
 import math
@@ -54,8 +54,7 @@ ROOM: Final = PlanSpec(
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
 """The default room, 10 by 7 m. The room contains boxes, four coloured posts and descending stairs.
-A wall
-with a door divides it into two halves."""
+A wall with a door divides the room into two halves."""
 
 
 class WorldMap:
@@ -71,7 +70,7 @@ class WorldMap:
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Minimum x and y and maximum x and y of all obstacles, in metres.
+        """Minimum x, minimum y, maximum x and maximum y of all obstacles, in metres.
 
         Without obstacles, the bounds are a square with sides of 10 m.
         """

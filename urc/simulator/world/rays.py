@@ -1,4 +1,4 @@
-"""Vectorized intersection of rays with the edges of a world map.
+"""Vectorised intersection of rays with the edges of a world map.
 
 Pure. The module imports numpy, so it is loaded only on first use.
 """

@@ -111,7 +111,7 @@ def odometry(moment: SensorInput, reckoned: Odometry) -> Mapping[str, object]:
 
 
 def imu(moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.imu``: acceleration with gravity, and attitude."""
+    """Return ``world.imu``: acceleration including gravity, and attitude."""
     motion = moment.motion
     roll = motion.roll + 0.001 * moment.gauss("roll")
     pitch = motion.pitch + 0.001 * moment.gauss("pitch")

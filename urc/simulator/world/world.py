@@ -57,8 +57,8 @@ class World:
 
     Args:
         spec: the declaration.
-        inputs: function that returns the inputs of the body at a given time. The function `inputs`
-            may observe the world at the current step.
+        inputs: function that returns the inputs of the body at a given time. The function may
+            observe the world at the current step.
         holds: function that evaluates a camera condition, which a document may declare as a
             template.
         has_rendering: whether numpy and Pillow are installed.
@@ -117,7 +117,7 @@ class World:
             self._is_busy = False
 
     def low_battery(self) -> None:
-        """Set the battery to nearly empty."""
+        """Set the battery level to nearly empty."""
         self.battery.drain(_LOW)
 
     def view(self, now_s: float) -> "SensorView":
@@ -126,7 +126,7 @@ class World:
         return SensorView(self)
 
     def top_view(self, width: int, height: int) -> bytes:
-        """Return a top view of the world as JPEG, at most five new images per second.
+        """Return a top view of the world as JPEG; draw at most five new images per second.
 
         `width` and `height` are in pixels, from 16 to 2000.
         """
@@ -141,7 +141,7 @@ class World:
         return self._once(("top", size), 0.2, draw)
 
     def picture(self) -> bytes:
-        """Return the robot's camera image as JPEG, at most ten new images per second."""
+        """Return the robot's camera image as JPEG; draw at most ten new images per second."""
         flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
 
         def draw() -> bytes:

@@ -1,1 +1,1 @@
-"""ROS through rosbridge."""
+"""ROS through rosbridge or the Foxglove bridge."""

@@ -1,13 +1,13 @@
-"""A transport for ROS robots behind a server of the Foxglove protocol, such as foxglove_bridge.
+"""A transport for ROS robots behind a Foxglove protocol server, such as foxglove_bridge.
 
-Theory of operation. Each connection is one WebSocket, opened by URC's WebSocket transport, with
-pings. `FoxgloveSession` implements the protocol. Its objects are discarded with the connection, so
-no data can be sent late. A task reads continuously, even if messages are consumed slowly, because
-the bridge drops the oldest data of a slow client. Channels can appear and disappear. Changes are
+Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
+transport. `FoxgloveSession` implements the protocol. Its objects are discarded with the connection,
+so no data can be sent late. A task reads continuously, even if messages are consumed slowly,
+because the bridge drops a slow client's oldest data. Channels can appear and disappear. Changes are
 collected for `_SETTLE_S`, because a broken robot may announce thousands of channels per second.
 
 A bridge creates a ROS publisher when the client announces a topic, and ROS connects publishers and
-subscribers later. Stops are therefore repeated, and topics of earlier connections are announced
+subscribers later. Stops are therefore repeated, and topics from earlier connections are announced
 again as soon as a connection opens.
 """
 
@@ -37,7 +37,7 @@ _TURN_S: Final = 0.005
 
 
 class FoxgloveTransport:
-    """A transport to one server of the Foxglove protocol, which may be opened several times."""
+    """A transport to one Foxglove protocol server, which may be opened several times."""
 
     def __init__(
         self,
@@ -155,7 +155,7 @@ class FoxgloveTransport:
         """Wait until the first message of every topic has reached its subscribers.
 
         Returns:
-            A line with the topics without subscribers, or "".
+            A line that lists the topics without subscribers, or "".
         """
         topics = list(self._fresh)
         self._fresh.clear()
@@ -199,7 +199,7 @@ class FoxgloveTransport:
                     self._news.set()
                     if session.is_greeted:
                         self._greeted.set()
-                # Frames in the buffer need no wait, and some take long to parse.
+                # Buffered frames need no waiting, and some take a long time to parse.
                 if session.queue.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
                     began_s = clock()

@@ -1,4 +1,4 @@
-"""The state of one open connection of the Foxglove protocol: channels, subscriptions, calls.
+"""The state of one open Foxglove protocol connection: channels, subscriptions, calls.
 
 The session does no I/O. It writes frames to a list, and the transport sends these frames. Each
 object serves a single connection, so no state is carried over to the next.
@@ -8,7 +8,7 @@ only to the driver's topics. The bridge sends every message, so the session itse
 that arrive too soon. It delivers the last message of a burst later. The session passes messages on
 as bytes, preceded by the definition of the topic's type (`urc.protocol.ros.topic_codec`).
 
-The protocol provides the list of topics and the parameters. The session uses them to answer the
+The protocol provides the parameters and the list of topics. The session uses them to answer the
 corresponding rosapi services itself, so the same document also works with rosbridge.
 """
 
@@ -45,8 +45,8 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
 
 MAX_CHANNELS: Final = 4096
-"""Maximum number of known services, and of known channels; more are ignored. Channels of
-the driver's topics are accepted up to twice this number."""
+"""Maximum number of known services, and of known channels; any more are ignored. Channels for the
+driver's topics are accepted up to twice this number."""
 MAX_PENDING: Final = 256
 """Maximum number of pending calls; above the limit, the oldest call is dropped."""
 KNOWN_TOPICS: Final = 256
@@ -103,11 +103,12 @@ class FoxgloveSession:
         Args:
             queue: queue for messages and replies.
             wishes: the driver's topics, without duplicates.
-            graph: checks of topics.
-            call_at: function that calls a function at a given time of `clock`.
+            graph: object that checks topics.
+            call_at: function that schedules a call for a given time on `clock`.
             clock: monotonic clock, in seconds.
-            published: type of each published topic, by topic and encoding. The mapping persists
-                across connections, so that a new connection announces all these topics immediately.
+            published: type of each published topic, keyed by topic and encoding. The mapping
+                persists across connections, so that a new connection announces all these topics
+                immediately.
         """
         self.queue = queue
         self._wishes = {one.topic: one for one in wishes}
@@ -124,7 +125,7 @@ class FoxgloveSession:
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
         self._asked: dict[str, tuple[object, str]] = {}
-        """Request number and service of each pending parameter query, by query id."""
+        """Request number and service of each pending parameter query, keyed by query id."""
         self._listeners: dict[str, set[object]] = {}
         self._number = 0
         self._time = RobotTime()
@@ -138,7 +139,7 @@ class FoxgloveSession:
         self.has_graph = False
 
     def written(self) -> list[tuple[bytes, bool]]:
-        """Remove and return the frames to send, each with a flag that marks text."""
+        """Remove and return the frames to send, each with a flag that is true for text."""
         frames, self._frames = self._frames, []
         return frames
 
@@ -253,7 +254,7 @@ class FoxgloveSession:
         self.queue.answer(envelope, len(channel.schema))
 
     def check_topics(self) -> None:
-        """Report driver topics that have no publishers or another type."""
+        """Report driver topics that have no publishers or a different type."""
         self._graph.learn({one.topic: one.type for one in self._channels.values()})
         names = {topic for topic in self._wishes if not topic.startswith(PARAMETER)}
         self._graph.subscribed({topic: self._wishes[topic].type for topic in names})
@@ -338,7 +339,7 @@ class FoxgloveSession:
                     topic, Envelope("message", {"topic": topic}, {"value": value}), 64
                 )
 
-    # -- the graph and the status of the robot
+    # -- the robot's graph and status
 
     def _graph_update(self, said: Mapping[str, Any]) -> None:
         self.has_graph = True
@@ -363,8 +364,7 @@ class FoxgloveSession:
         """Forget the subscriptions to refused channels, so that `reconcile` subscribes again.
 
         The Foxglove SDK's server announces a channel before it accepts subscriptions, so it refuses
-        a client that subscribes immediately. The refusal is a text that contains the channel
-        number.
+        a client that subscribes immediately. The refusal is text that contains the channel number.
         """
         for one in list(self._topics.values()):
             topic, is_refused = one.wish.topic, one.channel.id in channels and not one.is_heard
@@ -488,7 +488,7 @@ class FoxgloveSession:
         while len(self._asked) >= MAX_PENDING:
             del self._asked[next(iter(self._asked))]
         self._asked[str(self._number)] = (number, name)
-        # rosapi writes /node:name, the Foxglove bridge /node.name.
+        # rosapi writes /node:name, and the Foxglove bridge writes /node.name.
         parameter = str(fields.get("name") or "").replace(":", ".")
         if name == "/rosapi/set_param":
             one = {"name": parameter, "value": _of_text(fields.get("value"))}

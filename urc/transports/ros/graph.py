@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Maximum number of remembered reports; beyond this number, further mistakes are not reported."""
+"""Maximum number of remembered reports; beyond this number, mistakes are not reported."""
 
 
 class TopicGraph:
@@ -21,7 +21,7 @@ class TopicGraph:
         """Initialise without topics.
 
         Args:
-            tell: callback with one line for each mistake.
+            tell: callback that receives one line for each mistake.
             ros: ROS version declared in the document; None if undeclared.
         """
         self._tell = tell
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version that uses this form of type names; None if unknown."""
+    """Return the ROS version that uses this form of type name; None if unknown."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None

@@ -15,7 +15,7 @@ _KEPT_NS: Final = 2_000_000_000
 
 
 class RobotTime:
-    """An estimate of the robot's time; without messages, this machine's time."""
+    """An estimate of the robot's time; before the first message, this machine's time."""
 
     def __init__(self) -> None:
         self._difference_ns = 0
@@ -33,7 +33,7 @@ class RobotTime:
         return divmod(max(here_ns + self._difference_ns, 0), 1_000_000_000)
 
     def stamped(self, data: bytes, offsets: Iterable[int], here_ns: int) -> bytes:
-        """Return a message in which the robot's time is written at each offset."""
+        """Return the message `data` with the robot's time written at each offset."""
         out, (seconds, nanos) = bytearray(data), self.now(here_ns)
         for offset in offsets:
             struct.pack_into("<II", out, offset, seconds & 0x7FFFFFFF, nanos)

@@ -1,21 +1,21 @@
 """A transport for ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
 
-Theory of operation. Each connection is one WebSocket, opened by URC's WebSocket transport, with
-pings. The protocol over the WebSocket is implemented by roslibpy
-(`urc.transports.ros.rosbridge_client`). The objects of roslibpy are discarded with the connection,
-so no data can be sent late. A task reads continuously, even if messages are consumed slowly,
-because one stalled reader would freeze the topic for every client of the bridge.
+Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
+transport. The protocol over the WebSocket is implemented by roslibpy
+(`urc.transports.ros.rosbridge_client`). roslibpy's objects are discarded with the connection, so no
+data can be sent late. A task reads continuously, even if messages are consumed slowly, because one
+stalled reader would freeze the topic for every client of the bridge.
 
-A bridge delivers the first message of a topic only after its publisher has connected to the
-subscribers. If the client disconnects earlier, the message is dropped. Clients therefore call
-`settle` before disconnecting: the method queries rosapi and waits for the subscribers. The reply of
-rosapi also shows that the bridge has processed all earlier data.
+A bridge delivers the first message on a topic only after its publisher has connected to the
+subscribers. If the client disconnects before then, the message is dropped. Clients therefore call
+`settle` before disconnecting: the method queries rosapi and waits for the subscribers. The
+reply also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
 all result in missing messages. The transport therefore requests the list of topics from rosapi at
 the start, and a topic's subscribers when the topic's first message is published.
 `urc.transports.ros.graph` reports mistakes. With ``version: auto``, subscriptions wait for the list
-of topics, which determines the form of type names.
+of topics, which determines the form of the type names.
 """
 
 import asyncio
@@ -74,8 +74,8 @@ class RosbridgeTransport:
             wire: WebSocket transport to the bridge, owned by this transport.
             where: target as display text, such as ``192.168.1.5:9090``.
             subscriptions: subscriptions made at each opening, one per topic.
-            ros: ROS version 1 or 2 that determines the form of type names; "auto": the bridge's
-                version; None: names stay as written.
+            ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
+                bridge's version; None to keep names as written.
         """
         self._wire = wire
         self._where = where
@@ -146,7 +146,7 @@ class RosbridgeTransport:
         """Wait until the first message of every topic has reached its subscribers.
 
         Returns:
-            A line with the topics without subscribers, or "".
+            A line that lists the topics without subscribers, or "".
         """
         return "" if self._session is None else await self._session.settle()
 
@@ -331,7 +331,7 @@ class _Session:
         try:
             while True:
                 self._receive(await self._wire.receive())
-                # Frames in the buffer need no wait, and some take long to parse.
+                # Buffered frames need no waiting, and some take a long time to parse.
                 if self.queue.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
                     began_s = clock()

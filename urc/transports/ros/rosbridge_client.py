@@ -1,10 +1,10 @@
 """The roslibpy protocol of a rosbridge connection, without roslibpy's network connection.
 
-roslibpy implements the rosbridge operations, their ids, and the handling of pending requests. The
-network connections of roslibpy are not used. After a reconnection, roslibpy would send old messages
+roslibpy implements the rosbridge operations, their ids, and the handling of pending requests.
+roslibpy's network connections are not used. After a reconnection, roslibpy would send old messages
 again. It also fails on binary frames, and never probes the other side. Measurements of roslibpy's
 network connections are recorded in docs/decisions. In this module, roslibpy's protocol writes
-frames into a list, and the transport sends these frames over URC's socket. The transport passes
+frames to a list, and the transport sends these frames over URC's socket. The transport passes
 received data to the protocol. Each object serves only one connection, so no state is carried over
 to the next connection.
 
@@ -49,7 +49,7 @@ class RosClient:
     """A converter between envelopes and rosbridge operations, for one connection."""
 
     def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver messages to `queue`; `ros` is the ROS version of type names, or None."""
+        """Deliver messages to `queue`; `ros` is the ROS version for type names, or None."""
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -58,7 +58,7 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals: dict[str, tuple[str, object]] = {}
-        """Action name and request id of each running goal, by roslibpy's goal id."""
+        """Action name and request id of each running goal, keyed by roslibpy's goal id."""
 
     @property
     def unanswered(self) -> int:
@@ -170,7 +170,7 @@ class RosClient:
         self._goals[goal] = name, number
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with the given id, or otherwise the newest running goal of the action."""
+        """Cancel the goal with the given id, or otherwise the action's newest running goal."""
         name, number = _text(attributes, "action"), attributes.get("id")
         running = [goal for goal, (action, _) in self._goals.items() if action == name]
         named = [goal for goal in running if self._goals[goal][1] == number]
@@ -256,7 +256,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         self._frames.append(payload)
 
     def send_ros_message(self, message: Any) -> None:
-        """Write an operation; unlike roslibpy, raise an error on a failure."""
+        """Write an operation; unlike roslibpy, raise an error on failure."""
         self.send_message(encode_operation(dict(message)))
 
     def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:
@@ -311,7 +311,7 @@ class _Topic(Topic):  # type: ignore[misc] # roslibpy ships no types
 
 
 def _ignore(said: object) -> None:
-    """Ignore the status or the failure of an internal query; the bridge logs failures."""
+    """Ignore the status or failure of an internal query; the bridge logs failures."""
 
 
 def _keep(table: dict[str, object], name: str, waiting: object) -> None:

@@ -2,7 +2,7 @@
 
 Pure. A frame is JSON text, or CBOR for subscriptions that request CBOR. An operation may arrive in
 fragments, or as a PNG image with JSON text in its pixels. JSON has no NaN (not a number) and no
-infinities, so the bridge writes null. This module also converts the NaN and infinite values of CBOR
+infinities, so the bridge writes null. This module also converts NaN and infinite values in CBOR
 data to null.
 """
 
@@ -27,13 +27,13 @@ MAX_PNG_BYTES = 2 * 1024 * 1024
 """Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
 one second."""
 MAX_VALUES = 2_000_000
-"""Maximum number of commas and brackets; the limit exists because an empty list takes three bytes
-as text but fifty in memory."""
+"""Maximum number of commas and brackets, because an empty list takes three bytes as text but fifty
+in memory."""
 _MANY_VALUES = 100_000
 """Maximum number of values in CBOR data with shared references; processing this many values takes a
 tenth of a second."""
 _CBOR_MAP = b"\xa0"
-"""First byte of a CBOR map or of a higher CBOR type; JSON text never begins with these bytes."""
+"""First byte of a CBOR map; JSON text never begins with this byte or a higher byte."""
 _LONGEST_ID = 256
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _NUMBERS = {
@@ -62,14 +62,14 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
 
 
 class OperationReader:
-    """A decoder of frames, which also joins the fragments of operations on one connection."""
+    """A decoder for the frames of one connection, which also joins fragmented operations."""
 
     def __init__(self) -> None:
         self._halves: dict[str, dict[int, str]] = {}
-        """Fragments of each incomplete operation, by operation id and fragment number."""
+        """Fragments of each incomplete operation, keyed by operation id and fragment number."""
         self._sizes: dict[str, int] = {}
-        """Total number of characters in the fragments of each incomplete operation, by operation
-        id."""
+        """Total number of characters in the fragments of each incomplete operation, keyed by
+        operation id."""
 
     def read(self, frame: bytes) -> dict[str, Any] | None:
         """Return the operation in a frame, or None for an incomplete operation.
@@ -147,7 +147,7 @@ def _read_cbor(data: bytes) -> object:
 
 
 def _tagged(first: Any, second: Any) -> object:
-    """Return a tagged array's numbers; cbor2 has passed the tag first since version 6."""
+    """Return a tagged array's numbers; since version 6, cbor2 passes the tag first."""
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
