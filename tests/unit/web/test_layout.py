@@ -160,6 +160,37 @@ def test_on_a_phone_in_portrait_only_the_background_grows() -> None:
     assert rows == "minmax(var(--urc-ground-height),1fr) auto auto auto"
 
 
+def phone_rules(*rows: str, **footprints: Footprint) -> str:
+    """Return the rules of a phone in portrait for the rows of a grid, over a background."""
+    slots: dict[str, Slot] = {}
+    for row, line in enumerate(rows):
+        for column, name in enumerate(line.split()):
+            last = slots.get(name)
+            span = 1 if last is None else last.row_span + (last.row + last.row_span == row)
+            slots[name] = Slot(name, row, column) if last is None else last._replace(row_span=span)
+    grid = Layout(len(rows), 2, tuple(slots.values()))
+    return over(grid, *slots, **footprints).split("@media (max-width: 37.499rem)")[1]
+
+
+VALUES: dict[str, Footprint] = {"a": "value", "b": "value", "c": "value", "d": "value"}
+
+
+def test_on_a_phone_in_portrait_the_first_values_are_over_the_background() -> None:
+    """The background keeps its space, and extends under them."""
+    phone = phone_rules("a b", "go stop", go="button", stop="button", **VALUES)
+    assert '[data-place="ground"]{grid-row:1/3;--urc-ground-foot:calc(1*' in phone
+    assert '[data-place="1"]{display:grid;grid-area:2/1/3/2;' in phone
+    phone = phone_rules("a b", "c d", "go stop", go="button", stop="button", **VALUES)
+    assert '[data-place="ground"]{grid-row:1/4;--urc-ground-foot:calc(2*' in phone
+
+
+def test_on_a_phone_in_portrait_controls_are_never_over_the_background() -> None:
+    """Nor are values below or next to a control."""
+    for rows in (["go a", "b c"], ["a move", "b move"]):
+        phone = phone_rules(*rows, go="button", move="stick", **VALUES)
+        assert '[data-place="ground"]{grid-row:1/2}' in phone
+
+
 def test_a_stick_in_a_lower_corner_reaches_down_next_to_stop() -> None:
     """STOP is between the sticks."""
     slots = (Slot("lift", 1, 0), Slot("move", 1, 2), Slot("a", 0, 1))
@@ -291,6 +322,7 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
         part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
+    assert '[data-rest]{display:inline-flex;--urc-rest:"+1"}' in text
     assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
 
 

@@ -11,7 +11,8 @@ normal size. Phones show no margins. A phone in portrait shows the first availab
 
 Over a background, each widget has the size of its footprint, and is placed at its slot's side of
 the screen. Empty rows and columns fill the remaining space, where the background is visible. On a
-phone in portrait, the background fills the space above the widgets.
+phone in portrait, the background fills the space above the widgets; the values of the first rows
+are over its lower edge.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
 extend down next to it. Over a background, columns of buttons and values in the corners also extend
@@ -50,6 +51,8 @@ _OVER, _WINDOW = "auto", "minmax(0,1fr)"
 """Sizes of rows and columns over a background: with a widget, and empty."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
+_GAP = "var(--urc-space-3)"
+"""Space between the rows of a grid."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
 do."""
@@ -133,8 +136,9 @@ def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
 def _button(place: str, grids: Mapping[str, Layout], hand: str = "") -> Iterator[str]:
     """Yield the rules that show the button for the missing slots; `hand` as for `_screens`."""
     for screen in grids:
-        shown = "inline-flex" if _missing(grids, screen) else "none"
-        rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{display:{shown}}}"
+        count = len(_missing(grids, screen))
+        shown = f'display:inline-flex;--urc-rest:"+{count}"' if count else "display:none"
+        rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
 
 
@@ -203,6 +207,8 @@ def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[s
     yield f"{place}{{{_template(grid, canvas, screen)}}}"
     places = {slot.name: slot for slot in grid.slots}
     is_below = screen == PHONE and bool(canvas.background)
+    if is_below:
+        yield f'{place} [data-place="ground"]{{{_ground(_leading_values(grid, canvas))}}}'
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
             rules = _place(places.get(name), grid, canvas, is_below)
@@ -234,6 +240,24 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
     rows = " ".join(sizes) or "none"
     columns = " ".join(_tracks(grid.columns, used_columns, column, empty_column)) or "none"
     return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+
+
+def _ground(covered: int) -> str:
+    """Return the rules for the background on a phone in portrait; values cover `covered` rows."""
+    area = f"grid-row:1/{2 + covered}"
+    if not covered:
+        return area
+    height = f"calc({covered}*(var(--urc-height-value) + {_GAP}))"
+    return f"{area};--urc-ground-foot:{height};margin-block-end:calc(-.5*{_GAP})"
+
+
+def _leading_values(grid: Layout, canvas: _Canvas) -> int:
+    """Return the number of rows at the top that contain only values."""
+    tall = _used((slot.row, slot.row_span) for slot in grid.slots if slot.row_span > 1)
+    is_value = [
+        row not in tall and _kinds(row, grid, canvas) == {"value"} for row in range(grid.rows)
+    ]
+    return [*is_value, False].index(False)
 
 
 def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str]) -> list[str]:
