@@ -219,3 +219,5 @@ class Profile(NamedTuple):
     tags: tuple[str, ...] = ()
     """Tags that put the robot into groups, for which rights can be granted; at most 16, all
     different."""
+    picture: str = ""
+    """Path of the robot's picture; "" without a picture."""

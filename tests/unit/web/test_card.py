@@ -1,8 +1,10 @@
 """What a card shows of a robot: a picture, values, or nothing; and nobody is connected for it."""
 
 from collections.abc import Callable
+from pathlib import Path
 from time import monotonic, sleep
 
+import pytest
 from starlette.testclient import TestClient
 
 from urc.model.driver import Driver
@@ -16,6 +18,7 @@ from urc.web.fleet.robots import Glimpse, Robot
 from urc.web.show.card import VALUES, small_values
 
 JPEG = b"\xff\xd8\xff\xe0 a picture"
+SVG = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
 
 
 def until(holds: Callable[[], bool], within_s: float = 10.0) -> None:
@@ -87,6 +90,46 @@ def test_the_last_picture_of_a_real_robot_stays_and_is_marked_as_old() -> None:
             assert "x-urc-old" not in client.get("/robots/puppet/card").headers
         until(lambda: client.get("/robots/puppet/card").headers.get("x-urc-old") == "1")
         assert client.get("/robots/puppet/card").content == JPEG
+
+
+def with_picture(tmp_path: Path) -> FakeRobot:
+    """Return a robot with a picture and a camera."""
+    place = tmp_path / "puppet.svg"
+    place.write_bytes(SVG)
+    uses = (WidgetUse("view", "image", {"image": "view"}),)
+    profile = dashboard_profile(signals={"view": Signal("view", "image")}, uses=uses)
+    return FakeRobot(profile._replace(picture=str(place)))
+
+
+@pytest.mark.parametrize("glimpse", ["real", JPEG])
+def test_a_robot_with_a_picture_shows_it_instead_of_its_world(
+    tmp_path: Path, glimpse: Glimpse | str
+) -> None:
+    robot = with_picture(tmp_path)
+    answer = client_of(robot, glimpse).get("/robots/puppet/card")
+    assert (answer.status_code, answer.content) == (200, SVG)
+    assert answer.headers["content-type"].startswith("image/svg+xml")
+    assert answer.headers["x-urc-picture"] == "1"
+    assert robot.opened == 0
+
+
+def test_a_camera_takes_the_place_of_the_picture_while_it_is_connected(tmp_path: Path) -> None:
+    robot = with_picture(tmp_path)
+    ours = {"origin": "http://localhost:8080"}
+    with client_of(robot, JPEG) as client:
+        with client.websocket_connect("ws://localhost:8080/ws?robot=puppet", headers=ours) as line:
+            assert line.receive_json()["t"] == "hello"
+            assert client.portal is not None
+            assert client.get("/robots/puppet/card").content == SVG
+            client.portal.call(robot.set_reading, "view", JPEG)
+            assert client.get("/robots/puppet/card").content == JPEG
+        until(lambda: client.get("/robots/puppet/card").content == SVG)
+
+
+def test_a_picture_whose_file_is_gone_is_not_found(tmp_path: Path) -> None:
+    robot = with_picture(tmp_path)
+    (tmp_path / "puppet.svg").unlink()
+    assert client_of(robot).get("/robots/puppet/card").status_code == 404
 
 
 def test_the_whole_card_leads_to_the_robot() -> None:

@@ -300,9 +300,10 @@ class RobotService:
     def glimpse(self) -> Glimpse:
         """Return a view of the robot, without opening a connection.
 
-        Without a session, a real robot's view is the last image of its previous session.
+        Without a session, a real robot's view is the last image of its previous session. An
+        emulated robot without a picture shows its world.
         """
-        if self.robot.glimpse is not None:
+        if self.robot.glimpse is not None and not self.robot.profile.picture:
             return self.robot.glimpse()
         live = self.open_session
         return _view(live.session.hub) if live is not None else self._last_picture

@@ -18,7 +18,7 @@ from starlette.responses import FileResponse, Response
 from urc.model.interface import WidgetUse
 from urc.model.profile import Profile
 
-__all__ = ["TILE_TYPES", "linked_options", "page_key", "robot_file", "tile", "uses_of"]
+__all__ = ["TILE_TYPES", "linked_options", "page_key", "picture", "robot_file", "tile", "uses_of"]
 
 MEDIA_TYPES = {
     ".urdf": "application/xml",
@@ -101,6 +101,12 @@ def robot_file(profile: Profile, key: str, request: Request) -> Response:
     return _served(
         place, MEDIA_TYPES.get(place.suffix.lower(), "application/octet-stream"), request
     )
+
+
+def picture(profile: Profile, request: Request) -> Response:
+    """Return the robot's picture; raise status 404 if the file is missing."""
+    place = Path(profile.picture)
+    return _served(place, MEDIA_TYPES[place.suffix.lower()], request)
 
 
 def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> Response:

@@ -1,7 +1,8 @@
-"""The content of a robot's menu card: a camera image, the pose in the world, or the main values.
+"""The content of a robot's menu card: a camera image, its picture, its world, or the main values.
 
-Layer 5. A card never connects a robot. An emulated robot shows its simulated world. A real robot
-shows data while it is connected, and the last image afterwards.
+Layer 5. A card never connects a robot. A robot with a picture shows the picture, or its camera
+while it is connected. An emulated robot without a picture shows its simulated world. A real robot
+without a picture shows data while it is connected, and the last image afterwards.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,6 +15,7 @@ from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Reading, Signal
 from urc.web.fleet.robots import RobotService
+from urc.web.load.files import picture
 from urc.web.serve.rights import WATCH, ProtectedRoute
 from urc.web.show.cells import spoken
 from urc.web.words import t
@@ -43,17 +45,23 @@ class Cards:
     async def card(self, request: Request) -> Response:
         """Return an image, or values as JSON ``[[title, text], …]``; without data, status 204.
 
-        The header ``x-urc-old`` marks the last image of a session that has ended.
+        The header ``x-urc-old`` marks the last image of a session that has ended, and
+        ``x-urc-picture`` the robot's picture, which seldom changes.
         """
         name = request.path_params["name"]
         service = self._services().get(name)
         if service is None:
             raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
         seen = service.glimpse()
+        is_open = service.open_session is not None
+        if service.robot.profile.picture and not (is_open and isinstance(seen, bytes)):
+            found = picture(service.robot.profile, request)
+            found.headers["x-urc-picture"] = "1"
+            return found
         if seen is None:
             return Response(status_code=204, headers=_FRESH)
         if isinstance(seen, bytes):
-            is_old = service.robot.glimpse is None and service.open_session is None
+            is_old = service.robot.glimpse is None and not is_open
             headers = {**_FRESH, "x-urc-old": "1"} if is_old else _FRESH
             return Response(seen, media_type=media_type(seen), headers=headers)
         shown = small_values(service.robot.profile.driver, seen)

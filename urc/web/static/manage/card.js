@@ -57,8 +57,9 @@ async function renew(look) {
   try {
     const answer = await fetch(look.url, { signal: AbortSignal.timeout(QUIET_MS) });
     const isOld = answer.headers.get("x-urc-old") !== null;
+    const isPicture = answer.headers.get("x-urc-picture") !== null;
     look.el.dataset["old"] = String(isOld);
-    if (answer.status !== 200 || isOld) look.dueMs += QUIET_MS;
+    if (answer.status !== 200 || isOld || isPicture) look.dueMs += QUIET_MS;
     if (answer.status !== 200) look.el.dataset["shows"] = "";
     else if (answer.headers.get("content-type")?.startsWith("image/")) await show(look, await answer.blob());
     else list(look, await answer.json());
