@@ -144,7 +144,7 @@ class Store:
     def make(self, lock: Lock) -> Path:
         """Return the folder with a lock's files; extract incomplete files again.
 
-        The caller must hold the lock of `changing`.
+        The caller must hold the lock that `changing` acquires.
 
         Raises:
             PackageError: an archive is missing or damaged.

@@ -155,7 +155,7 @@ class OneShotCommands:
     # -- session
 
     async def serve(self, session: Drivable) -> None:
-        """Deliver STOP to a session, at once if STOP is latched or has not been acknowledged."""
+        """Deliver each STOP to a session; deliver a latched or unacknowledged STOP immediately."""
         self._session = session
         self._pressed.clear()
         if self._controller().lease.latched or self._controller().owed:
