@@ -12,7 +12,7 @@ from urc.config.default_look import automatic_slots, default_interface
 from urc.config.gather import gather
 from urc.config.link.driver import link_driver, link_simulator
 from urc.config.link.interface import link_interface, link_slots
-from urc.config.link.resources import link_picture
+from urc.config.link.resources import find_picture
 from urc.config.link.tests import link_test
 from urc.config.node import Problems
 from urc.config.parse.driver import parse_driver, spoken_name
@@ -195,11 +195,10 @@ def _link(
         name: link_interface(sources.interfaces[name], interface, slots, driver, registry, problems)
         for name, interface in parsed.interfaces.items()
     }
-    root = sources.root
-    picture = link_picture(root, problems) if sources.kind == "robot" else ""
     if has_errors(problems) or has_errors(registry.problems):
         return None
     check_profile(sources, driver, interfaces, uses, problems)
+    root = sources.root
     name = root.text("name")
     title = root.text("title", spoken_name(name))
     if not interfaces:
@@ -225,5 +224,5 @@ def _link(
         licence=root.text("licence"),
         author=root.text("author"),
         tags=parsed.tags,
-        picture=picture,
+        picture=find_picture(root.document.file),
     )

@@ -1,7 +1,6 @@
 """Converts a profile into a single document that shows the origin of every key.
 
-The result is a valid document with the same meaning. It lacks the robot's picture, because the
-result can be stored in another folder, for example in a recording.
+The result is a valid document with the same meaning.
 """
 
 import json

@@ -24,7 +24,7 @@ _DEEPEST: Final = 16
 """Maximum number of documents in a chain of `extends` and `include`."""
 _NODES_MOST: Final = 10_000
 _OWN: Final = ("urc", "kind", "name", "extends", "include", "partial")
-_HEADER: Final = (*_OWN, "title", "summary", "licence", "author", "tags", "picture")
+_HEADER: Final = (*_OWN, "title", "summary", "licence", "author", "tags")
 _BUILDING: Final = ("extends", "include")
 _SCHEMA: Final = "driver.schema.json#/$defs/{}"
 _INCLUDED: Final = {

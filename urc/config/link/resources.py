@@ -1,7 +1,7 @@
-"""Checks a robot's picture, and the files and web pages in a widget's options.
+"""Checks files and web pages in a widget's options.
 
-The dashboard serves only the files that a document names. Served files must be in the document's
-folder, so packages cannot publish other files on the server.
+The dashboard serves only the files that a document names for its widgets. Served files must be in
+the document's folder, so packages cannot publish other files on the server.
 
 A page's content security policy contains the host of every embedded web page. The URLs of embedded
 web pages must therefore be unambiguous to all browsers.
@@ -9,7 +9,7 @@ web pages must therefore be unambiguous to all browsers.
 
 import ipaddress
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 from pathlib import PurePosixPath
 from typing import Final
@@ -19,7 +19,7 @@ from urc.model.widget import Widget
 
 __all__ = [
     *("FILE_TYPES", "LONGEST_URL", "MOST_BYTES", "MOST_PICTURE_BYTES", "PICTURE_TYPES"),
-    *("link_files", "link_pages", "link_picture", "named_texts"),
+    *("find_picture", "link_files", "link_pages", "named_texts"),
 ]
 
 FILE_TYPES: Final = (
@@ -28,14 +28,14 @@ FILE_TYPES: Final = (
 )
 """Served file types, without executable types."""
 
-PICTURE_TYPES: Final = (".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg")
-"""File types of a robot's picture."""
-
-MOST_BYTES: Final = 64 << 20
-"""Maximum size of one file, in bytes."""
+PICTURE_TYPES: Final = (".svg", ".png", ".jpg", ".jpeg", ".webp", ".gif")
+"""File types of a robot's picture, in order of preference."""
 
 MOST_PICTURE_BYTES: Final = 4 << 20
 """Maximum size of a robot's picture, in bytes; a photo from a phone fits."""
+
+MOST_BYTES: Final = 64 << 20
+"""Maximum size of one file, in bytes."""
 
 LONGEST_URL: Final = 2000
 """Maximum length of a URL, in characters."""
@@ -57,37 +57,39 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
     """
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
-        place = _place(part, FILE_TYPES, MOST_BYTES, problems)
-        if place:
-            found[str(part.data)] = place
+        fault = _file_fault(part.data)
+        place = FilePath(part.document.file).absolute().parent / part.data
+        if fault:
+            hint = "name a file in this document's folder or a subfolder"
+            problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
+        elif not place.is_file():
+            problems.error(part, "no-such-file", f"there is no file {part.data!r}")
+        elif not _is_below(place, FilePath(part.document.file).absolute().parent):
+            problems.error(part, "file-not-served", f"{part.data!r} is outside this folder")
+        elif place.stat().st_size > MOST_BYTES:
+            text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
+            problems.error(part, "file-not-served", text)
+        else:
+            found[str(part.data)] = str(place.resolve())
     return found
 
 
-def link_picture(root: Node, problems: Problems) -> str:
-    """Return the path of the robot's picture; "" without a picture."""
-    part = root.get("picture")
-    if part is None:
-        return ""
-    return _place(part, PICTURE_TYPES, MOST_PICTURE_BYTES, problems)
+def find_picture(document: str) -> str:
+    """Return the path of the robot's picture; "" without a picture.
 
-
-def _place(part: Node, types: Sequence[str], most_bytes: int, problems: Problems) -> str:
-    """Return the path of the file that `part` names; report a file that is not served."""
-    fault = _file_fault(part.data, types)
-    folder = FilePath(part.document.file).absolute().parent
-    place = folder / part.data
-    if fault:
-        hint = "name a file in this document's folder or a subfolder"
-        problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
-    elif not place.is_file():
-        problems.error(part, "no-such-file", f"there is no file {part.data!r}")
-    elif not _is_below(place, folder):
-        problems.error(part, "file-not-served", f"{part.data!r} is outside this folder")
-    elif place.stat().st_size > most_bytes:
-        text = f"{part.data!r} is larger than {most_bytes >> 20} MiB"
-        problems.error(part, "file-not-served", text)
-    else:
-        return str(place.resolve())
+    The picture has the document's name, and is in the document's folder or in ``pictures`` there.
+    A missing picture is no problem, so a document can be copied without its picture.
+    """
+    place = FilePath(document).absolute()
+    for folder in (place.parent, place.parent / "pictures"):
+        for suffix in PICTURE_TYPES:
+            found = folder / f"{place.stem}{suffix}"
+            if (
+                found.is_file()
+                and _is_below(found, place.parent)
+                and found.stat().st_size <= MOST_PICTURE_BYTES
+            ):
+                return str(found.resolve())
     return ""
 
 
@@ -106,12 +108,12 @@ def named_texts(
             yield from ((name, each) for each in part.items() if isinstance(each.data, str))
 
 
-def _file_fault(name: str, types: Sequence[str]) -> str:
+def _file_fault(name: str) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
         return "is not a path inside this folder"
-    if path.suffix.lower() not in types:
-        return f"has a file type that is not served; allowed types are {', '.join(types)}"
+    if path.suffix.lower() not in FILE_TYPES:
+        return f"has a file type that is not served; allowed types are {', '.join(FILE_TYPES)}"
     return ""
 
 
