@@ -88,6 +88,24 @@ test("a gesture that still asks for the controls ends with STOP, and does not mo
   assert.equal(control.reason, "STOP", "what ended it first is why");
 });
 
+test("while STOP is latched, no other reason is shown, whichever is heard first", () => {
+  const { input, control } = held();
+  const drive = /** @type {any} */ (input.drive);
+  const latch = () => Object.assign(drive, { isLatched: true, lease: { epoch: 2, latched: "ann", drives: true, holder: null } });
+  input.release = () => {};
+  input.stopped("go", "Link to URC too slow for this control");
+  assert.equal(control.reason, "Link to URC too slow for this control");
+  latch();
+  input.leaseChanged();
+  assert.equal(control.reason, "Reset STOP first.");
+  input.stopped("go", "Link to URC too slow for this control");
+  assert.equal(control.reason, "Reset STOP first.");
+  Object.assign(drive, { isLatched: false, lease: { epoch: 3, latched: "", drives: true, holder: null } });
+  control.grips.clear();
+  input.leaseChanged();
+  assert.equal(control.phase, "idle");
+});
+
 test("while a dead-man does not stand, nothing can be driven", () => {
   const free = { epoch: 1, latched: "", drives: true, holder: null };
   const input = new Input(/** @type {any} */ ({ lease: free, isMine: true }));

@@ -290,14 +290,20 @@ export class Input {
     if (!control) return;
     control.closedEpoch = this.drive.lease?.epoch ?? control.closedEpoch;
     control.isReleaseOwed = true;
-    if (control.phase !== "spent" || !control.reason) this.spend(control, reason);
+    if (this.drive.isLatched) this.spend(control, this.against());
+    else if (control.phase !== "spent" || !control.reason) this.spend(control, reason);
     if (control.grips.size === 0) this.release(control);
   }
 
-  /** Clear the last gesture's reason after a change of the lease. */
+  /**
+   * Clear the last gesture's reason after a change of the lease. While STOP is latched, STOP is the
+   * only reason, because only its reset helps.
+   */
   leaseChanged() {
     for (const control of this.controls.values()) {
-      if (control.phase !== "spent" || control.grips.size > 0 || this.drive.isLatched) continue;
+      if (control.phase !== "spent") continue;
+      if (this.drive.isLatched) this.spend(control, this.against());
+      if (control.grips.size > 0 || this.drive.isLatched) continue;
       control.phase = "idle";
       for (const grip of this.grips) if (grip.control === control) grip.show();
     }
