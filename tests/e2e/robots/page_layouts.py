@@ -103,6 +103,8 @@ def faults(seen: dict[str, Any], screen: str, is_large: bool) -> list[str]:
         lines.append(f"the bars take {seen['bars']} % of the screen")
     if screen not in WIDE or not seen["isOverGround"]:
         return lines
+    if seen["scrolls"]:
+        lines.append("the page scrolls, so widgets can be next to STOP")
     if seen["isPicture"] and seen["ground"] < 55:
         lines.append(f"the camera has {seen['ground']} % of the stage")
     if any(size < STICK_PX[0] or size > STICK_PX[1] for size in seen["sizes"]):
