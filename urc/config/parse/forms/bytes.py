@@ -1,4 +1,4 @@
-"""The form ``bytes``: a list of numbers, names of control characters, strings and expressions."""
+"""The ``bytes`` form: a list of numbers, names of control characters, strings and expressions."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""The form ``equals``: the frame is constant text."""
+"""The ``equals`` form: the frame is constant text."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The form ``json``: fields of a JSON document, addressed by JMESPath expressions.
+"""The ``json`` form: fields of a JSON document, addressed by JMESPath expressions.
 
 Plain paths such as ``a.b[0].c`` become tuples for the engine. All other paths need the JMESPath
 library.

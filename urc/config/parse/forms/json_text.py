@@ -1,4 +1,4 @@
-"""The form ``json`` for sent frames: any JSON value, with templates in its strings."""
+"""The ``json`` form for sent frames: any JSON value, with templates in its strings."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any

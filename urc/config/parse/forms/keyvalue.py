@@ -1,4 +1,4 @@
-"""The form ``keyvalue``: key-value pairs, in any order."""
+"""The ``keyvalue`` form: key-value pairs, in any order."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The form ``pattern``: a frame's text with {name:kind} in place of each field."""
+"""The ``pattern`` form: a frame's text with {name:kind} in place of each field."""
 
 import re
 from typing import Any, Final, cast, get_args

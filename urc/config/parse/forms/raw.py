@@ -1,4 +1,4 @@
-"""The form ``raw``: one field with the whole frame."""
+"""The ``raw`` form: one field with the whole frame."""
 
 from typing import Any
 

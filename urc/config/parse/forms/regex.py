@@ -1,4 +1,4 @@
-"""The form ``regex``: a regular expression with a named group for each field."""
+"""The ``regex`` form: a regular expression with a named group for each field."""
 
 from typing import Any
 

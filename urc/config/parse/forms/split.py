@@ -1,4 +1,4 @@
-"""The form ``split``: fields between separators."""
+"""The ``split`` form: fields between separators."""
 
 from typing import Any
 

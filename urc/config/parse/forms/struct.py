@@ -1,4 +1,4 @@
-"""The form ``struct``: binary items, for received and sent frames."""
+"""The ``struct`` form: binary items, for received and sent frames."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, cast

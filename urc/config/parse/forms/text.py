@@ -1,4 +1,4 @@
-"""The form ``text``: a template with text and expressions."""
+"""The ``text`` form: a template with text and expressions."""
 
 from collections.abc import Iterable
 from typing import cast

@@ -1,4 +1,4 @@
-"""The form ``xml``: fields of an XML document, addressed by the paths of their elements."""
+"""The ``xml`` form: fields of an XML document, addressed by the paths of their elements."""
 
 import re
 from typing import Any
