@@ -351,7 +351,7 @@ GROUND = "[data-place='ground']"
 async def test_the_background_fills_the_stage_with_the_widgets_in_front(
     new_page: PageMaker,
 ) -> None:
-    """On each screen but a phone in portrait: there it is above the widgets."""
+    """On a phone in portrait, only values are in front of its lower edge."""
     grid = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
     async with running_dashboard(
         gauged(Interface("x", "X", {"landscape": grid}, background="c"))
@@ -367,7 +367,11 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
         await turned(page, PHONE)
         stage, back = await box(page, "[data-stage]"), await box(page, GROUND)
         assert (back["y"], back["width"]) == (stage["y"], stage["width"])
-        assert back["y"] + back["height"] <= (await box(page, B))["y"]
+        for value in (B, C):
+            assert await is_on_top(page, value)
+            seen = await box(page, value)
+            assert back["y"] + back["height"] / 2 < seen["y"]
+            assert seen["y"] + seen["height"] < back["y"] + back["height"]
 
 
 async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:
