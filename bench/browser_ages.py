@@ -10,10 +10,10 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""Smallest share of the robot's values that a valid measurement shows."""
+"""Smallest share of the robot's values that a valid measurement must show."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
-# The text in a frame's layout counts, because a page that writes outside of frames may change it
+# The text in a frame's layout counts, because a page that writes outside frames may change it
 # before it is read. A resize observer runs after a frame's callbacks and before drawing. Its
 # message arrives after drawing; then the age is measured.
 WATCH = """

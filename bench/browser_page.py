@@ -41,7 +41,7 @@ transports:
   wire:
     {{ type: tcp, host: 127.0.0.1, port: {port}, framing: {{ type: delimiter, tx: LF, rx: LF }} }}
 """
-# A page that is opened twice already has a counter; a second one would count each frame again.
+# A page that is opened twice already has a counter; a second counter would count each frame again.
 COUNT = """
 () => {
   if (window.benchFrames !== undefined) return;
@@ -97,7 +97,7 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
             await context.add_init_script(script)
         url, _, key = address.partition("?key=")
         if key:
-            await context.request.get(address)  # hands it in
+            await context.request.get(address)  # submits the key
         page = await context.new_page()
         page.set_default_timeout(LOAD_MS)
         await page.goto(url)

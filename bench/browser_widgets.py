@@ -38,7 +38,7 @@ KINDS = (
     ("gauge", "value", ""),
     ("compass", "heading", "deg"),
 )
-"""Widget, input, unit."""
+"""Widget, input and unit of each signal."""
 # A hidden cell is not drawn, so all sixty must be visible and live.
 READY = """
 (count) => {

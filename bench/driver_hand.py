@@ -1,6 +1,6 @@
 """A typical hand-written driver for the robot of `bench.driver_robot`.
 
-The code is tidy and, like URC, has the features that every driver of a real robot needs:
+The code is tidy and, like URC, has the features that every driver for a real robot needs:
 
 - A speed is clamped, and NaN is refused, because `max` and `min` would turn NaN into full speed.
 - The driver accepts readings at any time, and stores the newest reading of every signal.

@@ -1,8 +1,8 @@
 """A plain loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
 
 The program accepts the clients, answers each handshake with status 101, and sends frames to each
-client at the rate. The program prints its port at the start, and its processor time in seconds at
-the end.
+client at the given rate. The program prints its port at the start, and its processor time in
+seconds at the end.
 """
 
 import socket

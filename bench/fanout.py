@@ -29,7 +29,7 @@ CLIENTS = 50
 GOAL = 2.5
 FAN_S = 60
 
-# The cheapest way to make a reading, because other benchmarks measure the drivers.
+# This is the cheapest way to make a reading; other benchmarks measure the drivers.
 _sample = partial(tuple.__new__, Sample)
 
 

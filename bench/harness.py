@@ -52,7 +52,8 @@ def process_seconds(command: Sequence[str]) -> float:
     Raises:
         SystemExit: the command failed, or took longer than `PROCESS_TIMEOUT_S`.
     """
-    # With this variable, nothing stays compiled, and Python's compiler would be measured.
+    # With this variable set, no bytecode is cached, so the benchmark would measure Python's
+    # compiler.
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     began = time.perf_counter()
     try:

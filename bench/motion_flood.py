@@ -2,9 +2,9 @@
 
 In short windows, the benchmark measures the latency from the driving page's socket to its robot.
 The windows alternate between a normal page, a page that floods another server, and a page that
-floods the same server. Any flood uses processor time of the machine, in the flooding page and in
-its server. The goal therefore compares the two floods. The result with the normal page is printed,
-but has no goal.
+floods the same server. Any flood uses the machine's processor time, in the flooding page and in its
+server. The goal therefore compares the two floods. The result with the normal page is printed, but
+has no goal.
 """
 
 import statistics

@@ -2,7 +2,7 @@
 
 A real Chromium drives through a real ``urc serve`` with its guard. The robot timestamps received
 data. Each time is measured on the machine's monotonic clock, from the page's event until the stop's
-first byte arrives at the robot. The lease is one second, so a stop after its expiry would be
+first byte arrives at the robot. The lease lasts one second, so a stop after its expiry would be
 obvious. A late trial is repeated if the machine caused the delay.
 """
 
@@ -68,7 +68,7 @@ EVENTS = {
     "pad lost": "gamepaddisconnected",
 }
 """Event that the page receives, for each way to release."""
-# Before the page's scripts, so that the page's own listeners run after these.
+# Runs before the page's scripts, so that the page's own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};
 for (const kind of {list(EVENTS.values())}) {{
@@ -97,7 +97,7 @@ class Scene(NamedTuple):
     one: Opened
     robots: Robots
     witness: Robots
-    """Measures its own late wake-ups, and the processor waits of server, guard and browser."""
+    """Measures its own late wake-ups, and the processor waits of the server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

@@ -3,7 +3,7 @@
 Pages drive over a relay with a round-trip time of 100 ms and random loss in both directions. After
 each stop, a page starts a new gesture. For comparison, one run uses a single connection, and the
 other also uses URC's second connection for lossy links. The benchmark needs root and /dev/net/tun;
-otherwise, the benchmark is skipped with a message.
+otherwise, it is skipped with a message.
 """
 
 import json

@@ -63,7 +63,7 @@ class TimedPage(Page):
 
     def tick_number(self, number: int) -> int:
         """Send a tick with `number` as its value; return its send time, in nanoseconds."""
-        self.hear()  # the newest beat
+        self.hear()  # the newest heartbeat
         self.sent += 1
         body = {
             "t": "tick",
@@ -137,7 +137,7 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
 
 
 def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
-    """Send ticks; return the latency of each arrived tick, in milliseconds."""
+    """Send ticks; return the latency of each tick that arrived, in milliseconds."""
     first = len(robots.heard[0]) + 1
     sent: dict[int, int] = {}
     next_ns = time.monotonic_ns()

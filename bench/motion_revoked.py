@@ -1,6 +1,6 @@
 """Time from the revocation of a right until the stop reaches its holder's robot.
 
-People, devices and programs drive real robots of the rig through a real ``urc serve``. Another
+People, devices and programs drive real robots in the rig through a real ``urc serve``. Another
 process ends their rights in the data folder, while their pages continue to send ticks.
 """
 

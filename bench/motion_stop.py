@@ -2,8 +2,8 @@
 
 Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
 time is measured from the last effective tick to the first byte of the stop. With root, a relay
-between network namespaces adds two failures of the link. Without root, these failures are skipped
-with a message.
+between network namespaces adds two link failures. Without root, these failures are skipped with a
+message.
 """
 
 import json

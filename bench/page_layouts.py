@@ -20,7 +20,7 @@ __all__ = ["run"]
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure all pages; without `full`, only the pages with English text of the default size."""
+    """Measure all pages; without `full`, only the pages with English text in the default size."""
     languages, sizes = (LANGUAGES, TEXT_PX) if full else (LANGUAGES[:1], TEXT_PX[:1])
     kept = Kept(f"page_layouts-{len(languages)}-{len(sizes)}")
     done = {str(row["page"]) for row in kept.rows}

@@ -13,7 +13,7 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 def cpu_s(processes: Iterable[int]) -> dict[int, float]:
     """Return the total processor time of each running process."""
-    # After the name, which can contain spaces: field 3 on, see proc(5).
+    # Skip the name, which can contain spaces; the words begin with field 3 (see proc(5)).
     stats = {one: _read(one, "stat").rpartition(")")[2].split() for one in processes}
     return {
         one: (int(words[11]) + int(words[12])) / _TICKS_HZ for one, words in stats.items() if words

@@ -10,7 +10,7 @@ import time
 
 
 def main() -> None:
-    """Send the text `TICKS` times at the rate."""
+    """Send the text `TICKS` times at the given rate."""
     number, ticks, rate_hz = sys.argv[1:]
     with socket.socket(fileno=int(number)) as line:
         line.recv(1)

@@ -110,7 +110,7 @@ def _measured(load: Load, look_s: float) -> Row:
         port = stack.enter_context(peer("fleet.py", load.signals, RATE_HZ))
         profiles = [_profile(Path(folder), load, number, port) for number in range(load.robots)]
         server = stack.enter_context(Server(profiles, Path(folder, "data")))
-        # A process has one page of each robot. Without pages, the robots are not connected.
+        # Each process has one page for each robot. Without pages, the robots are not connected.
         pages = [
             _pages(stack, server, min(load.robots, load.pages - first))
             for first in range(0, load.pages, load.robots)

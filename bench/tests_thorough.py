@@ -29,7 +29,7 @@ _RUN: Final = (sys.executable, "-m", "pytest", "-q", "-x", "--no-header")
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Run the tests with full counts, or without `full` only the first steps."""
+    """Run the tests with full counts; without `full`, run only the first steps."""
     kept = Kept(f"tests_thorough-{full}")
     done = {str(row["test"]) for row in kept.rows}
     steps = list(_steps().items())

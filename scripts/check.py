@@ -1,10 +1,10 @@
 """The command `./dev test`: run lint, type checks and all tests, then print a summary.
 
 `./dev test quick` skips the tests with real servers and browsers, and needs only Node. The quick
-steps run in parallel, before all other steps. The tests of stopping leave most of the processors
-idle, so they run in parallel with the other end-to-end tests. A failed step does not stop later
-steps. The exit code is 0 if all steps pass, otherwise 1. If a required program is missing, its
-tests are skipped and listed; with ``CI=true``, a skipped test is a failure.
+steps run in parallel, before all other steps. The tests for stopping leave most processors idle, so
+they run in parallel with the other end-to-end tests. A failed step does not stop later steps. The
+exit code is 0 if all steps pass, otherwise 1. If a required program is missing, its tests are
+skipped and listed; with ``CI=true``, a skipped test is a failure.
 """
 
 import asyncio
@@ -72,8 +72,9 @@ PYTEST = (PYTHON, "-m", "pytest")
 _HALF_OF_UNIT = (
     *("runtime", "access", "protocol", "guard", "packages", "simulator", "config", "motion"),
 )
-# Processes that do not communicate. A process for distributing thousands of small tests would use a
-# fifth of the processor time. Longest first, so that few steps are still running at the end.
+# These processes do not communicate. A process that distributes thousands of small tests would use
+# a fifth of the processor time. The longest steps start first, so that few are still running at the
+# end.
 QUICK = (
     Step("tests contract", (*PYTEST, "tests/contract")),
     Step(
@@ -86,7 +87,7 @@ QUICK = (
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
 SLOW = (
     (
-        # Built with all processors, for the tests of the site.
+        # The build uses all processors; the site's tests need its result.
         Step("site", (PYTHON, "-m", "scripts.site"), is_yielding=True),
         # Most of these tests wait for a server or for silence, so a few in parallel need no more
         # processor time.
@@ -122,7 +123,8 @@ def main() -> int:
     environment[BUILT_SITE] = str(HTML)
     quick = (*QUICK, *([javascript] if javascript else []), *STATIC)
     try:
-        # Twice as many as processors, because the unit tests wait a quarter of their time.
+        # Run twice as many steps as processors, because the unit tests spend a quarter of their
+        # time waiting.
         outcomes += run([(step,) for step in quick], environment, at_once=2 * PROCESSORS)
         if not is_quick:
             names = ", ".join(step.name for steps in SLOW for step in steps)
@@ -210,7 +212,7 @@ async def _shown(step: Step, environment: Mapping[str, str]) -> Outcome:
 async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) -> Outcome:
     """Run a step; `output` receives its standard output and standard error."""
     start = time.monotonic()
-    # A separate session, so that the processes of a killed test can also be ended.
+    # Start a separate session, so that the processes of a killed test can also be ended.
     process = await asyncio.create_subprocess_exec(
         *step.command,
         cwd=ROOT,

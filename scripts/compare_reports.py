@@ -109,7 +109,7 @@ def main() -> int:
 
 
 def unpack(commit: str, folder: Path) -> None:
-    """Write the needed files of a commit into a folder."""
+    """Write the needed files from a commit into a folder."""
     packed = subprocess.run(
         ["git", "archive", commit, *CODE, *DOCUMENTS, "pyproject.toml"],
         cwd=ROOT,

@@ -1,4 +1,4 @@
-"""The command `./dev docs`: check every link and picture of the Markdown files, and build the site.
+"""The command `./dev docs`: check every link and picture in the Markdown files, and build the site.
 
 The check follows only links to files in the tree, so the command needs no network.
 """

@@ -67,7 +67,7 @@ def lock(uv: str, name: str, *, is_upgrade: bool) -> int:
     done = subprocess.run(command, cwd=ROOT, timeout=_TIMEOUT_S, check=False)
     if done.returncode == 0:
         text = file.read_text("utf-8").removeprefix(_HEADER)
-        # True wherever `./dev` reads a lock file, and repeated by uv in every line.
+        # uv repeats this condition in every line; it is true wherever `./dev` reads a lock file.
         text = text.replace(f" and {SYSTEMS}", "").replace(f" ; {SYSTEMS}", "")
         file.write_text(_HEADER + text, "utf-8")
     return done.returncode

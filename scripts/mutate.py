@@ -72,7 +72,7 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
     """
     mutmut = Path(sys.executable).with_name("mutmut")
     command = [str(mutmut), "run", "--max-children", str(workers), *names]
-    # The copy comes before the checkout, also for programs that a test starts.
+    # The copy comes before the checkout, even for programs that a test starts.
     environment = {
         **os.environ,
         "PYTHONPATH": str(COPY / "mutants"),

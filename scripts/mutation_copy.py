@@ -69,7 +69,7 @@ def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
         if not target.is_file() or target.read_bytes() != data:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
-    # Without this call, Python would cache that this folder in its path does not exist.
+    # Without this call, Python would cache the absence of this folder from its path.
     (copy / "mutants").mkdir(exist_ok=True)
     for folder in (copy, copy / "mutants"):
         for name in _files(folder, settings.copied):

@@ -70,8 +70,8 @@ NEEDS = (
         variable="URC_CHROMIUM",
     ),
     Need(
-        # The same browser without windows, which needs half the time for a page. The complete
-        # browser is the fallback.
+        # This is the same browser without windows; it needs half the time to show a page. The
+        # complete browser is the fallback.
         name="headless-shell",
         executables=("chromium-headless-shell", "chrome-headless-shell"),
         package="chromium-headless-shell",

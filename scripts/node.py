@@ -18,7 +18,7 @@ def node_executable() -> str | None:
         command = npm_command()
     except VendorError:
         return None
-    return command[0] if len(command) > 1 else None  # npm without a Node is not usable
+    return command[0] if len(command) > 1 else None  # npm cannot be used without Node
 
 
 def playwright_environment() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Take pictures for work on the design: `python -m scripts.page_pictures FOLDER`.
+"""Take pictures for design work: `python -m scripts.page_pictures FOLDER`.
 
 The pictures show the menu and every robot of the demo on each kind of screen, in each theme. The
 robots are emulated, with a separate data folder. ``shares.md`` in the folder lists the measurements

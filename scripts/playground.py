@@ -1,14 +1,14 @@
 """Build the playground as one folder of static files: `python -m scripts.playground FOLDER`.
 
-Any static web server can serve the folder, under any path. The pages use no other hosts. It
+Any static web server can serve the folder, under any path. The pages use no other hosts. The folder
 contains:
 
-- the interpreter: Pyodide from npm, in the version of `package-lock.json`;
+- the interpreter: Pyodide from npm, in the version from `package-lock.json`;
 - `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
 - `dash/`: the modules and styles of the dashboard and the widgets, with a server's paths;
 - the page, its worker and its service worker, from `playground/static`.
 
-Packages are copied from this environment, which has the versions of `requirements/`. `msgspec` is
+Packages are copied from this environment, which has the versions from `requirements/`. `msgspec` is
 the only package with a browser build on the package index; pip checks its locked hash.
 """
 
@@ -124,7 +124,7 @@ def _copy_tree(source: Path, target: Path, kinds: Iterable[str]) -> None:
 
 
 def _copy_distribution(package: str, code: Path) -> None:
-    """Copy the pure Python files and an installed package's metadata."""
+    """Copy an installed package's pure Python files and metadata."""
     for file in distribution(package).files or ():
         place = file.as_posix()
         is_metadata = ".dist-info/" in place and file.name in ("METADATA", "entry_points.txt")
@@ -187,7 +187,7 @@ def _run(command: list[str], fault: str) -> None:
 
 
 def _pack(folder: Path, archive: Path) -> None:
-    """Write a ZIP archive with the same bytes at every build."""
+    """Write a ZIP archive that has the same bytes in every build."""
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
         for file in sorted(folder.rglob("*")):
             if file.is_file():
@@ -216,7 +216,7 @@ def _copy_tree_of(source: Path, target: Path, kinds: tuple[str, ...]) -> None:
 
 
 def _write_licences(folder: Path) -> None:
-    """Copy the licence texts of everything that the folder contains."""
+    """Copy the licence text of everything that the folder contains."""
     _copy(ROOT / "LICENSE", folder / "urc.txt")
     _copy(ROOT / "LICENSES" / "MPL-2.0.txt", folder / "pyodide.txt")
     _copy(ROOT / "LICENSES" / "Python-2.0.txt", folder / "python.txt")

@@ -133,7 +133,7 @@ def build_twice(out: Path, epoch: int) -> None:
 
 
 def copy_sources(target: Path) -> None:
-    """Copy the files in the checkout, without ignored files."""
+    """Copy the checkout's files, except ignored files."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     for name in filter(None, done.stdout.split("\0")):

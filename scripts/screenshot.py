@@ -16,7 +16,7 @@ PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "dashboard.p
 CHARGE = "74"
 """Battery charge in the picture, in percent.
 
-The emulated battery reaches each charge once in 100 s.
+The emulated battery reaches each charge once every 100 s.
 """
 WAIT_MS = 110_000
 MAX_BYTES = 150_000

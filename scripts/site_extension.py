@@ -1,4 +1,4 @@
-"""The Sphinx extension of the documentation site: marks, glossary anchors, and llms.txt."""
+"""The Sphinx extension for the documentation site: marks, glossary anchors, and llms.txt."""
 
 from html import escape
 from pathlib import Path
@@ -89,7 +89,7 @@ def link_names(app: Sphinx, tree: nodes.document, name: str) -> None:
 
 
 def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
-    """Return whether one of a node's ancestors is of one of these kinds."""
+    """Return whether any of a node's ancestors is of one of these kinds."""
     while (node := node.parent) is not None:
         if isinstance(node, kinds):
             return True

@@ -32,7 +32,7 @@ __all__ = ["main"]
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 LOOP = DOCS / "_static" / "drive.webp"
 STILL = DOCS / "_static" / "drive-still.webp"
-"""One still picture of the film, for people who prefer no motion."""
+"""A still picture from the film, for people who prefer no motion."""
 STILL_QUALITY = 70
 SCREEN = (1120, 700)
 LOOP_SIZE = (960, 600)
@@ -91,7 +91,7 @@ async def opened(browser: Browser, address: str, path: str, size: tuple[int, int
 
 
 async def film() -> None:
-    """Write the animated picture of the front page."""
+    """Write the animated picture for the front page."""
     async with (
         served("serve", "turtlebot4", "--simulate") as address,
         running_browser(is_whole=True) as browser,  # the other browser cannot keep a screen on

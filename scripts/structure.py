@@ -279,7 +279,7 @@ def repeated_lines(found: list[Module]) -> int:
                         for number in lines
                     )
                 fresh.add(window)
-            # Only now, because repeated rows within one function do not count.
+            # Added only now, because repeated rows within one function do not count.
             seen |= fresh
     return len(repeated)
 

@@ -1,10 +1,10 @@
-"""Update, check and compile the catalogues of the pages' texts.
+"""Update, check and compile the catalogues of the text on the pages.
 
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps
 
-The texts are in the page templates, the pages' modules, and the widgets' templates, modules, titles
-and summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext
+The text is in the page templates, the pages' modules, and the widgets' templates, modules, titles
+and summaries. A message is the text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext
 PO files, which any translation program can open.
 """
 
@@ -38,7 +38,7 @@ HOLE = re.compile(r"\{[a-z_]+\}")
 
 
 def sources() -> Iterator[tuple[str, Path]]:
-    """Yield Babel's extraction method and the path of every file with texts for people."""
+    """Yield Babel's extraction method and the path of every file with text for people."""
     for pattern, method in (
         ("templates/*.j2", "jinja2"),
         ("widgets/*/*.j2", "jinja2"),

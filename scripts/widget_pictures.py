@@ -27,7 +27,7 @@ STATES = 3
 WIDTH = 1240
 READY_MS = 30_000
 
-# Only the first states, without the page around them.
+# Shows only the first states, without the page around them.
 ONLY = """
 (count) => {
   document.documentElement.dataset.theme = "dark";

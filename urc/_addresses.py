@@ -17,7 +17,7 @@ __all__ = ["Address", "is_of_this_machine", "local_addresses", "unmapped"]
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 _IS_UP = 0x1
-# Addresses for documentation and of private networks; they receive no packet.
+# Documentation and private addresses; they receive no packets.
 _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254", "2001:db8::1")
 
 

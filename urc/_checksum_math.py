@@ -74,7 +74,7 @@ PLAIN_CHECKSUMS: Final = {
     "fletcher32": 32,
     "internet": 16,
 }
-"""Result width in bits of each algorithm without parameters, by name."""
+"""Result width, in bits, of each algorithm without parameters, by name."""
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
@@ -97,7 +97,7 @@ def algorithm_names() -> Iterable[str]:
     return {one.lower() for one in (*models, *aliases)} | FOLDED.keys() | PLAIN_CHECKSUMS.keys()
 
 
-@cache  # the algorithm names are few
+@cache  # there are few algorithm names
 def _named(name: str) -> Compute:
     algorithm = algorithm_of(name)
     if algorithm is None:
@@ -195,7 +195,7 @@ NAMED: Final[Mapping[str, Compute]] = {
     "fletcher32": _fletcher(65535, 16, 2),
     "internet": _internet,
 }
-"""Functions that compute the algorithms without parameters, by name."""
+"""Functions that compute the checksums without parameters, by algorithm name."""
 
 _BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
     CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,

@@ -1,4 +1,4 @@
-"""The environment variables of URC, in one table.
+"""URC's environment variables, in one table.
 
 `python -m scripts.reference` writes docs/reference/environment.md from this table.
 """

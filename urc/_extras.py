@@ -28,7 +28,7 @@ def missing(feature: str, package: str, extra: str) -> str:
 
 
 def packages_of(extra: str) -> list[str]:
-    """Return the requirements of an extra, such as ``paho-mqtt<3,>=2.1``.
+    """Return an extra's requirements, such as ``paho-mqtt<3,>=2.1``.
 
     The list is empty if this URC has no package metadata, as in a browser.
     """

@@ -1,4 +1,4 @@
-"""Finds the folder of the user's URC data on this machine."""
+"""Finds the folder with the user's URC data on this machine."""
 
 import os
 import sys

@@ -1,12 +1,12 @@
 """Translates expressions in the supported subset of Jinja into Python source.
 
-Private to `urc.expressions`. Grammar and precedence follow the section "Expressions" of Jinja's
+Private to `urc.expressions`. Grammar and precedence follow the section "Expressions" in Jinja's
 template designer documentation. A custom parser can report the column of every error, and avoids
 the 40 ms import of a template engine. `tests/unit/test_expressions.py` compares this parser with
 Jinja.
 
 WARNING: the generated Python source is passed to eval. The source may contain only the `repr()` of
-constants, results of `resolve`, and names of `urc.filters.table.SCOPE`.
+constants, results of `resolve`, and names in `urc.filters.table.SCOPE`.
 """
 
 import math
@@ -309,7 +309,7 @@ class _ExpressionParser:
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
     def _nonce(self, token: Token) -> str:
-        """Parse ``nonce()`` or ``nonce(8)``: a nonce of 16 or the given number of bytes."""
+        """Parse ``nonce()`` or ``nonce(8)``: a nonce of 16 bytes or the given number."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._accept(")"):
             raise ExpressionSyntaxError(

@@ -1,7 +1,7 @@
 """Reserved HTTP headers, which identify the sender or delimit the request.
 
-With a reserved header, a document could impersonate a page of the dashboard, a page of another
-program, or a proxy. Browsers also prevent scripts from setting reserved headers.
+With a reserved header, a document could impersonate a dashboard page, another program's page, or a
+proxy. Browsers also prevent scripts from setting reserved headers.
 """
 
 from typing import Final

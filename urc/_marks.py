@@ -1,4 +1,4 @@
-"""Positions of the keys and values of a document.
+"""Positions of the keys and values in a document.
 
 Private to `urc.source`.
 """

@@ -36,7 +36,7 @@ _CODES = {
 
 
 def format_of(number: Number) -> str:
-    """Return the `struct` format character of a number; "" for 24, 40, 48 and 56 bits."""
+    """Return the `struct` format character for a number; "" for 24, 40, 48 and 56 bits."""
     code = _CODES.get((number.kind, number.bits), "")
     return code.lower() if number.is_signed and number.kind == "integer" else code
 

@@ -120,7 +120,7 @@ class Pattern:
         return self._search if self.is_proven else None
 
     def search(self, text: str) -> Mapping[str, str | None] | None:
-        """Return the named groups of the first match in `text`; None without a match."""
+        """Return the named groups of the first match in `text`; None if there is no match."""
         found: _Match | None = self._search(text)
         return None if found is None else found.groupdict()
 
@@ -177,14 +177,14 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
 
 
 def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
-    """Return a short text that matches `pattern`, with the texts of `groups` in its named groups.
+    """Return a short string that matches `pattern`, with the text of `groups` in its named groups.
 
     The caller must check that the result really matches `pattern`.
 
     Args:
         pattern: pattern to match.
-        groups: texts of the named groups, by name.
-        variant: number of the text variant. Variant 0 omits optional parts that contain no group of
+        groups: text of each named group, by name.
+        variant: number of the text variant. Variant 0 omits optional parts that contain none of
             `groups`, and uses the first alternatives and the first printable characters. Other
             variants use other alternatives, characters and numbers of repeats.
     """
@@ -213,7 +213,7 @@ def is_plain_group(pattern: Pattern, name: str) -> bool:
 
 
 def can_be_empty(pattern: Pattern, name: str) -> bool:
-    """Return whether a group can match the empty text."""
+    """Return whether a group can match the empty string."""
     tree = _parser.parse(pattern.source, re.ASCII)
     return bool(_least_width(tree, tree.state.groupdict[name]) == 0)
 
@@ -389,7 +389,7 @@ def _is_linear(tree: Any, text: str) -> bool:
 def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
     """Check each item; return the possible first characters of `items` followed by `follow`.
 
-    The check runs from the last item to the first, because the check of an item needs the possible
+    The check runs from the last item to the first, because checking an item requires the possible
     next characters.
     """
     for operation, argument in reversed(items):

@@ -1,7 +1,7 @@
-"""Translatable texts for people.
+"""Translatable text for people.
 
 A phrase stores the English text and the values, for later translation by `urc.web.words`.
-`scripts.translations` collects the translatable texts from the calls to `phrase`.
+`scripts.translations` collects the translatable text from calls to `phrase`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -10,7 +10,7 @@ __all__ = ["Phrase", "joined", "phrase"]
 
 
 class Phrase(str):
-    """A translatable text in English."""
+    """Translatable English text."""
 
     __slots__ = ("between", "names", "pieces", "text")
 

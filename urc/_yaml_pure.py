@@ -1,6 +1,6 @@
-"""PyYAML's pure Python parser, with the rules of libyaml for text inside braces.
+"""PyYAML's pure Python parser, with libyaml's rules for text inside braces.
 
-Private to `urc.source`. Inside ``{ }`` and ``[ ]``, PyYAML's own parser ends an unquoted text at
+Private to `urc.source`. Inside ``{ }`` and ``[ ]``, PyYAML's own parser ends unquoted text at
 ``?``. Without this module, ``{ send: MODE? }`` would be a syntax error only on machines without
 libyaml.
 """
@@ -19,18 +19,18 @@ _BLANK: Final = "\0 \t\r\n\x85\u2028\u2029"
 
 
 class PureParser(Reader, Scanner, Parser):
-    """A parser with the events and errors of libyaml."""
+    """A parser that produces the same events and errors as libyaml."""
 
     def __init__(self, text: str) -> None:
         """Start reading `text`."""
         self._is_plain = False
-        """Whether the scanner is inside an unquoted text."""
+        """Whether the scanner is inside unquoted text."""
         Reader.__init__(self, text)
         Scanner.__init__(self)
         Parser.__init__(self)
 
     def scan_plain(self) -> Any:
-        """Return the token of an unquoted text."""
+        """Return the token for unquoted text."""
         self._is_plain = self.flow_level > 0
         try:
             return super().scan_plain()
@@ -49,7 +49,7 @@ class PureParser(Reader, Scanner, Parser):
         return _LETTER if found == "?" else found
 
     def check_plain(self) -> bool:
-        """Return whether an unquoted text starts at the current position."""
+        """Return whether unquoted text starts at the current position."""
         if self.flow_level and self.peek() == ":":
             return False
         return bool(super().check_plain())

@@ -1,4 +1,4 @@
-"""Interprets unquoted scalars by the core schema of YAML 1.2.
+"""Interprets unquoted scalars according to the core schema of YAML 1.2.
 
 Private to `urc.source`. In the core schema, ``on``, ``yes``, ``12:30:00`` and dates are text, 010
 is ten, and 1e3 is a number.

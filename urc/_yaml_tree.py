@@ -62,7 +62,7 @@ class TreeReader:
         """Anchored nodes by anchor name; None for an incomplete node."""
 
     def read(self) -> tuple[object, Mark] | None:
-        """Return the data and marks of the document; None for a text without a document.
+        """Return the data and marks of the document; None for text without a document.
 
         Raises:
             StoppedError: the rest of the text cannot be parsed.
@@ -282,7 +282,7 @@ class TreeReader:
         self._report(event, "key-not-text", f"a key must be text, found {what}")
 
     def _is_bare(self, key: Any, value: Any) -> bool:
-        """Return whether the key is not followed by a colon."""
+        """Return whether no colon follows the key."""
         is_text = _is_plain(key) and type(value) is yaml.ScalarEvent
         if not is_text or value.value or value.style:
             return False

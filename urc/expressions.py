@@ -1,10 +1,10 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
 `urc._grammar` defines the supported subset. The sandbox for expressions has no attributes of Python
-objects, no loops, and no operators that turn a short text into a very long one. Expressions can
-call only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja
-converts CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong
-reading must not become zero. In Jinja, ``'abc' | int`` is 0.
+objects, no loops, and no operators that turn short text into very long text. Expressions can call
+only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja converts
+CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong reading must
+not become zero. In Jinja, ``'abc' | int`` is 0.
 
 If a template consists of a single ``{{ expression }}``, its result has the expression's type.
 """
@@ -47,7 +47,7 @@ _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Maximum length of a template, in characters."""
 MAX_OUTPUT: Final = 65536
-"""Maximum length of a rendered text, in characters."""
+"""Maximum length of rendered text, in characters."""
 
 
 _INSTEAD: Final = {
@@ -174,7 +174,7 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
     except (SyntaxError, RecursionError, MemoryError):
         # The brackets around many long sums can exceed the nesting limit of the Python parser.
         raise ExpressionError("the expression is nested too deeply") from None
-    # `python` contains only constants and names of SCOPE: see the warning in `urc._grammar`.
+    # `python` contains only constants and names in SCOPE: see the warning in `urc._grammar`.
     function: Callable[[Mapping[str, object]], Any] = eval(code, table.SCOPE)  # noqa: S307
     return function
 
@@ -245,7 +245,7 @@ def _translate(
 
 
 def last_filter(template: Template) -> str:
-    """Return the name of the outermost filter of an expression; "" without a filter."""
+    """Return the name of an expression's outermost filter; "" if there is no filter."""
     name = template.python.partition("(")[0]
     return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
 

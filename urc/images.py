@@ -11,8 +11,8 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Maximum number of pixels in an image. An image with this number of pixels takes 64 MB of memory
-in a browser."""
+"""Maximum number of pixels in an image. An image of this size takes 64 MB of memory in a
+browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (

@@ -1,4 +1,4 @@
-"""Writes private files atomically: after a power failure, a file has its old or its new content.
+"""Writes private files atomically: a power failure leaves either the old or the new content.
 
 The files contain persistent data: settings, a latched STOP, host keys.
 """
@@ -13,7 +13,7 @@ __all__ = ["make_private", "put_private", "remove_incomplete"]
 
 _OWN = 0o700
 _INCOMPLETE_S = 3600.0
-"""Age at which no process can still be writing a file, in seconds."""
+"""Age, in seconds, beyond which no process can still be writing a file."""
 
 
 def make_private(folder: Path) -> None:
@@ -61,7 +61,7 @@ def put_private(file: Path, data: bytes) -> None:
 def remove_incomplete(folder: Path) -> None:
     """Delete the files that killed processes left incomplete in a folder and its direct subfolders.
 
-    Files that another process may be writing stay. So does a file that cannot be deleted.
+    Files that another process may be writing remain, as do files that cannot be deleted.
     """
     oldest_s = time.time() - _INCOMPLETE_S
     for pattern in (".*.new", "*/.*.new"):

@@ -55,19 +55,19 @@ class Problem(NamedTuple):
     code: str
     """Code of the problem, such as ``unknown-key``."""
     message: str
-    """One-line message that states the found and the expected content."""
+    """One-line message that states the actual and the expected content."""
     file: str
     line: int = 1
-    """1-based."""
+    """Line number, 1-based."""
     column: int = 1
-    """1-based, in characters."""
+    """Column number, 1-based, in characters."""
     end_column: int = 0
     """End column of the underlined text on the same line, 1-based and exclusive; 0 if unknown.
     """
     path: str = ""
     """Path in the document, such as ``transports.wire.port``."""
     hint: str = ""
-    """Suggested correction; "" without a suggestion."""
+    """Suggested correction; "" if there is no suggestion."""
     source: str = ""
     """Source line, shown above the caret."""
     severity: Severity = "error"

@@ -2,7 +2,7 @@
 
 Each row contains the import path of a factory. Factories are imported on first use: a robot with
 only a TCP transport never loads the SSH code. The top layer passes all tables as one `Registries`
-to lower layers. Because the tables are passed down, modules of one layer need not import each
+to lower layers. Because the tables are passed down, modules in one layer need not import each
 other. Third-party packages add rows through the entry-point groups ``urc.transports`` and
 ``urc.framings``.
 """

@@ -32,7 +32,7 @@ Path = tuple[str | int, ...]
 
 _LIMITS: Final = DocumentLimits()
 # These patterns and the YAML reader use the same line ends, so marks count the same lines. The
-# Unicode patterns take milliseconds to compile, so they are compiled only for texts that need them.
+# Unicode patterns take milliseconds to compile, so they are compiled only for text that needs them.
 _LINE_END = re.compile("\r\n|[\r\n]")
 _LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -43,7 +43,7 @@ _ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
 class Document:
     """The content of one file, with the position of every key and value. Immutable after reading.
 
-    Parts of the data may be from other documents; `source_of` returns the document of a value.
+    Parts of the data may come from other documents; `source_of` returns the document of a value.
     """
 
     __slots__ = ("data", "file", "lines", "mark", "problems", "text")
@@ -58,7 +58,7 @@ class Document:
         problems: tuple[Problem, ...] = (),
     ) -> None:
         self.file = file
-        """Original text of the file, for messages and references."""
+        """Name of the file, for messages and references."""
         self.text = text
         self.lines = lines
         self.data = data
@@ -105,7 +105,7 @@ class Document:
         Args:
             path: path of the value; for a missing value, the problem points at the nearest parent.
             code: code of the problem, such as ``unknown-key``.
-            message: one line with the found and the expected content.
+            message: one line that states the actual and the expected content.
             hint: advice.
             key: whether the problem points at the key instead of the value.
             offset: 0-based character position in the value at `path`.
@@ -150,7 +150,7 @@ class Document:
         return value if isinstance(value, str) else None
 
     def inside(self, mark: Mark, text: str | None, offset: int, length: int) -> Span | None:
-        """Return the position of characters of a value in the document's text; None if unknown."""
+        """Return the position of a value's characters in the document's text; None if unknown."""
         written = mark.written
         if written is not None:
             end = written.offset(offset + length)

@@ -28,7 +28,7 @@ async def tell(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     tick = 0
     with contextlib.suppress(ConnectionError):
         while not writer.is_closing():
-            # A timer is not exact to a millisecond, so overdue lines are sent together.
+            # Timers are not accurate to the millisecond, so overdue lines are sent together.
             due = int((time.monotonic() - began_s) * CHANNELS_HZ)
             while tick <= due:
                 values = json.dumps(channels(tick), separators=(",", ":"))

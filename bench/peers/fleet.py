@@ -1,7 +1,7 @@
 """Robots in one process, one for each connection: ``python fleet.py SIGNALS RATE_HZ``.
 
-The program prints its port. A line contains all signals of a robot, as JSON. Every value changes in
-every line.
+The program prints its port. Each line contains all of a robot's signals, as JSON. Every value
+changes in every line.
 """
 
 import asyncio
@@ -13,7 +13,8 @@ from itertools import cycle
 
 LINES = 50
 GOLDEN = 0.6180339887
-"""Phase shift between two robots, as a share of a period; no two robots send at the same time."""
+"""Phase shift between two robots, as a fraction of a period; no two robots send at the same
+time."""
 
 
 def lines(signals: int) -> list[bytes]:

@@ -39,7 +39,7 @@ async def stay(line: ServerConnection) -> None:
 
 
 async def main() -> None:
-    """Relay without end."""
+    """Relay indefinitely."""
     reader, _ = await asyncio.open_connection("127.0.0.1", int(sys.argv[1]))
     async with serve(stay, "127.0.0.1", 0, process_request=page, compression=None) as server:
         print("ready", next(iter(server.sockets)).getsockname()[1], flush=True)

@@ -1,7 +1,7 @@
 """A robot that sends the time and prints its port: ``python robot.py RATE_HZ``.
 
 Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS`, plus
-`START`. Each line has ten digits. The age of a shown line can be computed from them. At 50 lines a
+`START`. Each line has ten digits, from which the age of a shown line can be computed. At 50 lines a
 second, the robot and the display have only five relative phases, a fifth of a frame apart. Each
 line is therefore shifted by up to half of this interval, so that all phases are equally frequent.
 The shifts are the same in every run.

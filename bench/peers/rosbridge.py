@@ -1,6 +1,6 @@
 """A rosbridge server with a robot, and two pages: ``python rosbridge.py`` prints its port.
 
-Each subscriber of a topic gets messages at the topic's rate. The pages are ``roslib.html``, with
+Each subscriber to a topic gets messages at the topic's rate. The pages are ``roslib.html``, with
 the modules of ``node_modules``, and ``picture.html``.
 """
 

@@ -1,7 +1,7 @@
 """Robots driven over UDP, whose motion and polls share one frame counter.
 
 Each robot is a socket that stores received frames in order and answers polls. A session with a
-guard drives the robots. Each gesture uses a separate connection. A control is held for some
+guard drives the robots. Each gesture uses a separate connection. A control is held for several
 seconds, sometimes together with a second control. A gesture ends when all held controls are
 released, or when the leases expire.
 """
@@ -178,7 +178,7 @@ async def _follow(session: Session, controller: MotionController) -> None:
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
-    """Return the first gap in the counters, or the first motion without a later stop, or ""."""
+    """Return the first gap in the counters, or the first motion with no later stop, or ""."""
     motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
     places: dict[int, int] = {}
     for port, number, words in heard:

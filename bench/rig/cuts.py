@@ -48,11 +48,12 @@ class Cut(NamedTuple):
     kind: str
     lasted_s: float
     was_held: bool
-    """Whether the control was held during the whole cut; False: it was released during the cut."""
+    """Whether the control was held throughout the cut; if False, it was released during the cut."""
     oldest_ms: float
-    """Age of the oldest motion received after the cut, in milliseconds; 0 without motion."""
+    """Age of the oldest motion received after the cut, in milliseconds; 0 if there was no
+    motion."""
     stop_ms: float
-    """Time from the end of the cut to the stop, in milliseconds; infinite without a stop."""
+    """Time from the end of the cut to the stop, in milliseconds; infinite if there was no stop."""
     fault: str
     late_ms: float
     """Delay caused by the machine during the trial, in milliseconds."""
@@ -95,7 +96,7 @@ class Cut(NamedTuple):
 class CutRig:
     """A rig with robots on one side of a relay, and a server with pages on the other side.
 
-    Needs root.
+    The rig needs root.
     """
 
     def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
@@ -103,7 +104,7 @@ class CutRig:
 
         Args:
             folder: empty folder for documents and data.
-            kinds: the kind of transport of each robot.
+            kinds: the kind of transport for each robot.
         """
         self.kinds = tuple(kinds)
         self._dice = random.Random(11)  # noqa: S311 - the same moments in every run
@@ -286,7 +287,7 @@ class CutRig:
         ages_ms = [
             (one.time_ns - int(one.text[2:]) * 1000) / 1e6 for one in heard if one.text != "M 0"
         ]
-        # After a cut of one direction, the stop may also have arrived before the end of the cut.
+        # After a cut in one direction, the stop may also have arrived before the end of the cut.
         before = [one for one in all_heard if one.time_ns <= healed_ns]
         if not stops and before and before[-1].text == "M 0":
             stop_ms = 0.0

@@ -66,9 +66,9 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    The value is the sum of two delays. One is the latest wake-up of the robots' process. The other
-    is the latest wake-up of an idle program or the longest processor wait of the server or a guard,
-    whichever is larger.
+    The value is the sum of two delays. The first is the latest wake-up of the robots' process. The
+    second is the latest wake-up of an idle program or the longest processor wait of the server or a
+    guard, whichever is larger.
     """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
@@ -113,7 +113,7 @@ class Rig:
             folder: folder for the robots' documents and the server's data.
             robot_count: number of robots and of parallel pages.
             has_relay: whether a relay connects pages and server; a relay needs root.
-            options: additional options of ``urc serve``.
+            options: additional options for ``urc serve``.
             inside: command prefix that starts the server in another network namespace.
         """
         self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
@@ -175,7 +175,7 @@ class Rig:
 
     @property
     def indexes(self) -> range:
-        """Indexes of all robots of the rig."""
+        """Indexes of all robots in the rig."""
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:

@@ -1,4 +1,4 @@
-"""A robot behind the server of the Foxglove SDK: a separate program without imports from URC.
+"""A robot behind the Foxglove SDK's server: a separate program without imports from URC.
 
 ``python foxglove_process.py foxglove:127.0.0.1:0`` prints the same lines as `robot_process`, for
 one robot. An `Int64` on the topic ``/go`` counts as the line ``M NUMBER``. The program also
@@ -21,7 +21,7 @@ LATE_S = 0.005
 
 
 class Robot(ServerListener):
-    """Callbacks of the server, from its own threads."""
+    """The server's callbacks, which run in the server's own threads."""
 
     def __init__(self) -> None:
         self.said: queue.SimpleQueue[str] = queue.SimpleQueue()

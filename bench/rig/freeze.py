@@ -1,4 +1,4 @@
-"""Trials in which a driven robot's program freezes for some seconds.
+"""Trials in which a driven robot's program freezes for a few seconds.
 
 The robot's program is separate (`bench.rig.robot_process`). Signals suspend and resume this
 program, while its kernel still accepts bytes. A session with a guard drives the robot. Each motion
@@ -60,7 +60,7 @@ class Freeze(NamedTuple):
     newest_ms: float
     """Send time of the newest received motion, in milliseconds after the start of the freeze."""
     stop_ms: float
-    """Time from the end of the freeze to the stop, in milliseconds; `inf` without a stop."""
+    """Time from the end of the freeze to the stop, in milliseconds; `inf` if there was no stop."""
     is_last: bool
     """Whether nothing arrived after the stop."""
     late_ms: float
@@ -97,8 +97,9 @@ async def freeze(
 ) -> Sequence[Freeze]:
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
-    Over `via` rosbridge, the robot's program is a substitute; over foxglove, the server of its SDK.
-    With `is_killed`, the program is killed instead, and a new one starts after `lasts_s` seconds.
+    With `via` set to rosbridge, the robot's program is a substitute; with foxglove, it is the SDK's
+    server. With `is_killed`, the program is killed instead, and a new one starts after `lasts_s`
+    seconds.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]

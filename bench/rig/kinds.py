@@ -1,4 +1,4 @@
-"""The kinds of transport for robots of the rig, with real third-party programs.
+"""The kinds of transport for the rig's robots, with real third-party programs.
 
 Each kind defines the robot's address (see `bench.rig.robot_process`), its document, and limits
 after a cut. If a connection reopens immediately, no motion older than 300 ms may arrive, and the
@@ -61,7 +61,7 @@ def bounds_of(kind: str) -> Bounds:
         return Bounds(300.0, 0, 100.0, 0.45)
     if kind == "udp":
         return Bounds(300.0, 0, 100.0, float("inf"), is_told=False, is_repeated=True)
-    # At most one late motion, at most a second old, and the fastest possible reconnection.
+    # Allow one late motion frame, at most a second old, and the fastest possible reconnection.
     return Bounds(1000.0, 1, 1000.0, 1.3, is_repeated=kind != "ssh")
 
 
@@ -116,12 +116,12 @@ class Counterpart(Program):
         self.options: dict[str, str] = {}
         """Values for the placeholders in the robot's document."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
-        # Killed by force, because unshare ignores other signals.
+        # The script kills by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
 
 
 def place_of(kind: str, index: int) -> str:
-    """Return the address of a robot of this kind, as an argument of `robot_process`."""
+    """Return the address of a robot of this kind, as an argument for `robot_process`."""
     if kind == "mqtt":
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + index}"
     if kind == "ssh":

@@ -39,7 +39,7 @@ FLOOD = 400
 
 
 class Plan(NamedTuple):
-    """The plan of one page."""
+    """The plan for one page."""
 
     number: int
     host: str
@@ -142,7 +142,7 @@ class Page:
         return True
 
     def wait(self, until_ns: int) -> None:
-        """Handle received messages until the time `until`."""
+        """Handle received messages until the time `until_ns`."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
             lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
@@ -240,7 +240,7 @@ class Page:
             if now_ns > until_ns or self.is_closed:
                 state = f"live {self.is_live}, mine {self.is_mine}, beat {self.heartbeat}"
                 raise TimeoutError(f"no controls ({state}): {self.refusal or 'no answer'}")
-            # The last operator is leaving, so repeat the request until the controls are free.
+            # The previous operator is leaving, so repeat the request until the controls are free.
             if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:
                 verb = "reset" if self.is_latched else "take"
                 self.say({"t": "drive", "verb": verb})
@@ -249,7 +249,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return the first frame's opcode, payload and the remaining data; None if incomplete."""
+    """Return the first frame's opcode and payload, and the remaining data; None if incomplete."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -286,7 +286,7 @@ def live(plan: Plan) -> None:
 
 @contextlib.contextmanager
 def _no_release_meanwhile() -> Iterator[None]:
-    """Hold the order to release back, so that no release overtakes a tick with a lower number."""
+    """Delay the order to release, so that no release overtakes a tick with a lower number."""
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
     try:
         yield
@@ -295,7 +295,7 @@ def _no_release_meanwhile() -> Iterator[None]:
 
 
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
-    """Send ticks at a fixed rate until the time `until`."""
+    """Send ticks at a fixed rate until the time `until_ns`."""
     while next_ns < until_ns:
         page.wait(next_ns)
         with _no_release_meanwhile():

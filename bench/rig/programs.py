@@ -48,11 +48,11 @@ class Program:
     """A process that receives orders and reports events, both as lines of text."""
 
     def __init__(self, arguments: Sequence[str], *, inside: Sequence[str] = ()) -> None:
-        """Start it.
+        """Start the program.
 
         Args:
             arguments: command line.
-            inside: command prefix of a network namespace, from `Relay.inside`.
+            inside: command prefix for a network namespace, from `Relay.inside`.
         """
         self.lines: list[str] = []
         """All output lines of the program so far, including standard error."""
@@ -85,7 +85,7 @@ class Program:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End it."""
+        """End the program."""
         self.close()
 
     @property
@@ -164,8 +164,8 @@ def peer(script: str, *arguments: object) -> Iterator[int]:
 
 
 def _script(name: str, *arguments: str) -> list[str]:
-    # -P: otherwise, its own folder is first on the path, with names of the standard library.
-    # -S: only the server of Foxglove needs installed packages.
+    # -P: otherwise, its own folder is first on the path, with names from the standard library.
+    # -S: only Foxglove's server needs installed packages.
     flags = "-PE" if name == "foxglove_process.py" else "-PSE"
     return [sys.executable, flags, str(HERE / name), *arguments]
 
@@ -196,7 +196,7 @@ class Robots(Program):
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
     def take(self, line: str) -> None:
-        """Sort a report."""
+        """Store a report by kind."""
         words = line.split(" ", 3)
         if words[0] == "line":
             self.heard[int(words[1])].append(Heard(int(words[2]), words[3]))
@@ -238,7 +238,7 @@ class Operators(Program):
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
-        """Sort a report."""
+        """Store a report by kind."""
         word, _, rest = line.partition(" ")
         number, _, rest = rest.partition(" ")
         if number.isdigit():
@@ -282,7 +282,7 @@ class Relay(Program):
         self._descriptors = dict(zip("ab", found, strict=True))
 
     def take(self, line: str) -> None:
-        """Number of orders that the relay has executed."""
+        """Count the orders that the relay has executed."""
         self._done += line.startswith("done")
 
     def inside(self, side: str) -> tuple[str, ...]:
@@ -315,9 +315,9 @@ class Server(Program):
         Args:
             profiles: paths of the robots' documents.
             data: the server's data folder.
-            options: additional options of ``urc serve``.
+            options: additional options for ``urc serve``.
             host: address to listen on.
-            inside: command prefix of a network namespace, from `Relay.inside`.
+            inside: command prefix for a network namespace, from `Relay.inside`.
             can_hang: whether a signal can block the server; see `bench.rig.server_process`.
         """
         script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]

@@ -110,7 +110,7 @@ class RevocationRig(Rig):
         before = [
             one for one in self.robots.since(index, began_ns) if one.time_ns <= revoked_ns[index]
         ]
-        if not before or before[-1].text == "M 0":  # a busy machine has held up the page
+        if not before or before[-1].text == "M 0":  # a busy machine has delayed the page
             return Trial(death, float("inf"), "", 0.0, REVOKED_BOUND_MS, has_moved=False)
 
         def has_stopped() -> bool:

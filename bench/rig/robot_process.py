@@ -30,9 +30,9 @@ import time
 from dataclasses import dataclass
 
 BEAT_NS = 5_000_000
-"""Interval of checks for a late wake-up, in nanoseconds."""
+"""Interval between checks for a late wake-up, in nanoseconds."""
 LOOK_NS = 20_000_000
-"""Interval of checks for waiting processes, in nanoseconds."""
+"""Interval between checks for waiting processes, in nanoseconds."""
 WAITED_NS = 2_000_000
 """Shortest reported wait for a processor, in nanoseconds."""
 LATE_NS = 5_000_000
@@ -141,7 +141,7 @@ class HttpEar(Ear):
 
 
 class BrokerEar(Ear):
-    """A subscriber of MQTT 3.1.1."""
+    """An MQTT 3.1.1 subscriber."""
 
     opening = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x00\x00\x00"
 

@@ -1,4 +1,4 @@
-"""Random ROS messages and their bytes, made by the library rosbags.
+"""Random ROS messages and their bytes, made with the library rosbags.
 
 rosbags, by Ternaris, is independent of URC. It includes a ROS 2 type store, and serializes to CDR
 and to the ROS 1 format. The values of a message are compared as plain data, as URC reads them.

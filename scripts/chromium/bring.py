@@ -57,7 +57,7 @@ class BringError(Exception):
 
 
 def bring_chromium() -> str:
-    """Return the launcher of Chromium in the user's cache; the first call installs Chromium."""
+    """Return Chromium's launcher in the user's cache; the first call installs Chromium."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise BringError("the package exists for Linux x64 only")
     folder = cache_folder()
@@ -120,7 +120,7 @@ def unpack(archive: Path, folder: Path) -> None:
             target = (folder / member.name).resolve()
             if not target.is_relative_to(folder.resolve()):
                 raise BringError(f"{archive.name} points outside its folder: {member.name!r}")
-        # Debian 12's Python 3.11.2 has no `filter` yet; later ones warn without it.
+        # Debian 12's Python 3.11.2 has no `filter` yet; later versions warn without it.
         options = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
         tar.extractall(folder, **options)  # type: ignore[arg-type]  # noqa: S202  # checked above
 

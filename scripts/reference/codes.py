@@ -1,4 +1,4 @@
-"""The page of problem codes, generated from the texts of `urc explain`."""
+"""The reference page for problem codes, generated from the text of `urc explain`."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""The page of the command line, generated from the argument parsers of `urc`."""
+"""The reference page for the command line, generated from `urc`'s argument parsers."""
 
 import argparse
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The page of environment variables, generated from the table in the code."""
+"""The reference page for environment variables, generated from the table in the code."""
 
 from collections.abc import Mapping
 

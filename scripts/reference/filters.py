@@ -1,4 +1,4 @@
-"""The page of expressions and filters. URC itself computes the result of each example."""
+"""The reference page for expressions and filters. URC computes each example's result itself."""
 
 from collections.abc import Mapping
 
@@ -70,7 +70,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "utf8": ("'OK' | utf8", "bytes of a text"),
     "yaw": ("[0, 0, 0, 1] | yaw", "yaw of a quaternion [x, y, z, w], in radians"),
 }
-"""An example and the meaning of each filter."""
+"""An example of each filter, and the filter's meaning."""
 _OPERATORS = (
     ("`+` `-` `*` `/` `//` `%` `**`", "arithmetic; `+` also joins texts or bytes"),
     ("`==` `!=` `<` `<=` `>` `>=`", "comparisons"),

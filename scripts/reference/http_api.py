@@ -1,4 +1,4 @@
-"""The page of the HTTP API, generated from the server's OpenAPI document."""
+"""The reference page for the HTTP API, generated from the server's OpenAPI document."""
 
 import json
 from collections.abc import Iterator, Mapping

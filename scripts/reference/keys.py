@@ -1,4 +1,4 @@
-"""Pages of the language's keys, generated from the schemas: one page for each family of keys."""
+"""Reference pages for the language's keys, generated from the schemas: one page for each family."""
 
 import json
 import re

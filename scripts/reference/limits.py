@@ -1,4 +1,4 @@
-"""The page of limits, generated from the constants whose docstring begins with “Maximum”."""
+"""The reference page for limits, generated from constants whose docstrings begin with “Maximum”."""
 
 import ast
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The page of the Python client, generated from the docstrings of its public names."""
+"""The reference page for the Python client, generated from the docstrings of its public names."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""The page of the WebSocket messages, generated from the message types in `urc.wire`."""
+"""The reference page for WebSocket messages, generated from the message types in `urc.wire`."""
 
 import inspect
 import typing

@@ -38,14 +38,15 @@ class PrincipalStatus(NamedTuple):
 
     principal: Principal
     owner: str = ""
-    """Name of the device's owner; "" without an owner."""
+    """Name of the device's owner; "" if there is no owner."""
     has_passphrase: bool = False
     passkeys: int = 0
     """Number of passkeys."""
     accounts: int = 0
     """Number of accounts with identity providers (OpenID Connect)."""
     invited_until: float | None = None
-    """UTC time at which the newest invitation expires, in seconds; None without an invitation."""
+    """UTC time at which the newest invitation expires, in seconds; None if there is no
+    invitation."""
     sign_ins: int = 0
     """Number of active sign-ins."""
     used_at: float | None = None
@@ -254,7 +255,7 @@ def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bo
 def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
     """End restored codes and sign-ins that are unsafe to keep; return the number of sign-ins ended.
 
-    After the backup, codes may have been used and browser sign-ins revoked. All codes and browser
+    Since the backup, codes may have been used and browser sign-ins revoked. All codes and browser
     sign-ins therefore end. People keep their passphrases.
 
     Args:

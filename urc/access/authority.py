@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 AUTHORITY_FOLDER: Final = "tls"
-"""Subfolder of the data folder for certificates and keys."""
+"""Subfolder in the data folder for certificates and keys."""
 AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
 """Validity of a server certificate; browsers reject certificates with a longer validity."""
@@ -73,8 +73,8 @@ class CertificateAuthority:
 
         Args:
             folder: folder for certificates and keys.
-            names: required names and addresses of the certificate. A name outside the limits of the
-                existing authority requires a new authority, which every device must trust again.
+            names: required names and addresses for the certificate. A name outside the limits of
+                the existing authority requires a new authority, which every device must then trust.
             now: time on this machine's clock, with a time zone.
             optional: additional names and addresses. Names that the existing authority does not
                 permit are omitted and listed in `left_out`.
@@ -215,7 +215,7 @@ class CertificateAuthority:
         )
 
     def _is_usable(self) -> bool:
-        """Return whether the root does not expire soon and permits all names of this machine."""
+        """Return whether the root will not expire soon and permits all of this machine's names."""
         if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
         allowed = self._allowed()
@@ -247,10 +247,10 @@ def fingerprint(certificate: x509.Certificate) -> str:
 
 
 def issued_at(file: Path) -> datetime | None:
-    """Return the earliest time at which this module can have issued a certificate.
+    """Return the earliest time at which this module could have issued a certificate.
 
-    The certificate's start of validity does not show the issue time, because it is never later than
-    `OLDEST`. Return None for a missing or damaged file.
+    The start of the certificate's validity does not show the issue time, because the start is never
+    later than `OLDEST`. Return None for a missing or damaged file.
     """
     found = _certificate(file)
     if found is None:

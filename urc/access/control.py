@@ -62,7 +62,7 @@ class AccessControl:
         self.key = key or secrets.token_urlsafe(24)
         self.instance = instance or secrets.token_hex(4)
         self.on_change: list[Callable[[], None]] = []
-        """Callbacks after each change of rights."""
+        """Callbacks that run after each change of rights."""
         self._utc = utc
         self._latest = utc()
         self._codes: dict[str, None] = {}
@@ -94,7 +94,7 @@ class AccessControl:
     def code(self) -> str:
         """Return a one-time code that replaces the start key for one browser of the local user.
 
-        Disclosing a used code is harmless, for example in a browser's command line.
+        A used code can be disclosed safely, for example in a browser's command line.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None
@@ -148,7 +148,7 @@ class AccessControl:
         self._merge()
 
     def load(self) -> None:
-        """Read the store again like `reload`, but block until the read is complete."""
+        """Read the store again, like `reload`, but block until the read is complete."""
         self._stored = self.store.directory() if self.store else Directory()
         self._merge()
 
@@ -160,7 +160,8 @@ class AccessControl:
 
     def used(self, sign_in: str) -> None:
         """Note that a sign-in was used; `watch` records the use later."""
-        # Only in memory, because every request is a use and a transaction would wait for the disk.
+        # Note the use only in memory: every request is a use, and a transaction would wait for the
+        # disk.
         self._used[sign_in] = self.now()
 
     async def _record_use(self) -> None:
@@ -189,8 +190,8 @@ class AccessControl:
         self._next_end = min(ends, default=float("inf"))
         own = {self._program.id: self._program, **self._local}
         sign_ins = {**self._stored.sign_ins, **own}
-        # A single assignment, so no request sees a partial change. The callbacks run afterwards,
-        # because each socket checks its rights in the new directory.
+        # Use a single assignment, so that no request sees a partial change. The callbacks run
+        # afterwards, because each socket checks its rights in the new directory.
         self.directory = Directory(
             {**self._stored.principals, LOCAL_USER.id: LOCAL_USER},
             sign_ins,

@@ -43,7 +43,7 @@ class SignIn(NamedTuple):
     """The sign-in of one browser, or the token of one program."""
 
     id: str
-    """Unique; no secret."""
+    """Unique, but not secret."""
     principal: str
     """Id of the principal."""
     way: Way
@@ -59,7 +59,7 @@ class SignIn(NamedTuple):
     place: str = ""
     """Network address from which the person signed in."""
     agent: str = ""
-    """Name of browser and system, such as “Chromium on Android”."""
+    """Names of the browser and system, such as “Chromium on Android”."""
 
     def is_over(self, now: float) -> bool:
         """Return whether the sign-in has expired."""

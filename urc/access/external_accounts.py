@@ -96,7 +96,7 @@ def admit_named(
             at the same time.
 
     Raises:
-        AccessError: no person has the name, or the name is invalid.
+        AccessError: no person has this name, or the name is invalid.
     """
     grants = tuple(new_grants)
     with store.transaction() as base:

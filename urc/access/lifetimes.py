@@ -1,6 +1,6 @@
 """Lifetimes of sign-ins, codes and links.
 
-Layer 4. Pure. The creator of a guest link or token chooses its end.
+Layer 4. Pure. The creator of a guest link or token chooses when it ends.
 """
 
 from typing import Final, NamedTuple

@@ -4,7 +4,7 @@ Layer 4. The sign-in follows OpenID Connect Core 1.0, RFC 7636 (PKCE) and RFC 97
 practice).
 
 Theory of operation. `begin` returns the address of the provider's page. The address contains a
-random state, which is valid for ten minutes and only once. The state is valid only in the browser
+random state, which is valid for one use within ten minutes. The state is valid only in the browser
 that has the binding, so a link cannot sign a browser in to an attacker's account. `finish`
 exchanges the code in the redirect for an ID token and checks the token. The token's claims
 determine the grants.
@@ -44,7 +44,7 @@ class OidcRedirect(NamedTuple):
     url: str
     """Address of the provider's page."""
     binding: str
-    """Secret in a cookie of the browser during the sign-in at the provider."""
+    """Secret in a browser cookie during the sign-in at the provider."""
 
 
 class _Flow(NamedTuple):
@@ -55,7 +55,7 @@ class _Flow(NamedTuple):
 
 
 class OidcSignIn:
-    """The sign-ins of one server through its provider."""
+    """One server's sign-ins through its provider."""
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class OidcSignIn:
 
         Args:
             answer: the redirect's query parameters.
-            binding: the secret in the browser's cookie; "" without a cookie.
+            binding: the secret in the browser's cookie; "" if there is no cookie.
             now: UTC time in seconds since 1970.
 
         Raises:
@@ -160,7 +160,7 @@ class OidcSignIn:
         access = response.get("access_token")
         if isinstance(access, str) and not all(claim_values(claims, name) for name in wanted):
             more = await self._provider.userinfo(access)
-            # The response must be about the same account (OpenID Connect Core, 5.3.2).
+            # The response must describe the same account (OpenID Connect Core, 5.3.2).
             if more.get("sub") == claims["sub"]:
                 claims = more | claims
         return claims

@@ -59,7 +59,7 @@ class OidcOptions:
     client_secret: str = field(default="", repr=False)
     """This server's secret at the provider; "" for a public client."""
     title: str = ""
-    """Text of the sign-in button, such as the name of the school."""
+    """Text on the sign-in button, such as the school's name."""
     address: str = ""
     """This server's public address, without a path; "" to use the address in each request."""
     scopes: tuple[str, ...] = _SCOPES

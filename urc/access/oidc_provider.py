@@ -50,7 +50,7 @@ class ProviderMetadata(NamedTuple):
 
 
 class OidcProvider:
-    """The provider of one server."""
+    """One server's provider."""
 
     def __init__(self, options: OidcOptions, clock: Callable[[], float] = time.monotonic) -> None:
         """Store the options; the first sign-in triggers the first request.
@@ -141,7 +141,7 @@ class OidcProvider:
         return await self._ask("POST", metadata.token, form=form, credentials=credentials)
 
     async def userinfo(self, token: str) -> dict[str, Any]:
-        """Return further claims of a token's account; empty if the provider does not offer any.
+        """Return further claims about a token's account; empty if the provider does not offer any.
 
         Raises:
             AccessError: the provider is unreachable or rejects the token.
@@ -163,9 +163,10 @@ class OidcProvider:
     ) -> dict[str, Any]:
         """Return the JSON object in the response to a request."""
         if self._trust is None:
-            # In a thread, because reading the certificate authorities takes tens of milliseconds.
+            # Run in a thread, because reading the certificate authorities takes tens of
+            # milliseconds.
             self._trust = await asyncio.to_thread(self._trusted)
-        # No compression, so that the response cannot grow after the transfer.
+        # Request no compression, so that the response cannot grow after the transfer.
         sent = {"accept": "application/json", "accept-encoding": "identity", **(headers or {})}
         timeout = httpx2.Timeout(TOTAL_S, connect=_CONNECT_S)
         try:

@@ -1,7 +1,7 @@
 """YAML files with sign-in options; every error message contains the line.
 
-Layer 4. The file contains no secrets. It names other files with the secrets, which only their owner
-may read.
+Layer 4. The file contains no secrets. It names the files that contain the secrets; only their owner
+may read those files.
 """
 
 import os
@@ -58,7 +58,7 @@ class OptionsFile:
                 raise self.fault((*path, key), text, "unknown-key", is_key=True)
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return a text; raise `ProblemsError` for a wrong type or a missing required key.
+        """Return a key's text; raise `ProblemsError` for a wrong type or a missing required key.
 
         Args:
             key: the key.
@@ -80,7 +80,7 @@ class OptionsFile:
         return value
 
     def list_of(self, key: str) -> list[Any]:
-        """Return a list, empty for a missing key; raise `ProblemsError` for a wrong type."""
+        """Return a key's list, or [] for a missing key; raise `ProblemsError` for a wrong type."""
         value = self.data.get(key)
         if value is None:
             return []
@@ -123,5 +123,6 @@ class OptionsFile:
 
 def is_loopback_host(host: str) -> bool:
     """Return whether a URL's host is this machine, where plain HTTP is private."""
-    # A fixed list, because any other name is resolved at each request and could change its address.
+    # The list is fixed, because any other name is resolved at each request, and its address could
+    # change.
     return host in ("127.0.0.1", "localhost", "::1", "[::1]")

@@ -1,7 +1,7 @@
-"""One-time codes for pairing a device, or with which an invited person chooses a passphrase.
+"""One-time codes for pairing devices, and for invited people to choose a passphrase.
 
 Layer 4. Each function runs in one transaction. The code therefore stays valid after an error, such
-as a name in use. The functions block for a few milliseconds.
+as a name that is already in use. The functions block for a few milliseconds.
 """
 
 import hashlib
@@ -32,7 +32,7 @@ class Origin(NamedTuple):
     place: str = ""
     """Network address."""
     agent: str = ""
-    """Name of browser and system."""
+    """Names of the browser and system."""
 
 
 UNKNOWN_ORIGIN: Final = Origin()

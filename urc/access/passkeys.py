@@ -5,7 +5,7 @@ HTTPS or on ``localhost``. A passkey belongs to that host name, so a page on ano
 request it.
 
 Theory of operation. Each ceremony has two requests. The response to the first request contains
-options with a random challenge, which is valid once and for five minutes. The second request
+options with a random challenge, which is valid for one use within five minutes. The second request
 contains the authenticator's signature. The methods of `Passkeys` block for a few milliseconds
 (SQLite, signatures), so servers call them in a thread. A lock serializes access to the challenges.
 """
@@ -59,7 +59,7 @@ def relying_party(host: str, port: int | None) -> RelyingParty:
     """Return the relying party for a request.
 
     Args:
-        host: host of the request's ``Host`` header; an IPv6 address keeps its brackets.
+        host: host in the request's ``Host`` header; an IPv6 address keeps its brackets.
         port: port in the ``Host`` header; None for the default port.
 
     Raises:
@@ -116,7 +116,7 @@ class Passkeys:
         )
 
         passkeys = self.table.of(owner.id)
-        check_number(len(passkeys))  # before the authenticator creates one
+        check_number(len(passkeys))  # before the authenticator creates a passkey
         known = [each for each in passkeys if each.host == party.host]
         options = generate_registration_options(
             rp_id=party.host,
@@ -190,7 +190,7 @@ class Passkeys:
         return _as_json(options)
 
     def authenticate(self, party: RelyingParty, response: object, now: float) -> Passkey:
-        """Return the passkey that signed a challenge of this server.
+        """Return the passkey that signed one of this server's challenges.
 
         Args:
             party: this server.

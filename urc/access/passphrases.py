@@ -1,8 +1,8 @@
-"""Passphrases: rules for new ones, argon2id hashes, and the check at sign-in.
+"""Passphrases: rules for new passphrases, argon2id hashes, and the check at sign-in.
 
 Layer 4. A hash is deliberately slow and takes about 50 ms and 64 MiB. Servers therefore compute one
-hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, the second recommended choice of
-parameters). The rules follow NIST SP 800-63B-4: a minimum length, no common passwords, and no
+hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, with the second recommended set
+of parameters). The rules follow NIST SP 800-63B-4: a minimum length, no common passwords, and no
 composition rules.
 """
 
@@ -27,7 +27,7 @@ __all__ = [
 SHORTEST: Final = 8
 """Minimum number of characters."""
 LONGEST: Final = 256
-"""Maximum number of characters; longer texts would let attackers waste the server's time."""
+"""Maximum number of characters; longer text would let attackers waste the server's time."""
 WRONG: Final = "the name or the passphrase is wrong"
 _FEWEST_DIFFERENT: Final = 4
 _JUDGED: Final = 16
@@ -69,7 +69,7 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
 
 
 def matches(passphrase: str, kept: str | None) -> bool:
-    """Return whether `passphrase` matches the hash; the check always takes as long as one hash.
+    """Return whether `passphrase` matches the hash; the check always takes as long as hashing.
 
     Args:
         passphrase: passphrase entered at the sign-in.
@@ -116,7 +116,7 @@ def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
 def _is_common(passphrase: str, name: str) -> bool:
     """Return whether a program could find the passphrase with a million guesses.
 
-    Only the beginning of the passphrase is checked, because a long text can take seconds.
+    Only the beginning of the passphrase is checked, because checking long text can take seconds.
     """
     from zxcvbn import zxcvbn  # one megabyte of word lists, needed only for new passphrases
 

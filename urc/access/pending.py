@@ -1,6 +1,6 @@
 """Pending sign-ins, which briefly wait for their second request and can be used only once.
 
-Layer 4. Pure. A passkey signs a challenge of the server. An OpenID Connect provider returns the
+Layer 4. Pure. A passkey signs a challenge from the server. An OpenID Connect provider returns the
 browser with a state. The limits restrict the memory that unknown visitors can occupy.
 """
 
@@ -69,7 +69,7 @@ class Pending(Generic[_Value]):
         return entry.value if entry else None
 
     def _forget_old(self, now: float) -> None:
-        # All keys have the same validity, so the oldest keys are first.
+        # All keys have the same validity, so the oldest keys come first.
         while self._entries and next(iter(self._entries.values())).ends_at <= now:
             self._entries.popitem(last=False)
 

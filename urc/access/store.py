@@ -1,6 +1,6 @@
 """The store of people, devices, programs, sign-ins and pairing codes: one private SQLite file.
 
-Layer 4. Secrets are stored as hashes only. Several processes can use the file at once: the server,
+Layer 4. Only hashes of secrets are stored. Several processes can use the file at once: the server,
 and management commands on the same machine. `changed` reports changes by other processes, so a
 removal on the command line takes effect on a running server.
 
@@ -35,7 +35,8 @@ __all__ = [
 
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
-"""Maximum number of sign-ins, without tokens; a new sign-in closes the least recently used one."""
+"""Maximum number of sign-ins, not counting tokens; a new sign-in closes the least recently used
+one."""
 MOST_PRINCIPALS: Final = 5000
 MOST_INVITATIONS: Final = 1000
 MOST_SIGN_INS_OF_ONE: Final = 100
@@ -243,7 +244,7 @@ class AccessStore:
                 raise AccessError("that person was removed") from None
 
     def passphrase_of(self, name: str) -> tuple[str, str | None]:
-        """Return the id and hash of the person with this name; "" and None without a match."""
+        """Return the id and hash of the person with this name; "" and None if there is no match."""
         with self._lock, self._readable():
             row = self._base.execute(
                 "SELECT id, hash FROM principals LEFT JOIN passphrases ON principal = id"

@@ -1,6 +1,6 @@
-"""Detection of a clock that is behind, such as that of a Raspberry Pi without a network.
+"""Detection of a clock that is behind, such as the clock of a Raspberry Pi without a network.
 
-Layer 4. Pure. A clock is wrong if it shows a time before a known event. A clock that is ahead
+Layer 4. Pure. A clock is wrong if it shows a time earlier than a known event. A clock that is ahead
 cannot be detected.
 """
 
@@ -27,7 +27,7 @@ class KnownTime(NamedTuple):
 
 
 def clock_fault(now: float, known: Iterable[KnownTime] = ()) -> str:
-    """Return one line about a clock that is behind; "" if none is detected.
+    """Return one line about a clock that is behind; "" if no fault is detected.
 
     Args:
         now: UTC time of the machine's clock, in seconds since 1970.

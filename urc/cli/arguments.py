@@ -130,7 +130,7 @@ def is_loopback(host: str) -> bool:
 
 
 def add_port(parser: argparse.ArgumentParser) -> None:
-    """Declare the option `--port`, the port of the dashboard."""
+    """Declare the option `--port`, the dashboard's port."""
     parser.add_argument(
         "--port",
         type=port,
@@ -204,7 +204,7 @@ def port(text: str) -> int:
 
 
 def _address(text: str) -> str:
-    # An empty address would mean all networks of this machine.
+    # An empty address would mean all of this machine's networks.
     if not text.strip():
         raise argparse.ArgumentTypeError("expected an address like 127.0.0.1 or 0.0.0.0")
     return text.strip()

@@ -1,4 +1,4 @@
-"""Audit entries about commands run on this machine, in the data folder's audit log.
+"""Audit entries for commands run on this machine, written to the data folder's audit log.
 
 A running server may write to the same file. Both processes extend the same hash chain.
 """
@@ -34,7 +34,7 @@ def audit_packages(command: str, packages: Iterable[object]) -> None:
 
     Args:
         command: the change, such as ``install``.
-        packages: packages with versions, or addresses of repositories.
+        packages: packages with their versions, or repository addresses.
     """
     from urc._folders import data_folder
 

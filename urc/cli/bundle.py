@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the bundle. Bundles of the same packages always contain the same bytes."""
+    """Write the bundle. The same packages always produce identical bytes."""
     from urc.cli.error_report import Misuse
     from urc.cli.packages import open_store
     from urc.packages.atomic_files import put_file
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "InstallPlan":
-    """Return the packages, preferably their installed versions, which have been tested."""
+    """Return the packages to bundle; prefer installed versions, which have been tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_requirement

@@ -1,6 +1,6 @@
 """Colours of terminal output, according to https://no-color.org and the type of terminal.
 
-Layer 6. Colours never add information, because the coloured words already express the meaning.
+Layer 6. Colours never add information: the coloured words themselves carry the meaning.
 """
 
 import os
@@ -43,7 +43,10 @@ def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> 
 
 
 def painted(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """Return the text in a style, or unchanged if the stream (standard output) has no colours."""
+    """Return the text in a style; return it unchanged if the stream has no colours.
+
+    Without `stream`, the text is for standard output.
+    """
     if not text or not has_colours(stream or sys.stdout):
         return text
     return f"\x1b[{_CODES[style]}m{text}\x1b[0m"

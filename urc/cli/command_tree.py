@@ -1,4 +1,4 @@
-"""The parser of all subcommands together, for completion, the manual page and the reference.
+"""One parser for all subcommands, used by completion, the manual page and the reference.
 
 Layer 6. `urc` itself never builds this parser, because each subcommand loads only its own parser.
 """
@@ -16,7 +16,7 @@ DESCRIPTION = "Describe a robot in one YAML file, and drive it from any browser.
 
 
 def command_tree(only: Container[str] | None = None) -> argparse.ArgumentParser:
-    """Return the parser of `urc` with its subcommands.
+    """Return the parser for `urc`, with its subcommands.
 
     Args:
         only: subcommands to include with their arguments; None means all. Other subcommands are

@@ -41,7 +41,7 @@ def answer() -> None:
     for parser in (tree, *_parsers_of(tree)):
         for action in parser._actions:  # noqa: SLF001 - argparse has no public list
             if complete := _COMPLETERS.get(str(action.metavar)):
-                action.completer = complete  # type: ignore[attr-defined]  # as argcomplete wants it
+                action.completer = complete  # type: ignore[attr-defined]  # as argcomplete expects
     argcomplete.autocomplete(tree)
 
 
@@ -78,4 +78,4 @@ def _documents(prefix: str, **_: object) -> list[str]:
 
 
 _COMPLETERS: dict[str, Callable[..., list[str]]] = {"PROFILE": _robots, "PATH": _robots}
-"""Completion function by metavar; other arguments complete file names."""
+"""Completion function for each metavar; all other arguments complete to file names."""

@@ -41,13 +41,13 @@ from urc.web.serve.service_manager import ServiceManager, answers
 __all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""Return the command-line settings of a profile; raise `UrcError` for invalid settings."""
+"""Function that returns a profile's command-line settings, or raises `UrcError` if invalid."""
 _LOOK = (320, 240)
 """Columns and rows of the preview on a robot's card."""
 
 
 def _nothing(_: Profile) -> Mapping[str, Value]:
-    """Nothing was given."""
+    """Return no settings."""
     return {}
 
 
@@ -59,7 +59,7 @@ class DashboardAddress:
     port: int
     allowed_hosts: Sequence[str] = ()
     data: Path | None = None
-    """Data folder of URC; None means the default data folder of this user."""
+    """URC's data folder; None means this user's default data folder."""
     has_guard: bool = True
     """Whether to start a guard process, which stops motion if this process fails."""
     tiles: Path | None = None
@@ -73,7 +73,7 @@ class DashboardAddress:
     recordings: Path | None = None
     """Folder for recordings of all sessions; None disables recording."""
     recorder: ServerRecorder | None = None
-    """Receiver of audit entries about recordings."""
+    """Recorder that writes audit entries about recordings."""
     tls: TlsOptions = PLAIN
     """HTTPS certificate, and public names of a web server in front of this server."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
@@ -101,7 +101,7 @@ def run_dashboard(
         place: address, folders and options of the dashboard.
         is_simulated: whether emulated robots replace the real robots.
         on_ready: callback that receives the start addresses once.
-        given: function that returns the command-line settings of a profile.
+        given: function that returns a profile's command-line settings.
         is_dev: whether to serve developer pages and reload changed documents.
         faults: faults to inject into emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
 
@@ -215,7 +215,7 @@ async def _robot_at_start(
     profile: Profile,
     faulty: FaultInjector | None,
 ) -> Robot:
-    """Return a profile's robot; with `faulty`, emulate it from the start, even without a viewer."""
+    """Return a profile's robot; with `faulty`, emulate it from the start, even without viewers."""
     robot = _first(factory, profile)
     if faulty is None:
         return robot
@@ -247,7 +247,7 @@ async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
 def robot_options_of(
     place: DashboardAddress, given: SettingsOf = _nothing, faulty: FaultInjector | None = None
 ) -> RobotOptions:
-    """Return the options of a robot factory; with `faulty`, all robots are emulated."""
+    """Return the options for a robot factory; with `faulty`, all robots are emulated."""
     return RobotOptions(
         own_folder(place.data),
         make=partial(_robot, place, faulty),
@@ -302,7 +302,7 @@ async def _session(
     profile: Profile,
     values: Mapping[str, Value],
 ) -> AsyncIterator[Session]:
-    """Open a session with a robot or its emulation until the context ends."""
+    """Keep a session with a robot or its emulation open until the context ends."""
     transports = built_in_catalog().transports
     async with AsyncExitStack() as stack:
         settings = values

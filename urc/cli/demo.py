@@ -21,7 +21,7 @@ from urc.shipped import shipped
 
 EXAMPLE = "urc demo"
 USUAL_PORT = 8080
-_ALL_NETWORKS = "0.0.0.0"  # noqa: S104 - what --phone asks for; devices pair or sign in
+_ALL_NETWORKS = "0.0.0.0"  # noqa: S104 - --phone requires it; devices pair or sign in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

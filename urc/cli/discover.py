@@ -1,4 +1,4 @@
-"""`urc discover`: find announced robots, serial ports and topics of a rosbridge."""
+"""`urc discover`: find announced robots, serial ports and rosbridge topics."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
@@ -135,7 +135,7 @@ async def _nearby(
 ) -> tuple[list[Row], str]:
     """Return the open ports of shipped robots on this machine or on the given hosts.
 
-    The search uses the default values of all settings.
+    The search uses the default values for all settings.
 
     For each rosbridge that replies, the result includes its topics.
     """
@@ -192,7 +192,7 @@ async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[
 
     rows: list[Row] = []
     parts: list[str] = []
-    # Without subscriptions, because a ROS 1 bridge would list them as topics.
+    # Make no subscriptions, because a ROS 1 bridge would list them as topics.
     driver = profile.driver._replace(messages={})
     made = make_transports(driver, settings, built_in_catalog().transports)
     for name, spec in profile.driver.transports.items():

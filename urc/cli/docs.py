@@ -1,4 +1,4 @@
-"""`urc docs`: print the manual page of a profile as Markdown."""
+"""`urc docs`: print a profile's manual page as Markdown."""
 
 import argparse
 

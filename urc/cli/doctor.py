@@ -1,4 +1,4 @@
-"""`urc doctor`: check the features of this machine."""
+"""`urc doctor`: check this machine's features."""
 
 import argparse
 import platform
@@ -41,7 +41,7 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""For each optional package, the extra that installs it and its purpose."""
+"""For each optional package, its purpose and the extra that installs it."""
 OPTIONAL = {
     "google-re2": "patterns without provably linear run time; without it, URC refuses them",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
@@ -124,7 +124,7 @@ def _package(name: str, purpose: str, *, is_required: bool) -> _Finding:
 def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -> _Finding:
     try:
         return _Finding(name, True, check(), is_required)
-    except (UrcError, ImportError) as fault:  # not installed means not importable
+    except (UrcError, ImportError) as fault:  # a missing package cannot be imported
         return _Finding(name, False, str(fault), is_required)
 
 

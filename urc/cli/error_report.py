@@ -1,4 +1,4 @@
-"""Error messages of all subcommands: one line for each problem, without a traceback."""
+"""Error messages for all subcommands: one line for each problem, without a traceback."""
 
 from urc.cli.output import complain
 from urc.problems import ProblemsError, UrcError, to_text

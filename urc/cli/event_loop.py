@@ -1,4 +1,4 @@
-"""The event loop of a subcommand, with signal handling and non-blocking output."""
+"""A subcommand's event loop, with signal handling and non-blocking output."""
 
 import asyncio
 import logging
@@ -79,8 +79,8 @@ class _Job(NamedTuple):
 class LineWriter:
     """A writer for standard streams that does not block the event loop if the reader is slow.
 
-    A daemon thread writes directly to the file descriptor. Other threads and buffered `print`
-    output could block Python's exit indefinitely.
+    A daemon thread writes directly to the file descriptor. Any other kind of thread, or buffered
+    `print` output, could block Python's exit indefinitely.
     """
 
     def __init__(self) -> None:

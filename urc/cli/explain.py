@@ -1,4 +1,4 @@
-"""`urc explain`: print the help page of a problem code."""
+"""`urc explain`: print the help page for a problem code."""
 
 import argparse
 from difflib import get_close_matches
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the help page of a code, or one line for each code."""
+    """Print the help page for a code, or one line for each code."""
     every = pages()
     if arguments.code is None:
         width = max(map(len, every))

@@ -70,7 +70,7 @@ async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
     try:
         loop.add_reader(handle, read)
     except (NotImplementedError, OSError, ValueError):
-        return  # the event loop of this system only supports sockets
+        return  # this system's event loop supports only sockets
     try:
         while (line := await lines.get()) is not None:
             yield line
@@ -169,7 +169,7 @@ class FaultInjector:
             raise refusals[0]
 
     def mend(self, robot: str = "") -> None:
-        """Remove all faults of one robot or of all robots.
+        """Remove all faults from one robot or from all robots.
 
         Raises:
             UrcError: the robot is unknown.

@@ -114,7 +114,7 @@ def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]
 
 
 def named(store: "AccessStore", kind: "Kind", name: str) -> "Principal":
-    """Return the principal of this kind and name, or raise `UrcError` with a suggestion."""
+    """Return the principal with this kind and name, or raise `UrcError` with a suggestion."""
     from urc.access.administration import principal_named
     from urc.cli.arguments import what_it_has
 
@@ -128,7 +128,7 @@ def named(store: "AccessStore", kind: "Kind", name: str) -> "Principal":
 
 
 def roles_in(texts: Sequence[str] | None) -> tuple["Grant", ...]:
-    """Return the grants of `--role`; raise `Misuse` for an unknown role or an empty scope."""
+    """Return the grants from `--role`; raise `Misuse` for an unknown role or an empty scope."""
     from urc.access.grants import AccessError, parse_grant
 
     try:
@@ -140,7 +140,7 @@ def roles_in(texts: Sequence[str] | None) -> tuple["Grant", ...]:
 def change_roles(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str
 ) -> int:
-    """Run ``grant`` or ``revoke``: add or remove roles of a person or device."""
+    """Run ``grant`` or ``revoke``: give roles to a person or device, or take them away."""
     from urc.access.administration import change_grants
 
     (name,) = words_of(arguments, verb, "NAME")
@@ -194,7 +194,7 @@ def roles_text(grants: Iterable["Grant"]) -> str:
 
 
 def ends_at(text: str) -> float | None:
-    """Return the UTC time at which ``30d``, ``8h``, ``2027-01-31`` or ``never`` ends.
+    """Return the UTC end time for text such as ``30d``, ``8h``, ``2027-01-31`` or ``never``.
 
     A date means the end of that day in local time.
     """
@@ -218,7 +218,7 @@ def ends_at(text: str) -> float | None:
 
 
 def local_time(at: float | None, without: str = "never") -> str:
-    """Return a UTC time in seconds as text in local time, without seconds."""
+    """Return a UTC time, given in seconds, as local time to the minute."""
     return without if at is None else time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
 
 
@@ -232,7 +232,7 @@ def minutes_of(seconds: float) -> str:
 
 
 def iso(at: float | None) -> str | None:
-    """Return a UTC time in seconds as ISO 8601 text, for JSON."""
+    """Return a UTC time, given in seconds, as ISO 8601 text for JSON."""
     return None if at is None else time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(at))
 
 
@@ -246,7 +246,7 @@ def show(
 
     Args:
         rows: one object for each entry, for JSON.
-        table: the header row, followed by one row of texts for each entry.
+        table: the header row, followed by one row of strings for each entry.
         arguments: arguments with `--format`.
         empty: message for an empty list.
     """

@@ -22,7 +22,7 @@ _FIRST_STEPS: dict[str, str] = {
 """Commands for new users."""
 
 _INTERRUPTED = 130
-"""Exit code of a shell after SIGINT: 128 + 2."""
+"""A shell's exit code after SIGINT: 128 + 2."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

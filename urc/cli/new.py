@@ -1,4 +1,4 @@
-"""`urc new`: create the files of a new, valid widget as a starting point."""
+"""`urc new`: create the files for a new, valid widget as a starting point."""
 
 import argparse
 import os

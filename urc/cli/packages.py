@@ -42,7 +42,7 @@ __all__ = [
 
 
 def open_store() -> "Store":
-    """Return the package store of this user."""
+    """Return this user's package store."""
     from urc.packages.store import Store
 
     return Store(own_folder() / "packages")
@@ -68,7 +68,7 @@ def known_repositories() -> "list[Repository]":
 
 
 def installed_document(word: str) -> Path | None:
-    """Return the document of an installed robot or driver by name, or None.
+    """Return the document of the installed robot or driver called `word`, or None.
 
     If `word` contains no version, return the version in use; see
     `urc.runtime.settings_store.in_use`.
@@ -94,7 +94,7 @@ def installed_document(word: str) -> Path | None:
 
 
 def is_path(word: str) -> bool:
-    """Return whether a word is the path of a file or folder, and not a package name."""
+    """Return whether a word is the path of a file or folder rather than a package name."""
     path = Path(word)
     is_told = path.suffix in (".urcof", ".zip") or word.startswith((".", "/", "~"))
     return is_told or (path / "package.yaml").is_file()
@@ -171,7 +171,7 @@ def add_waivers(parser: argparse.ArgumentParser) -> None:
 
 
 def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
-    """Return the plan with the waivers that `--allow-unsigned` grants; raise `PackageError`."""
+    """Return the plan with the waivers from `--allow-unsigned`; raise `PackageError` on failure."""
     from urc.packages.names import parse_requirement
 
     words = [parse_requirement(word) for word in arguments.allow_unsigned]
@@ -234,7 +234,7 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
 
 
 def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
-    """Return the installed version of a package that is in use.
+    """Return the version in use of an installed package, or None.
 
     If a robot and a driver have the same name, the result may have a different kind from `key`.
     """

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 __all__ = ["list_passkeys", "remove_passkey"]
 
 _SHOWN: int = 8
-"""Number of characters of an id in a table."""
+"""Number of characters of an id that a table shows."""
 
 
 def list_passkeys(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """List the passkeys of a person."""
+    """List a person's passkeys."""
     from urc.access.passkey_table import PasskeyTable
 
     (name,) = words_of(arguments, "people", "NAME")

@@ -1,4 +1,4 @@
-"""A status line on a terminal with the current step and the duration of long work.
+"""A terminal status line that shows the current step and the duration of long work.
 
 Layer 6. The line is printed to standard error and erased at the end. Without a terminal, nothing is
 printed, so logs and pipes contain no status lines.

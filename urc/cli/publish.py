@@ -129,7 +129,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
 
 
 def _of_files(manifest: Path) -> "list[Problem]":
-    """Return the problems in the files of a widget."""
+    """Return the problems in a widget's files."""
     from urc.config.load import WidgetFolder, check
     from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped

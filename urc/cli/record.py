@@ -60,7 +60,7 @@ async def _record(
     session = Session(profile, settings, built_in_catalog().transports)
     check_installed()
     file = arguments.output or named(Path(), profile.name)
-    # The recording starts before the session and ends after the session, to record both ends.
+    # The recording starts before the session and ends after it, to capture both ends.
     async with recorded(session.hub, file, profile) as recorder:
         await _until_begun(recorder)
         async with session:
@@ -70,7 +70,7 @@ async def _record(
 
 
 async def _record_server(arguments: argparse.Namespace) -> int:
-    """Record the readings and the log of a server's robot.
+    """Record the readings and the log from a server's robot.
 
     A server sends neither its traffic with the robot nor the robot's document.
     """

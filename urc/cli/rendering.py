@@ -1,4 +1,4 @@
-"""The warning about emulated robots without cameras and laser scanners.
+"""The warning about emulated robots whose cameras and laser scanners do not work.
 
 Layer 6. Simulated cameras and laser scanners need a separate extra, because real robots do not use
 it; see docs/decisions/0045.

@@ -48,9 +48,9 @@ EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 
 _PORT = 8090
 _ARCHIVE_S = 60.0
-"""Timeout for the upload of an archive, in seconds."""
+"""Timeout for uploading an archive, in seconds."""
 _RENEW_S = 3600.0
-"""Interval between checks for the expiry of a served index, in seconds."""
+"""Interval at which a served index is checked for expiry, in seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -236,7 +236,7 @@ def _note(arguments: argparse.Namespace, why: str) -> int:
 
 
 def _serve(arguments: argparse.Namespace) -> int:
-    """Write the index of a folder and serve it until Ctrl-C or SIGTERM."""
+    """Write a folder's index, and serve the folder until Ctrl-C or SIGTERM."""
     from urc.cli.event_loop import run_loop
     from urc.packages.server import repository_app
     from urc.runtime.package_check import examine_apart

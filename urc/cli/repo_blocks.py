@@ -19,7 +19,7 @@ __all__ = ["block", "blocks", "unblock"]
 
 
 def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """Add an entry to the block list of a repository."""
+    """Add an entry to a repository's block list."""
     from urc.packages import block_builder
 
     if not (arguments.why or "").strip():
@@ -31,7 +31,7 @@ def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
 
 def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """Withdraw an entry from the block list of a repository."""
+    """Withdraw an entry from a repository's block list."""
     from urc.packages import block_builder
 
     folder, entry = _entry(arguments)

@@ -1,4 +1,4 @@
-"""`urc schema`: print the JSON Schema of a kind of document, for editors and other programs."""
+"""`urc schema`: print the JSON Schema for a kind of document, for editors and other programs."""
 
 import argparse
 import json
@@ -57,7 +57,7 @@ def _bundled(folder: Path, name: str) -> Any:
 
 
 def _relinked(node: Any, here: str, root: str) -> Any:
-    """Return a schema with references to the definitions in the bundle of `root`."""
+    """Return a schema whose references point to the definitions in the bundle of `root`."""
     if isinstance(node, list):
         return [_relinked(item, here, root) for item in node]
     if not isinstance(node, dict):

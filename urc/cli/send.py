@@ -1,4 +1,4 @@
-"""`urc send`: run one command of a robot and print the reply as JSON.
+"""`urc send`: run one robot command and print the reply as JSON.
 
 While STOP is latched or an operator is in control, motion is refused or stopped. If another process
 latches STOP, this module notifies the engine.
@@ -129,7 +129,7 @@ def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return a text converted to its argument's type. The engine checks ranges and choices."""
+    """Return text converted to the argument's type. The engine checks ranges and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)
@@ -218,7 +218,7 @@ async def _given(
     hold_s: float | None,
     interlock: "MotionInterlock | None",
 ) -> dict[str, "Reading"]:
-    """Send the command or hold it; return the values of its reply."""
+    """Send or hold the command; return the values in its reply."""
     if hold_s is None:
         return dict((await session.command(command.name, values)).values)
     from urc.protocol.requests.encode import BadArgument, check_arguments

@@ -137,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _add_sign_in(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of sign-in methods; `_sign_in` reads these options."""
+    """Declare the options for sign-in methods; `_sign_in` reads these options."""
     parser.add_argument(
         "--oidc",
         metavar="FILE",

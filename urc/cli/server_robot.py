@@ -1,4 +1,4 @@
-"""Options that make a command use a server's robot instead of connecting to a robot itself.
+"""Options that make a command use a server's robot instead of connecting to a robot directly.
 
 Layer 6. A token is read from a file or from the environment, but never from the command line. Every
 user of a computer can read the command lines of all processes.

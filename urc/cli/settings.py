@@ -1,4 +1,4 @@
-"""Settings of robots from `--set`, the environment, a file and defaults."""
+"""Robot settings from `--set`, the environment, a file and defaults."""
 
 import argparse
 import os
@@ -29,7 +29,8 @@ def settings_given(
         allows_any_port: whether a port may be 0, which selects a free port.
 
     Raises:
-        Misuse: no profile declares the name, or the text is not a value of the setting's type.
+        Misuse: no profile declares the name, or the text is not a valid value of the setting's
+            type.
         ProblemsError: the settings file contains an unknown name or an invalid value.
     """
     given: dict[str, str] = dict(arguments.settings)

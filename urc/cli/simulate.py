@@ -1,4 +1,4 @@
-"""`urc simulate`: emulate the robot of a profile on its real ports."""
+"""`urc simulate`: emulate a profile's robot on its real ports."""
 
 import argparse
 import asyncio
@@ -90,7 +90,7 @@ class UnansweredLog(logging.Handler):
 
     Args:
         tell: function that prints one line.
-        clock: function that returns a monotonic time in seconds.
+        clock: function that returns monotonic time in seconds.
     """
 
     def __init__(

@@ -86,10 +86,10 @@ def print_entrance(ready_dashboard: ReadyDashboard) -> None:
 
 
 def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
-    """Return the identities and rights of a dashboard.
+    """Return the identities and rights for a dashboard.
 
     Args:
-        data: folder with the store of people, devices and programs; None for only the local user.
+        data: folder with the store of people, devices and programs; None means only the local user.
         is_open: whether visitors who have not signed in may watch and drive.
 
     Raises:
@@ -106,7 +106,7 @@ def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
 def announce(
     stack: ExitStack | AsyncExitStack, data: Path, ready_dashboard: ReadyDashboard
 ) -> None:
-    """Register the dashboard for other programs of this user until `stack` closes."""
+    """Register the dashboard for this user's other programs until `stack` closes."""
     from urc.runtime.running_servers import RunningServer, announced
 
     found = ready_dashboard.certificate

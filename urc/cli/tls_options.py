@@ -21,7 +21,7 @@ class TlsOptions(NamedTuple):
     """The kind of certificate, and the public names of a web server in front of URC."""
 
     kind: Literal["plain", "local", "given"] = "plain"
-    """Plain HTTP, a certificate of the local authority, or a certificate from files."""
+    """Plain HTTP, a certificate from the local authority, or a certificate from files."""
     chain: Path = Path()
     key: Path = Path()
     public_names: Sequence[str] = ()
@@ -34,7 +34,7 @@ class TlsOptions(NamedTuple):
         return BehindProxy(app, self.public_names) if self.public_names else app
 
     def hosts(self) -> list[str]:
-        """Return the public names without ports, for the check of the Host header."""
+        """Return the public names without ports, for checking the Host header."""
         from urc.web.serve.policy import parse_host
 
         return [one.host for one in map(parse_host, self.public_names) if one is not None]

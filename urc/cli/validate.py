@@ -149,7 +149,7 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
 def _examine_folder(
     path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
 ) -> None:
-    """Add the problems in the files of a widget, if its manifest is valid."""
+    """Add the problems in a widget's files, if its manifest is valid."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
@@ -159,7 +159,7 @@ def _examine_folder(
 
 
 def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
-    """Add the problems in the widgets of a document, except shipped widgets."""
+    """Add the problems in a document's widgets, except shipped widgets."""
     from urc.shipped import shipped
 
     home = shipped("widgets").resolve()
@@ -171,7 +171,7 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 def _document_in(path: str) -> str:
     """Return the path of the document for a path or a robot name.
 
-    For the folder of a widget, the document is the manifest. A missing file is reported like other
+    For a widget's folder, the document is the manifest. A missing file is reported like other
     problems.
     """
     manifest = os.path.join(path, "widget.yaml")
@@ -183,7 +183,7 @@ def _document_in(path: str) -> str:
 
 
 def _widgets_of_package(path: str) -> "WidgetFolder | None":
-    """Return the widgets in the folder or package of a document, or None."""
+    """Return the widgets in a document's folder or package, or None."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):

@@ -115,8 +115,8 @@ async def _follow(
                 await tap.filled()
         is_over = now() >= ends  # checked here, because a tap that is never empty never waits
         try:
-            # The end of the duration does not cut off a line, but a blocked reader has a time
-            # limit.
+            # The end of the duration does not cut off a line, but a blocked reader is given limited
+            # time.
             async with asyncio.timeout_at(ends + _LAST_WORDS_S):
                 await printer.print_events(tap.drain())
                 await printer.tell_losses(tap.dropped, is_last=is_over)

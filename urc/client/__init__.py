@@ -1,6 +1,6 @@
 """Robots for Python programs, with the same interface in this process and over a server.
 
-`open` opens a robot on a server, and `connect` connects a robot in this process. The module
+`open` opens a robot on a server, and `connect` connects to a robot from this process. The module
 `urc.client.sync` offers the same functions without ``async``. Names are imported on first use,
 because each opening needs different parts of URC.
 """

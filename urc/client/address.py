@@ -18,7 +18,7 @@ _MOST_BYTES = 4096
 
 
 class ServerAddress(NamedTuple):
-    """A server's address, after checks."""
+    """A server's address that has been checked."""
 
     scheme: str
     """``http`` or ``https``."""
@@ -56,10 +56,10 @@ def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAdd
 
     Args:
         server: address such as ``https://robots.lab:8080``, without a path.
-        allow_unencrypted: whether ``http`` is also allowed to another computer.
+        allow_unencrypted: whether ``http`` is allowed even to another computer.
 
     Raises:
-        UrcError: the address is not a server's address, or requires encryption.
+        UrcError: the address is not a server's address, or must use ``https``.
     """
     try:
         parts = urlsplit(server)

@@ -1,7 +1,7 @@
 """Conversion of a server's messages into signals, readings, links and log lines.
 
 Layer 5. Pure. Ages become times on this process's monotonic clock. A browser's JSON has no tuples
-and no integers beyond 2^53, so values are converted by the type of their signal.
+and no integers beyond 2^53, so values are converted according to their signal's type.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +48,7 @@ def decode_message(text: str | bytes) -> ServerMessage | None:
 
 
 def signals_of(hello: HelloMessage) -> dict[str, Signal]:
-    """Return the robot's signals, by name, in the order of their indexes."""
+    """Return the robot's signals by name, in index order."""
     return {row.name: _signal(row) for row in hello.signals}
 
 
@@ -79,7 +79,7 @@ def reading_of(value: object, signal: Signal | None) -> Reading:
             return value
     if isinstance(value, list):
         return tuple(value)
-    return value  # type: ignore[return-value] # the rest of JSON is a reading
+    return value  # type: ignore[return-value] # any other JSON value is a reading
 
 
 def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
@@ -93,7 +93,7 @@ def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
 
 
 def entry_of(row: LogRow, now_s: float) -> LogEntry:
-    """Return a line of the log."""
+    """Return one log line."""
     level = row.level if row.level in _LEVELS else "info"
     return LogEntry(now_s - row.age / 1000, level, row.source, row.text)  # type: ignore[arg-type]
 

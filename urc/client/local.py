@@ -52,7 +52,7 @@ def load(path: str | PathLike[str]) -> Profile:
 async def connect(
     profile: Profile | str | PathLike[str], **settings: Value
 ) -> AsyncIterator["ConnectedRobot"]:
-    """Connect a robot while the context is open; lost connections are reopened.
+    """Connect to a robot while the context is open; lost connections are reopened.
 
     Args:
         profile: profile returned by `load`, or path of a file.
@@ -77,7 +77,7 @@ async def connect(
 
 
 class ConnectedRobot(HubReadings):
-    """A robot connected by this process; see `urc.client.robot.RobotInterface`.
+    """A robot that this process is connected to; see `urc.client.robot.RobotInterface`.
 
     The attribute `session` provides all other functions.
     """
@@ -101,7 +101,7 @@ class ConnectedRobot(HubReadings):
 
     @property
     def operator(self) -> str:
-        """Name of the holder of the controls in this process; "" without a holder."""
+        """Name of the program with the controls in this process; "" if the controls are free."""
         holder = self.motion.controller.lease.state.holder
         return holder.name if holder is not None else ""
 
@@ -111,7 +111,7 @@ class ConnectedRobot(HubReadings):
         return self.motion.controller.lease.state.latched_by
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command, and return the values of its reply; the wait has a time limit.
+        """Run a command, and return the values in its reply; the wait has a time limit.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.

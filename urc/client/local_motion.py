@@ -1,8 +1,8 @@
-"""The controls of a robot connected by this process, under the same rules as on a server.
+"""The controls of a robot that this process is connected to, under a server's rules.
 
 Layer 5. A `urc.runtime.motion_controller.MotionController` checks each tick, and a guard process
 writes the frames and the stops. Motion is refused while STOP is latched, or while an operator
-drives the robot on a server of this user.
+drives the robot on one of this user's servers.
 """
 
 import asyncio
@@ -142,7 +142,7 @@ class LocalMotion(ProgramControls):
             reason = self.controller.drive(_US.id, "take", self._clock.now())
         if reason:
             raise MotionEnded(reason)
-        self.controller.release(_US.id, command)  # a new gesture, also after a stop
+        self.controller.release(_US.id, command)  # begin a new gesture, even after a stop
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
         """Pass one tick to the controller."""

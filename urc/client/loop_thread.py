@@ -40,7 +40,7 @@ class LoopThread:
             return found.result(limit_s)
         except TimeoutError:
             if found.done():
-                raise  # a limit inside the call
+                raise  # a time limit inside `work` expired
             found.cancel()
             raise TimeoutError(f"the call took longer than {limit_s:g} s") from None
         except BaseException:  # Ctrl-C: the call must not continue

@@ -23,7 +23,7 @@ STOP_REASONS: Final[Mapping[str, str]] = {
     "stopped": "STOP was pressed",
     "revoked": "the connection to the robot was cut",
 }
-"""Text that explains why a motion ended, by the `Reason` that the guard reports."""
+"""Text that explains why motion ended, for each `Reason` that the guard reports."""
 _LEFT: Final = "the drive context has ended"
 
 
@@ -53,7 +53,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
-        """Send one tick; return the reason why motion must end, or ""."""
+        """Send one tick; return the reason for ending motion, or ""."""
 
     @abstractmethod
     def release(self, command: str) -> None:

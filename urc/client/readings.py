@@ -36,7 +36,7 @@ class HubReadings:
         """Return a signal's newest reading, or None.
 
         Raises:
-            UrcError: the robot has no signal of this name.
+            UrcError: the robot has no signal with this name.
         """
         self._check(name)
         return self.hub.latest(name)
@@ -45,7 +45,7 @@ class HubReadings:
         """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
-            UrcError: the robot has no transport of this name.
+            UrcError: the robot has no transport with this name.
         """
         if transport not in self.hub.links:
             known = ", ".join(self.hub.links)
@@ -60,11 +60,11 @@ class HubReadings:
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition, starting with the present reading.
+        """Return the first reading that meets the condition, starting with the current reading.
 
         Raises:
             TimeoutError: the timeout has passed.
-            UrcError: the robot has no signal of this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended for good.
         """
         self._check(name)
         async with asyncio.timeout(timeout):
@@ -80,11 +80,11 @@ class HubReadings:
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
         """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        The first readings are the present readings. Only the newest reading is kept, so a slow
-        program skips readings and never falls behind.
+        The current readings come first. Only the newest reading is kept, so a slow program skips
+        readings and never falls behind.
 
         Raises:
-            UrcError: the robot has no signal of this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended for good.
         """
         for name in names:
             self._check(name)
@@ -99,7 +99,7 @@ class HubReadings:
     def log(self) -> AsyncIterator[LogEntry]:
         """Yield each new line of the robot's log, until the caller stops.
 
-        A warning with the number of lost lines replaces these lines.
+        A warning replaces lost lines and states their number.
 
         Raises:
             UrcError: the connection has ended for good.

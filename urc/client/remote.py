@@ -90,7 +90,7 @@ async def open(
         server: address such as ``https://robots.lab:8080``.
         robot: the robot's name in its URL; "" for the server's only robot.
         token: this program's token; "" for none.
-        token_file: file with the token, instead of `token`.
+        token_file: file that contains the token; replaces `token`.
         authority: PEM file with the certificate of the server's local authority; None for the
             system's trust store. Certificates are always checked.
         allow_unencrypted: whether to send the token to another computer over plain HTTP, where
@@ -188,7 +188,7 @@ class RemoteRobot(HubReadings):
         return self.motion.lease.latched if self.motion.lease is not None else ""
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command and return the values of its reply.
+        """Run a command and return the values in its reply.
 
         The server limits the wait, except for sequences.
 
@@ -236,7 +236,7 @@ class RemoteRobot(HubReadings):
     # -- opening and closing
 
     async def until_ready(self, running: "asyncio.Task[None]", timeout_s: float) -> None:
-        """Wait for the server's first message; raise the reason if the server sends none."""
+        """Wait for the server's first message; raise the reason if none arrives."""
         ready = asyncio.ensure_future(self._ready.wait())
         try:
             await asyncio.wait(
@@ -384,7 +384,7 @@ class RemoteRobot(HubReadings):
     async def _post(
         self, address: str, body: Mapping[str, Any] | None, what: str
     ) -> Mapping[str, Any]:
-        """Send a request over HTTP, and return its answer.
+        """Send a request over HTTP, and return the server's answer.
 
         Raises:
             ConnectionLost: the server could not be reached.
@@ -396,7 +396,8 @@ class RemoteRobot(HubReadings):
         try:
             async with httpx2.AsyncClient(
                 verify=self._context if self._context is not None else True,
-                # A proxy of the environment cannot reach this computer, and would read the token.
+                # A proxy set in the environment cannot reach this computer, and would read the
+                # token.
                 trust_env=not self._address.is_loopback,
                 timeout=_POST_S,
             ) as client:

@@ -14,7 +14,7 @@ __all__ = ["RemoteAlarms"]
 
 _HIDDEN: Final = ("shelved", "suppressed")
 Post = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
-"""Function that sends a request about alarms, and returns its answer."""
+"""Function that sends a request about alarms, and returns the server's answer."""
 
 
 class RemoteAlarms:
@@ -42,7 +42,7 @@ class RemoteAlarms:
         """Acknowledge alarms that this program has received; without names, all pending alarms.
 
         Returns:
-            The acknowledged alarms' signals, excluding alarms that were raised again meanwhile.
+            The signals of the acknowledged alarms, except alarms raised again in the meantime.
 
         Raises:
             UrcError: the server refused, or could not be reached.

@@ -33,7 +33,7 @@ ControlMessage = LeaseMessage | HeartbeatMessage | StoppedMessage | RefusedMessa
 _ASK_S: Final = 2.0
 """Maximum wait for the answer to a request about the controls, in seconds."""
 STOP_AGAIN_S: Final = 0.3
-"""Duration of the server's silence after which STOP is also sent over HTTP, in seconds."""
+"""Server silence after which STOP is also sent over HTTP, in seconds."""
 _CONFIRM_S: Final = 2.0
 _CONNECT_S: Final = 10.0
 """Maximum wait for the robot's first connection, in seconds."""
@@ -51,7 +51,7 @@ class RemoteMotion(ProgramControls):
         self.lease: LeaseMessage | None = None
         """Newest lease; None before the first lease, and for a robot without motion."""
         self.is_connecting: Callable[[], bool] = lambda: False
-        """Function that returns whether the server is still connecting to the robot initially."""
+        """Function that returns whether the server's first connection to the robot is pending."""
         self._socket = socket
         self._beat = 0
         self._beat_s = 0.0
@@ -109,7 +109,7 @@ class RemoteMotion(ProgramControls):
             return
         for command, stick in self.sticks.items():
             if command not in self._epochs:
-                continue  # it is still taking the controls
+                continue  # the stick is still taking the controls
             if not _is_ours(lease):
                 stick.end(_taken(lease))
             elif lease.epoch != self._epochs[command]:
@@ -124,7 +124,7 @@ class RemoteMotion(ProgramControls):
 
     async def take(self, command: str) -> None:
         """Take the controls, and wait for the robot and for the first heartbeat."""
-        # The first client of a server connects the robot, which takes a moment.
+        # The server connects to the robot for its first client, which takes a moment.
         await self._until(lambda: not self.is_connecting(), _CONNECT_S)
         lease = self.lease
         is_shared = bool(self._epochs) and lease is not None and _is_ours(lease)
@@ -136,7 +136,7 @@ class RemoteMotion(ProgramControls):
                 raise MotionEnded(refusal)
         if self.lease is None:
             raise MotionEnded(_CUT)
-        self._socket.send(Release(command))  # a new gesture, also after a stop
+        self._socket.send(Release(command))  # a new gesture, even after a stop
         self._epochs[command] = self.lease.epoch
 
     def _is_granted(self, before: int) -> bool:

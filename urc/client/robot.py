@@ -1,7 +1,7 @@
-"""A robot's interface for Python programs, which has the same meaning in every opening.
+"""A robot's interface for Python programs, with the same meaning in every opening.
 
-Layer 5. `urc.connect` connects a robot in this process, and `urc.client.open` uses a robot of a
-server. Both return this interface, so a program switches between them by changing one line. The
+Layer 5. `urc.connect` connects to a robot from this process, and `urc.client.open` uses a server's
+robot. Both return this interface, so a program switches between them by changing one line. The
 tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same
 dialogues against both.
 """
@@ -26,7 +26,7 @@ class ConnectionLost(UrcError):
 
 
 class AccessDenied(ConnectionLost):
-    """The server does not accept the token, or the token has no right to this robot."""
+    """The server does not accept the token, or the token grants no rights to this robot."""
 
 
 class RobotInterface(Protocol):
@@ -60,14 +60,14 @@ class RobotInterface(Protocol):
         """Return a signal's newest reading; None if there has been no reading.
 
         Raises:
-            UrcError: the robot has no signal of this name.
+            UrcError: the robot has no signal with this name.
         """
 
     def state(self, transport: str, /) -> LinkState:
         """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
-            UrcError: the robot has no transport of this name.
+            UrcError: the robot has no transport with this name.
         """
 
     async def wait_for(
@@ -78,7 +78,7 @@ class RobotInterface(Protocol):
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition; the present reading counts.
+        """Return the first reading that meets the condition; the current reading counts.
 
         Args:
             name: the signal's name.
@@ -87,35 +87,35 @@ class RobotInterface(Protocol):
 
         Raises:
             TimeoutError: the timeout has passed.
-            UrcError: the robot has no signal of this name.
+            UrcError: the robot has no signal with this name.
             ConnectionLost: the server has ended the connection for good.
         """
 
     def watch(self, *names: str) -> AsyncIterator[Sample]:
         """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        The first readings are the present readings. Only the newest reading is kept, so a slow
-        program skips readings and never falls behind.
+        The current readings come first. Only the newest reading is kept, so a slow program skips
+        readings and never falls behind.
 
         Raises:
-            UrcError: the robot has no signal of this name.
+            UrcError: the robot has no signal with this name.
             ConnectionLost: the server has ended the connection for good.
         """
 
     def log(self) -> AsyncIterator[LogEntry]:
         """Yield each new line of the robot's log, until the caller stops.
 
-        A warning with the number of lost lines replaces these lines.
+        A warning replaces lost lines and states their number.
 
         Raises:
             ConnectionLost: the server has ended the connection for good.
         """
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command and return the values of its reply.
+        """Run a command and return the values in its reply.
 
-        The call confirms a command with ``confirm``. A two-person command waits until a person at a
-        dashboard approves it.
+        The call itself confirms a command with ``confirm``. A two-person command waits until a
+        person at a dashboard approves it.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.

@@ -62,14 +62,14 @@ class RobotSocket:
             address: the server.
             robot: the robot's name; "" for the server's only robot.
             token: the program's token; "" for none.
-            context: rules for certificates; None without encryption.
+            context: rules for certificates; None for an unencrypted connection.
             timeout_s: longest duration of one attempt to connect, in seconds.
         """
         self.address = address
         self.on_message: Callable[[str | bytes], None] = _ignore
         """Callback that receives each message, in order."""
         self.on_lost: Callable[[str], None] = _ignore
-        """Callback that is called when the connection is lost, with the reason."""
+        """Callback that receives the reason when the connection is lost."""
         self.is_up = False
         """Whether the server has sent its first message on this connection; set by the owner."""
         self._robot = robot
@@ -195,7 +195,7 @@ class RobotSocket:
     def _closed(self, line: ClientConnection) -> ConnectionLost:
         code, reason = line.close_code, printable(line.close_reason or "")
         if code == CLOSE_NOT_LET_IN:
-            # The server's own text is for people with a browser.
+            # The server's own text is meant for people using a browser.
             return AccessDenied(
                 f"{self.address.url} does not accept the token: it is unknown, removed or expired"
             )

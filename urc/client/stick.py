@@ -49,7 +49,7 @@ class MotionLine(Protocol):
     """The path that ticks take to the robot; each way to open a robot has its own class."""
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
-        """Send one tick; return the reason why motion must end, or ""."""
+        """Send one tick; return the reason for ending motion, or ""."""
 
     def release(self, command: str) -> None:
         """Stop the command, because its stick was released."""
@@ -78,7 +78,7 @@ class Stick:
         """Set the held command's arguments; missing arguments use their defaults.
 
         Raises:
-            MotionEnded: motion has ended; the message has the reason.
+            MotionEnded: motion has ended; the message states the reason.
         """
         self.put(arguments)
         self.wake()
@@ -137,12 +137,12 @@ class Stick:
     def expire(self, reason: str, now_s: float) -> None:
         """End all motion because the guard received no input in time.
 
-        After a block of this program, the guard's report may be handled before the sampler runs.
-        The block is then the reason.
+        If this program was blocked, the guard's report may be handled before the sampler runs. The
+        block is then the reason.
 
         Args:
             reason: the reason if this program was not blocked.
-            now_s: time of the sampler's clock, in seconds.
+            now_s: time on the sampler's clock, in seconds.
         """
         self.end(self.block_since_sample(now_s) or reason)
 
@@ -157,7 +157,7 @@ class Stick:
         self._moved_s = now_s if is_moving else None
 
     def sample(self) -> tuple[Mapping[str, Reading], float] | None:
-        """Return the last call's arguments and time; None without input."""
+        """Return the last call's arguments and time; None if there is no input."""
         self._changed.clear()
         return self._input
 

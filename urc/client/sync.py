@@ -50,7 +50,7 @@ _Result = TypeVar("_Result")
 def connect(
     profile: Profile | str | PathLike[str], **settings: Value
 ) -> "AbstractContextManager[SyncRobot]":
-    """Connect a robot in this process while the context is open; see `urc.connect`."""
+    """Connect to a robot from this process while the context is open; see `urc.connect`."""
     from urc.client import local
 
     return _opened(lambda: local.connect(profile, **settings), CALL_S)
@@ -140,7 +140,7 @@ class SyncRobot:
         """Return a signal's newest reading; None if there has been no reading.
 
         Raises:
-            UrcError: the robot has no signal of this name.
+            UrcError: the robot has no signal with this name.
         """
         return self._here(lambda: self._robot.latest(name))
 
@@ -148,7 +148,7 @@ class SyncRobot:
         """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
-            UrcError: the robot has no transport of this name.
+            UrcError: the robot has no transport with this name.
         """
         return self._here(lambda: self._robot.state(transport))
 
@@ -160,7 +160,7 @@ class SyncRobot:
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition; the present reading counts.
+        """Return the first reading that meets the condition; the current reading counts.
 
         Args:
             name: the signal's name.
@@ -169,7 +169,7 @@ class SyncRobot:
 
         Raises:
             TimeoutError: the timeout has passed.
-            UrcError: the robot has no signal of this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended for good.
         """
         return self._thread.call(self._robot.wait_for(name, is_met), timeout)
 
@@ -181,7 +181,7 @@ class SyncRobot:
 
         Raises:
             TimeoutError: no reading arrived in time.
-            UrcError: the robot has no signal of this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended for good.
         """
         return self._steps(self._robot.watch(*names), timeout)
 
@@ -195,7 +195,7 @@ class SyncRobot:
         return self._steps(self._here(self._robot.log), timeout)
 
     def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command and return the values of its reply.
+        """Run a command and return the values in its reply.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.
@@ -338,7 +338,7 @@ class SyncStick:
         """Set the held command's arguments; missing arguments use their defaults.
 
         Raises:
-            MotionEnded: motion has ended; the message has the reason.
+            MotionEnded: motion has ended; the message states the reason.
         """
         self._stick.put(arguments)
         self._loop.call_soon_threadsafe(self._stick.wake)

@@ -105,7 +105,7 @@ def exclusive(file: Path) -> Iterator[None]:
     A crash of this process releases the lock.
 
     Raises:
-        PackageError: another process holds the lock for more than ten seconds.
+        PackageError: another process has held the lock for more than ten seconds.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     number = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)

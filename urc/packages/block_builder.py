@@ -44,7 +44,7 @@ def export_blocks(folder: Path, index_signer: IndexSigner | None) -> BlockFile:
     """Return a repository's signed block list for machines without a network.
 
     Raises:
-        PackageError: the maintainer has no key, or nothing was ever blocked.
+        PackageError: the maintainer has no key, or nothing has ever been blocked.
     """
     signer = _signer(index_signer)
     index = _index(folder)

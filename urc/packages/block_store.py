@@ -1,4 +1,4 @@
-"""The known block lists on this machine, in ``blocks.json`` in the packages folder.
+"""The block lists known on this machine, in ``blocks.json`` in the packages folder.
 
 A list stays known while its repository is unreachable, expired or removed. An entry therefore
 applies until the package is removed, or until a newer list from the same maintainer omits the
@@ -116,7 +116,7 @@ class BlockStore:
             self._write([*others, new])
 
     def forget(self, key: str) -> None:
-        """Delete all lists signed with the key `key`; raise `PackageError` without such a list."""
+        """Delete all lists signed with `key`; raise `PackageError` if there is no such list."""
         with self._changing():
             left = [one for one in self.all() if fingerprint(one.key) != key]
             if len(left) == len(self.all()):

@@ -22,14 +22,14 @@ _Text = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class Block(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One entry: a package with a range of versions, an archive, or all packages of a signer."""
+    """One entry: a package with a range of versions, an archive, or all of a signer's packages."""
 
     why: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
     """Reason shown to users, on one line."""
     package: str = ""
     """Package, such as ``drivers/puppet``; "" for an entry about an archive or a key."""
     versions: _Text = "*"
-    """Blocked range of versions. Pre-releases within the bounds are blocked, too."""
+    """Blocked range of versions. Pre-releases within the bounds are also blocked."""
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
     """Digest of the blocked archive."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A(SHA256:[A-Za-z0-9+/]{43})?\Z")] = ""
@@ -70,7 +70,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class BlockList(msgspec.Struct, frozen=True):
-    """The entries of one maintainer."""
+    """One maintainer's entries."""
 
     id: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{32}\Z")]
     """Random name of the list, because one maintainer may sign several repositories."""
@@ -100,7 +100,7 @@ def sign_blocks(listed: BlockList, number: int, index_signer: IndexSigner) -> Bl
 def read_block_file(data: bytes, where: str) -> BlockFile:
     """Return a block list with a valid signature; raise `PackageError` on failure.
 
-    The caller decides whether the key of the signature is trusted.
+    The caller decides whether to trust the signature's key.
     """
     try:
         if len(data) > BLOCK_FILE_BYTES:

@@ -24,7 +24,7 @@ _CHECKED_S: Final = 90.0
 
 
 class HttpResponse(NamedTuple):
-    """Response of a web server."""
+    """A web server's response."""
 
     status: int
     """Status code: 200, 304 for an unchanged file, or 404 for a permitted missing file."""
@@ -60,7 +60,7 @@ def fetch_archive(url: str, entry: IndexEntry) -> bytes:
 def ask(
     url: str, most: int, etag: str = "", total_s: float = _TOTAL_S, *, may_lack: bool = False
 ) -> HttpResponse:
-    """Return the file at a URL, with a size of at most `most` bytes.
+    """Return the file at a URL; the file may have at most `most` bytes.
 
     Args:
         url: the file's URL; redirects are not followed.
@@ -123,7 +123,7 @@ async def _exchange(
     most: int,
     accepted: Container[int],
 ) -> HttpResponse:
-    # No compression, so that the response cannot grow after the transfer.
+    # Request no compression, so that the response cannot grow after the transfer.
     asked = {"accept-encoding": "identity", **headers}
     timeout = httpx2.Timeout(_CHECKED_S if body else _READ_S, connect=_CONNECT_S)
     async with (

@@ -63,7 +63,7 @@ class IndexEntry(msgspec.Struct, frozen=True):
 
     @property
     def key(self) -> PackageId:
-        """Its package."""
+        """The entry's package."""
         return PackageId(self.kind, self.name)
 
     @property
@@ -97,7 +97,7 @@ class Index(msgspec.Struct, frozen=True):
         return self.blocks if isinstance(self.blocks, BlockList) else None
 
     def to_bytes(self) -> bytes:
-        """Return the index file's content: equal indexes have the same bytes."""
+        """Return the index file's content; equal indexes have identical bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
@@ -124,7 +124,7 @@ def entry_of(
 
 
 def read_index(data: bytes, where: str) -> Index:
-    """Return an index from an untrusted source; raise `PackageError` if invalid.
+    """Return an index from an untrusted source; raise `PackageError` if it is invalid.
 
     Versions and ranges are validated, so later code can rely on valid values.
     """
@@ -147,7 +147,7 @@ def check_entries(entries: Iterable[IndexEntry]) -> None:
     """Raise `PackageError` for an invalid version or range."""
     versions: set[str] = set()
     needs: set[tuple[str, str]] = set()
-    for entry in entries:  # thousands of entries have equal texts, so each text is parsed once
+    for entry in entries:  # thousands of entries share the same text, so each text is parsed once
         versions.add(entry.version)
         needs.update(entry.needs.items())
     for version in versions:

@@ -80,7 +80,7 @@ def make_index(
     Args:
         folder: the repository's folder.
         name: the repository's name.
-        examine: function that returns the errors of a package's document, one per line.
+        examine: function that returns the errors in a package's document, one per line.
         index_signer: maintainer's signer for the index and for new source packages.
 
     Raises:
@@ -112,7 +112,7 @@ def changing(folder: Path) -> Iterator[Path]:
     """Lock a repository against other processes, and yield a folder for incomplete files.
 
     Raises:
-        PackageError: another process holds the lock for more than ten seconds.
+        PackageError: another process has held the lock for more than ten seconds.
     """
     work = folder / ".work"
     with atomic_files.exclusive(folder / ".changing"):
@@ -209,7 +209,7 @@ def _checked(notes: Notes) -> Notes:
 
 
 def renew(folder: Path, index_signer: IndexSigner) -> None:
-    """Sign an index again if its signature needs renewal; raise `PackageError` or `OSError`."""
+    """Renew an index's signature if necessary; raise `PackageError` or `OSError` on failure."""
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -274,7 +274,7 @@ def _before(folder: Path) -> tuple[Index | None, int]:
 
 
 def head_in(folder: Path) -> IndexHead | None:
-    """Return the head in a repository's folder; None without a valid head."""
+    """Return the head in a repository's folder; None if there is no valid head."""
     with suppress(PackageError):
         return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
     return None

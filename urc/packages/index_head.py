@@ -1,8 +1,7 @@
 """An index's head: number, digest, signature and expiry time.
 
-A maintainer with a key signs the head, and therefore the digest of the whole index. The signature
-of a head expires after some days. An attacker cannot hide newer versions from clients after the
-expiry.
+A maintainer with a key signs the head, and therefore the digest of the whole index. A head's
+signature expires after some days. An attacker can then no longer hide newer versions from clients.
 """
 
 import time
@@ -50,7 +49,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
     """Digest of `index.json`."""
     expires: str = ""
-    """Expiry time, such as ``2026-12-05T20:00:00Z``; "" without a signature."""
+    """Expiry time, such as ``2026-12-05T20:00:00Z``; "" if the head is unsigned."""
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
@@ -83,7 +82,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def read_head(data: bytes, where: str) -> IndexHead:
-    """Return a head from an untrusted source; raise `PackageError` if invalid."""
+    """Return a head from an untrusted source; raise `PackageError` if it is invalid."""
     try:
         return msgspec.json.decode(data, type=IndexHead)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -93,7 +92,7 @@ def read_head(data: bytes, where: str) -> IndexHead:
 def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
     """Raise `PackageError` if the key that signed the current head is not available.
 
-    Clients have pinned the key, so they would reject a head with another key.
+    Clients have pinned the key, so they would reject a head signed with another key.
     """
     signed = old.signed if old is not None else None
     if signed is not None and (index_signer is None or index_signer.signer.key != signed.key):
@@ -109,7 +108,7 @@ def next_head(
     """Return a new head for an index, or the old head while it is still valid.
 
     Args:
-        old: current head; None without a valid head.
+        old: current head; None if there is no valid head.
         number: number of the index.
         digest: the index file's digest.
         index_signer: maintainer's signer; None for an unsigned head.

@@ -105,7 +105,7 @@ def plan_root(
         pinned: expected result.
 
     Raises:
-        PackageError: as `plan_requirement`.
+        PackageError: as for `plan_requirement`.
     """
     chosen = settle(root, wanted, found)
     lock = lock_of(root, chosen)
@@ -185,7 +185,7 @@ def without_blocked(found: Found, store: Store) -> Found:
 
 
 def _blocked(entry: IndexEntry, store: Store) -> list[str]:
-    """Return why a version is blocked, with one reason per line."""
+    """Return the reasons for blocking a version, one per line."""
     return store.blocks.lines(lock_of(entry.key, {entry.key: entry}), lambda _: entry.signed)
 
 

@@ -16,7 +16,7 @@ class InstallPlan(NamedTuple):
     archives: Mapping[str, bytes]
     """New archives by digest, for storage."""
     origins: Mapping[str, str]
-    """Source of each package, such as ``drivers/puppet``, by name."""
+    """Source of each package, by package name, such as ``drivers/puppet``."""
     signatures: Mapping[str, Signature]
     """Signatures of signed archives, by digest."""
     own: frozenset[str] = frozenset()

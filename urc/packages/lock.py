@@ -63,7 +63,7 @@ class Lock(msgspec.Struct, frozen=True):
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """Return the lock file's content: equal locks have the same bytes."""
+        """Return the lock file's content; equal locks have identical bytes."""
         return msgspec.json.format(msgspec.json.encode(self, order="sorted"), indent=1) + b"\n"
 
     def __str__(self) -> str:

@@ -24,13 +24,13 @@ class Manifest(NamedTuple):
 
     key: PackageId
     version: str
-    """Version by SemVer."""
+    """Version according to SemVer."""
     licence: str
     """SPDX expression."""
     authors: tuple[str, ...]
     summary: str
     needs: dict[str, str]
-    """Version ranges of dependencies by package, such as ``widgets/battery-svg``."""
+    """Version ranges of dependencies, by package name, such as ``widgets/battery-svg``."""
     language: int
 
     @property

@@ -1,4 +1,4 @@
-"""Names of packages: a kind and a name, such as ``drivers/puppet``, with an optional version."""
+"""Package names: a kind and a name, such as ``drivers/puppet``, with an optional version."""
 
 import re
 from typing import Final, NamedTuple
@@ -51,7 +51,7 @@ class PackageRequirement(NamedTuple):
 
 
 def parse_key(text: str) -> PackageId:
-    """Return the identity in a text like ``drivers/puppet``; raise `PackageError` if invalid."""
+    """Return the identity in text like ``drivers/puppet``; raise `PackageError` if invalid."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(

@@ -38,7 +38,7 @@ class _Tags(msgspec.Struct, frozen=True):
     """ETag of the index."""
     head: str = ""
     said: IndexHead | None = None
-    """The verified head; None without a head that matches the index."""
+    """The verified head; None if no head matches the index."""
 
 
 class Repository:
@@ -47,8 +47,8 @@ class Repository:
     The last index is stored for use while the repository is unreachable.
 
     The index number never decreases. If an index has a lower number, URC reports an error and uses
-    the stored index. The first signing key is pinned. An index with another key or without a
-    signature is rejected.
+    the stored index. The first signing key is pinned. An index that is unsigned or signed with
+    another key is rejected.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Repository:
         return by.key if by is not None else ""
 
     def known(self) -> tuple[IndexEntry, ...]:
-        """Return the stored index's entries without a request; () without a stored index."""
+        """Return the stored index's entries without a request; () if no index is stored."""
         kept = self._kept()
         return kept[0].packages if kept is not None else ()
 
@@ -138,7 +138,7 @@ class Repository:
             return kept[0]
         if kept is not None and head is not None:
             index, tags = kept
-            if (head.number, head.sha256) == (index.number, tags.sha256):  # only signed again
+            if (head.number, head.sha256) == (index.number, tags.sha256):  # only re-signed
                 self._store(_Tags(tags.sha256, tags.index, answer.etag, head))
                 return index
         return self._whole(kept, head, answer.etag)
@@ -177,7 +177,7 @@ class Repository:
             )
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return an archive of the repository."""
+        """Return an archive from the repository."""
         return fetch_archive(self.name, entry)
 
     def forget(self) -> None:
@@ -196,7 +196,7 @@ class Repository:
         atomic_files.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:
-        """Return the stored index with its ETags, or None without a valid index.
+        """Return the stored index with its ETags, or None if no valid index is stored.
 
         If the stored ETags belong to another index, the returned ETags are empty.
         """

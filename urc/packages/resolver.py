@@ -1,6 +1,6 @@
 """Dependency resolution, which chooses a version for every required package.
 
-The search uses `resolvelib`, the resolver of pip. The resolver backtracks after a conflict, and
+The search uses `resolvelib`, which is pip's resolver. The resolver backtracks after a conflict, and
 reports conflicts that have no solution. This module defines packages, dependencies and the
 preferred version, which is the newest match.
 """
@@ -35,7 +35,7 @@ def choose(entries: Entries, required: PackageRequirement) -> PackageId:
     """Return the package for a requirement.
 
     Raises:
-        PackageError: no package, or packages of several kinds, have this name.
+        PackageError: no package has this name, or packages of several kinds do.
     """
     found = [
         key for key in entries if key.name == required.name and required.kind in ("", key.kind)

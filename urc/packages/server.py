@@ -183,7 +183,7 @@ def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = No
 
 _ANSWER_HEADERS: Final = {
     "x-content-type-options": "nosniff",
-    # Archives are for dashboards. A browser must not run the content of an archive.
+    # Archives are for dashboards. A browser must not run an archive's content.
     "content-security-policy": "default-src 'none'; sandbox",
     "cache-control": "no-cache",
 }

@@ -1,8 +1,8 @@
-"""Ed25519 signatures of packages, over a readable text statement.
+"""Ed25519 signatures for packages; each signs a readable text statement.
 
 A signature states that the key's holder declares these bytes to be this version of this package.
 URC does not verify the identity of the key's holder. The first installation of a package pins its
-key. Later versions with another key are rejected. SSH handles host keys in the same way.
+key. Later versions signed with another key are rejected. SSH handles host keys in the same way.
 """
 
 import base64
@@ -89,7 +89,7 @@ class Signature(msgspec.Struct, frozen=True):
 
 
 SignatureOf = Callable[[str], Signature | None]
-"""Function that returns an archive's signature by its digest; None without a signature."""
+"""Function that returns an archive's signature by its digest; None if there is no signature."""
 
 
 class Signer:

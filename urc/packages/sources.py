@@ -21,7 +21,7 @@ class Source(Protocol):
 
     @property
     def name(self) -> str:
-        """Name in messages."""
+        """Name shown in messages."""
 
     def entries(self) -> tuple[IndexEntry, ...]:
         """Return every version of every package; raise `PackageError` on failure."""
@@ -60,7 +60,7 @@ class FileSource:
 
     @property
     def packages(self) -> tuple[Package, ...]:
-        """All packages of the source. For a folder, the requested package is first."""
+        """All packages in the source. For a folder, the requested package comes first."""
         return tuple(self._packages.values())
 
     def fetch(self, entry: IndexEntry) -> bytes:

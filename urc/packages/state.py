@@ -19,11 +19,11 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
-    """Public key from the first installation, by package, such as ``drivers/puppet``. Removing a
-    package does not delete its key, because a reinstallation would then bypass the key check.
+    """Public key from the first installation, by package name, such as ``drivers/puppet``. Removing
+    a package does not delete its key, because a reinstallation would then bypass the key check.
     """
     before: dict[str, Lock] = {}
-    """Previous lock, with which the last update can be undone, by digest of the installed lock."""
+    """Previous lock, for undoing the last update, by digest of the installed lock."""
     waived: tuple[str, ...] = ()
     """Packages that the user accepts without a signature in every installation, sorted."""
 
@@ -37,7 +37,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, lock), self.before, plan)
 
     def with_update(self, old: Lock, plan: InstallPlan) -> "StoreState":
-        """Return the state after replacing the lock `old`, with an undo step restoring `old`."""
+        """Return the state after replacing the lock `old`, with an undo step that restores it."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)

@@ -184,7 +184,7 @@ class Store:
         return files
 
     def _collect(self) -> None:
-        """Delete the files of removed locks. A later change deletes files that are still in use."""
+        """Delete the files of removed locks, but leave files still in use for a later change."""
         locks = self.state().kept
         digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
         for folder, wanted in (
@@ -315,7 +315,7 @@ def _check_needs(said: Manifest, lock: Lock) -> None:
 
 
 def ecosystem_of(document: Path) -> Path | None:
-    """Return the folder with the files of an installed document, or None."""
+    """Return the folder that contains an installed document's files, or None."""
     for folder in document.resolve().parents:
         if (folder / LOCK).is_file():
             return folder

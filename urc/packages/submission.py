@@ -54,7 +54,7 @@ def take(
         entry_file: path of the upload, such as ``archives/drivers/puppet/1.0.0.zip``.
         data: the archive.
         signature: the package's signature; None for an unsigned package.
-        examine: function that returns the errors of a document in a folder of packages.
+        examine: function that returns the errors in a document within a folder of packages.
         provenance: declared origin of the package, if any.
         index_signer: signer of the index, with the maintainer's key.
 
@@ -92,7 +92,7 @@ def take(
 
 
 def _noted(notes: Notes, provenance: Provenance | None, entry: IndexEntry) -> Notes:
-    """Return the notes with the declared origin; refuse an origin that differs from the notes."""
+    """Return the notes with the declared origin; refuse an origin that contradicts the notes."""
     if None not in (notes.provenance, provenance) and notes.provenance != provenance:
         raise SubmissionRefused(409, f"{entry} is already listed, {notes.provenance}")
     return msgspec.structs.replace(notes, provenance=notes.provenance or provenance)

@@ -27,7 +27,7 @@ class UploadToken(msgspec.Struct, frozen=True):
 
     name: str
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
-    """Digest of the token. A slow hash is not needed, because a token has 256 random bits."""
+    """Digest of the token. A fast hash is sufficient, because a token has 256 random bits."""
     may: tuple[str, ...]
     """Packages that the token may publish: ``drivers/puppet``, ``drivers/puppet*``, ``widgets/*``
     or ``*``."""

@@ -48,13 +48,13 @@ class PinnedKey:
 
     @property
     def keeper(self) -> str:
-        """Name and fingerprint of the index's signer; "" without a pinned key."""
+        """Name and fingerprint of the index's signer; "" if no key is pinned."""
         pin = self._pin()
         return f"{pin.by} ({fingerprint(pin.key)})" if pin is not None else ""
 
     @property
     def signer(self) -> PinnedSigner | None:
-        """Signer of the index; None without a pinned key."""
+        """Signer of the index; None if no key is pinned."""
         pin = self._pin()
         return PinnedSigner(pin.by, pin.key) if pin is not None else None
 

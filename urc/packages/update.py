@@ -117,12 +117,12 @@ def plan_update(
     complain: Callable[[str], None],
     wanted: str = "*",
 ) -> InstallPlan | None:
-    """Return the install plan for the newest version, with its archives; None without an update.
+    """Return the install plan for the newest version, with archives; None if there is no update.
 
     Args:
         old: the installed package's lock.
         sources: package sources, as for `newer`.
-        store: its store.
+        store: the store with this package.
         complain: receives warnings for the user.
         wanted: version range; the newest version in this range is installed.
 
@@ -172,7 +172,7 @@ def headline(old: Lock, new: Lock) -> str:
 
 
 def version_lines(old: Lock, new: Lock) -> list[str]:
-    """Return a line for each changed package."""
+    """Return one line for each changed package."""
     lines: list[str] = []
     for name in sorted({*old.packages, *new.packages}):
         before, after = old.packages.get(name), new.packages.get(name)

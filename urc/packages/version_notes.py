@@ -33,7 +33,7 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
     """Name and version of the packaging program."""
 
     def check(self) -> None:
-        """Raise `PackageError` for an invalid declared origin."""
+        """Raise `PackageError` if the declared origin is invalid."""
         if not self.source.startswith(("https://", "http://", "ssh://")):
             raise PackageError("expected a source that starts with https://, http:// or ssh://")
         if self.commit and not _COMMIT.fullmatch(self.commit):

@@ -98,7 +98,7 @@ def _core(version: Version) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=4096)
 def parse_range(text: str) -> Range:
-    """Parse a range of comma-separated parts; raise `PackageError` if invalid.
+    """Parse a range of comma-separated parts; raise `PackageError` if it is invalid.
 
     A version must match all parts of the range.
     """

@@ -1,7 +1,7 @@
 """Access control for pages: browsers with a key are admitted; all others get the sign-in page.
 
-Layer 5. The module contains an ASGI middleware inside the page policy. A visitor without a role
-reaches only routes with the right `ANYONE`, such as STOP and the sign-in page's files.
+Layer 5. The module's ASGI middleware runs inside the page policy. A visitor without a role reaches
+only routes with the right `ANYONE`, such as STOP and the sign-in page's files.
 """
 
 import re
@@ -41,7 +41,7 @@ _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class AccessMiddleware:
-    """The middleware."""
+    """ASGI middleware that forwards only permitted requests."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class AccessMiddleware:
         routes: Sequence[BaseRoute],
         pages: SignInPages,
     ) -> None:
-        """Prepare.
+        """Create the middleware.
 
         Args:
             app: the wrapped application.
@@ -121,7 +121,7 @@ class AccessMiddleware:
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
         """Return the response to a request with a start key in its query."""
         rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
-        # Never "//…", which would be another host.
+        # The path must not begin with "//", which would name another host.
         path = "/" + quote(scope["path"].lstrip("/"))
         url = f"{path}?{rest}" if rest else path
         visitor: Visitor = scope["state"]["visitor"]
@@ -130,7 +130,8 @@ class AccessMiddleware:
         if secret is None and not visitor.is_known:
             is_open = self._access.anonymous is not None
             return self._pages.response(scope, url=url if is_open else "", is_old=True, path=url)
-        # A page, not a redirect: browsers send no strict cookie after a redirect from another site.
+        # Send a page, not a redirect: browsers withhold strict cookies after a redirect from
+        # another site.
         page = self._pages.response(scope, url=url)
         if secret is not None:
             is_secure = scope["scheme"] == "https"
@@ -155,6 +156,6 @@ def _has_token(scope: Scope) -> bool:
 
 
 def _agent(scope: Scope) -> str:
-    """Return a readable name of the request's browser and operating system."""
+    """Return a readable name for the request's browser and operating system."""
     found = (value for name, value in scope["headers"] if name == b"user-agent")
     return browser_name(next(found, b"").decode("latin-1")[:_LONGEST_AGENT])

@@ -48,9 +48,9 @@ _IN_PATH: Final = {
     "file": "File name of the recording, as in the list of recordings.",
     "id": "Identifier of the pairing.",
 }
-"""Descriptions of the parameters in paths."""
+"""Descriptions of the path parameters."""
 _ALL: Final = (413, 429, 503)
-"""Failures of every call: an oversized request, or too many requests or connections."""
+"""Failures that apply to every call: an oversized request, or too many requests or connections."""
 
 
 async def document(_: Request) -> Response:
@@ -160,7 +160,7 @@ def _responses(call: Call, *, has_names: bool) -> dict[str, Any]:
     if has_names:
         statuses.add(404)
     if call.method == "POST":
-        statuses.add(403)  # a page of another site
+        statuses.add(403)  # a page from another site
     if call.body is not None:
         statuses |= {400, 415}
     content: dict[str, Any] = {media: {} for media in call.media}

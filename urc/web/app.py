@@ -1,6 +1,7 @@
-"""The dashboard as one ASGI application: routes to pages, files and sockets. Only wires.
+"""The dashboard as one ASGI application: routes to pages, files and sockets.
 
-Layer 5. `build_app` takes the robots and all options; `serve` runs the application.
+Layer 5. The module contains only wiring. `build_app` takes the robots and all options; `serve` runs
+the application.
 """
 
 import asyncio
@@ -108,11 +109,11 @@ class DashboardOptions:
     linger_s: float = LINGER_S
     """How long a robot stays connected after its last client has left, in seconds."""
     data: Path | None = None
-    """Folder of the latches and the audit log; None stores neither."""
+    """Folder for the latches and the audit log; None stores neither."""
     audit: AuditLog | None = None
-    """Open audit log of the folder, closed when the application ends; None opens the log."""
+    """Open audit log from the folder, closed when the application ends; None opens the log."""
     tiles: Path | None = None
-    """Folder of map tiles, ``z/x/y.png``; None if the server has no tiles."""
+    """Folder with map tiles, ``z/x/y.png``; None if the server has no tiles."""
     remake: Mapping[str, Remake] | None = None
     """Functions that create a robot from its saved document; None for a server without developer
     pages."""
@@ -137,7 +138,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     """Return the application that serves `robots`, which are keyed by their names in URLs.
 
     Raises:
-        UrcError: two robots use different widgets of the same name, or a sign-in method needs an
+        UrcError: two robots use different widgets with the same name, or a sign-in method needs an
             extra package.
     """
     access, data, notifier = options.access or Access(), options.data, options.notifier
@@ -314,7 +315,7 @@ class _Routes:
         )
 
     def stoppable(self) -> list[Stoppable]:
-        """Return all robots with motion, which STOP can stop."""
+        """Return all robots that can move, and that STOP can therefore stop."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
@@ -382,7 +383,7 @@ class _Routes:
                 await asyncio.to_thread(self.audit.close)
 
     async def _record_late(self) -> None:
-        """Record counts of repeated events and clock jumps until cancelled."""
+        """Record clock jumps and counts of repeated events until cancelled."""
         while True:
             await asyncio.sleep(_LATE_S)
             self.recorder.flush()
@@ -440,7 +441,7 @@ class _Routes:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
 
     async def stop(self, request: Request) -> Response:
-        """Stop a robot and latch the STOP; pages without a working socket use this request."""
+        """Stop a robot and latch STOP; pages without a working socket use this request."""
         service = self.services.get(request.path_params["name"])
         if service is None:
             return told(404, _NO_ROBOT, "unknown-robot")
@@ -468,7 +469,7 @@ class _Routes:
         return playback_state(self._playback(request))
 
     async def move(self, request: Request) -> Response:
-        """Change a playback."""
+        """Play, pause or seek a playback."""
         return await move_playback(request, self._playback(request))
 
     def _playback(self, request: Request) -> Playback | None:

@@ -1,6 +1,6 @@
-"""The WebSocket of one page, which checks each message and never waits for other pages.
+"""The server side of one page's WebSocket, which checks messages and never waits for other pages.
 
-Layer 5. One task reads, and another task of the same group writes. The writer sends the newest
+Layer 5. One task reads, and another task in the same group writes. The writer sends the newest
 state as soon as the socket is free, so a slow page skips frames. A page that reads no data for
 `STALL_S` seconds is disconnected.
 """
@@ -94,9 +94,9 @@ class BrowserClient:
                 await self._visit()
 
     def recheck(self) -> None:
-        """Check the visitor's rights again: stop forbidden motion, and close a page that has none.
+        """Check the visitor's rights again: stop forbidden motion, and close a page without rights.
 
-        If the visitor no longer has any right to the robot, the page's motion stops before this
+        If the visitor no longer has any right for the robot, the page's motion stops before this
         method returns, and the socket closes.
         """
         if self._operator is not None:
@@ -117,7 +117,7 @@ class BrowserClient:
             controls.remove_page(self._operator)
 
     async def _opened(self) -> LiveSession | None:
-        """Return the robot's open session; None if the page leaves or sends too much before."""
+        """Return the robot's open session; None if the page leaves or sends too much first."""
         opening = asyncio.ensure_future(self._service.live())
         reading = asyncio.ensure_future(self._read_early())
         # A page that leaves while the session is still opening must not count as a client.
@@ -136,8 +136,8 @@ class BrowserClient:
         """Read while the session opens; return why the page must close, or "" if the page left.
 
         STOP is handled immediately, and cancels waiting requests about the lease, so that an
-        earlier reset cannot undo it. Ticks are dropped, because they would be outdated. All other
-        messages wait for the session.
+        earlier reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All
+        other messages wait for the session.
         """
         while len(self._early) < EARLY_MESSAGES:
             message = await self._line.receive()
@@ -220,7 +220,7 @@ class BrowserClient:
         self._news.set()
 
     def _send_shared(self, live: LiveSession) -> None:
-        """Send the shared data of all pages, then images until the kernel's buffer is full."""
+        """Send the data that all pages share, then images until the kernel's buffer is full."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
         while self._place.subscription.names and self._flow.is_free():
@@ -232,7 +232,7 @@ class BrowserClient:
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
         self._answers.clear()
-        # Last, so that the page's round-trip time includes the wait in the buffer.
+        # Sent last, so that the page's round-trip time includes the wait in the buffer.
         if self._pong:
             answers.append(self._pong)
             self._pong = ""

@@ -32,20 +32,20 @@ __all__ = ["AlarmNotifier", "NotifyCount", "NotifyFailed"]
 GATHER_S: Final = 1.0
 """How long alarms are collected for one notification, in seconds."""
 FLOOD_GAP_S: Final = 60.0
-"""Minimum time between two notifications about a robot with a flood, in seconds."""
+"""Minimum time between two notifications about a robot with an alarm flood, in seconds."""
 MOST_WAITING: Final = 1000
 """Maximum number of queued alarms."""
 MOST_SHOWN: Final = 50
-"""Maximum number of alarms listed in one notification; any more are only counted."""
+"""Maximum number of alarms listed in one notification; further alarms are only counted."""
 _WAITS_S: Final = (2.0, 5.0, 10.0, 20.0)
-"""Delays before each retry, in seconds."""
+"""Delays before the retries, in seconds."""
 _CLOSE_S: Final = 2.0
 
 log = logging.getLogger(__name__)
 
 
 class NotifyFailed(UrcError):
-    """A failed call of the hook."""
+    """A failed call to the hook."""
 
 
 class NotifyCount(NamedTuple):
@@ -74,7 +74,7 @@ class AlarmNotifier:
         self._now = now
         self._waiting: list[_QueuedAlarm] = []
         self._next_at: dict[str, float] = {}
-        """Earliest time of the next notification about each robot that has a flood."""
+        """Earliest time for the next notification about each robot with an alarm flood."""
         self._counts: Counter[str] = Counter()
         self._wakes = threading.Condition()
         self._is_closing = False

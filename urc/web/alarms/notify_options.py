@@ -1,7 +1,7 @@
-"""The options file with the maintainer's hook for alarm notifications.
+"""The options file that defines the maintainer's hook for alarm notifications.
 
-Layer 5. A web hook's URL is often a secret, so it can be stored in a separate file that only its
-owner can read.
+Layer 5. A web hook's URL is often a secret, so it can be stored in a separate file that only the
+file's owner can read.
 """
 
 from dataclasses import dataclass, field

@@ -1,6 +1,6 @@
 """HTTP API endpoints for alarms: list, history, acknowledge, shelve, unshelve.
 
-Layer 5. Reading requires the role ``watch``, and actions require ``drive``. No call connects a
+Layer 5. Reading requires the role ``watch``, and actions require ``drive``. No call connects to a
 robot. The response to an action waits until the change is stored, so an acknowledgement survives a
 server crash.
 """
@@ -67,7 +67,7 @@ class AlarmCalls:
         recorder: ServerRecorder,
         notifier: AlarmNotifier | None = None,
     ) -> None:
-        """Prepare.
+        """Create the endpoints.
 
         Args:
             services: function that returns the robots, keyed by their names in paths.

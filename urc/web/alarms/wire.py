@@ -98,7 +98,7 @@ class NotificationCount(AlarmMessage, frozen=True):
     """Counts of notifications since the server started."""
 
     sent: int
-    """Number of sent notifications."""
+    """Number of notifications sent."""
     failed: int
     """Number of notifications for which every attempt failed."""
     lost: int
@@ -164,7 +164,7 @@ class AcknowledgeAsked(AlarmMessage, frozen=True):
     """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """Number `raised` of each alarm, by signal; alarms raised again since then are skipped."""
+    """Each alarm's `raised` number, by signal; alarms raised again since then are skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):
@@ -185,6 +185,6 @@ class AlarmAction(AlarmMessage, frozen=True):
     """Result of an action on alarms."""
 
     signals: tuple[str, ...]
-    """Signals with a changed alarm."""
+    """Signals whose alarm changed."""
     stored: bool
     """Whether the change is stored and survives a restart."""

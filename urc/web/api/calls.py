@@ -74,7 +74,7 @@ _ROBOT: Final = "/api/v1/robots/{name}"
 
 
 class Query(NamedTuple):
-    """An optional parameter of a query."""
+    """An optional query parameter."""
 
     name: str
     summary: str
@@ -85,7 +85,7 @@ class Call(NamedTuple):
     """One call."""
 
     name: str
-    """Unique name, and key of its endpoint."""
+    """Unique name, which is also the endpoint's key."""
     path: str
     right: Right
     summary: str
@@ -115,7 +115,7 @@ _FILTERS: Final = (
     Query("last", "Maximum number of entries, at most 1000.", "integer"),
 )
 _NO_ROBOT: Final = (409, 429)
-"""URC cannot connect to the robot, or too many clients use it."""
+"""Failures: URC cannot connect to the robot, or too many clients use the robot."""
 
 CALLS: Final[tuple[Call, ...]] = (
     Call("health", "/healthz", ANYONE, "The health of the server, and its version.", HealthStatus),

@@ -36,7 +36,7 @@ _LIMITS: Final = ("lolo", "low", "high", "hihi")
 def summary(
     name: str, service: RobotService, role: Role, times: ContactTimes = NO_CONTACT
 ) -> RobotSummary:
-    """Return the list entry of a robot.
+    """Return a robot's list entry.
 
     Args:
         name: the robot's name in paths.

@@ -1,4 +1,4 @@
-"""A robot's document as one YAML text, without this machine's paths.
+"""A robot's document as one YAML file, without this machine's paths.
 
 Layer 5. A document contains no setting values, and therefore no secrets from settings. Reading the
 source files blocks, so call `document_of` in a thread.

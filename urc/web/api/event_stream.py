@@ -1,8 +1,8 @@
 """Server-Sent Events of one robot: the newest values of changed signals.
 
 Layer 5. Readers have no queues. When a reader's connection is free, the reader gets the newest
-values that changed since its last event. A slow reader skips values, without delaying other
-readers. Source of the format: HTML standard, section 9.2 “Server-sent events”.
+value of each signal that changed since its last event. A slow reader skips values, without delaying
+other readers. Source of the format: HTML standard, section 9.2 “Server-sent events”.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ STALL_S: Final = 15.0
 _HEADERS: Final = [
     (b"content-type", b"text/event-stream"),
     (b"cache-control", b"no-store"),
-    (b"x-accel-buffering", b"no"),  # otherwise nginx would delay the events
+    (b"x-accel-buffering", b"no"),  # prevents nginx from delaying the events
 ]
 _COMMENT: Final = b": beat\n\n"
 
@@ -52,7 +52,7 @@ class EventStream:
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
         visit: AbstractContextManager[None],
     ) -> None:
-        """Prepare.
+        """Create the response.
 
         Args:
             live: the open session.
@@ -159,7 +159,7 @@ async def _send(send: Send, chunk: bytes) -> None:
 
 
 async def _left(receive: Receive) -> None:
-    """Return when the reader has disconnected."""
+    """Wait until the reader has disconnected."""
     while (await receive())["type"] != "http.disconnect":
         pass
 

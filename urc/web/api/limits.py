@@ -31,7 +31,7 @@ class RequestLimits:
     def count(self, who: str, now_s: float) -> None:
         """Count a request from `who`; raise `ApiError` 429 above the maximum rate."""
         bucket = self._rates.pop(who, None) or TokenBucket(REQUESTS_PER_S, now_s)
-        self._rates[who] = bucket  # reinserted at the end: the first entry is the least recent
+        self._rates[who] = bucket  # reinserted at the end, so the first entry is the least recent
         while len(self._rates) > MOST_VISITORS:
             self._rates.popitem(last=False)
         if not bucket.allow(now_s):

@@ -1,6 +1,7 @@
 """A robot's state for the menu and for lists: battery, alarms, and sort order.
 
-Layer 5. Pure. The functions connect no robot, so the battery is unknown without a session.
+Layer 5. Pure. The functions never connect to a robot, so the battery level is unknown without a
+session.
 """
 
 from collections.abc import Iterable

@@ -38,7 +38,8 @@ MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
 _FROM_START: Final = "bytes=0-"
-"""Beginning of a Range header for the first byte; later ranges do not count as new downloads."""
+"""Beginning of a Range header that starts at the first byte; other ranges do not count as new
+downloads."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII
 )
@@ -74,7 +75,7 @@ class RecordingCalls:
         folder: Path | None,
         audit: ServerRecorder,
     ) -> None:
-        """Prepare.
+        """Create the endpoints.
 
         Args:
             services: function that returns the robots, keyed by their names in paths.
@@ -146,12 +147,12 @@ class RecordingCalls:
         )
 
     def _may_read(self, request: Request, robot: str) -> bool:
-        """Return whether the visitor may maintain the robot whose document has the name `robot`."""
+        """Return whether the visitor may maintain the robot whose document is named `robot`."""
         visitor = visitor_of(request)
         served = [name for name, one in self._services().items() if one.robot.profile.name == robot]
         return visitor.may(MAINTAIN_SERVER) or any(visitor.may(MAINTAIN, one) for one in served)
 
-    # Recordings of programs
+    # Recordings started by programs
 
     @answers_errors
     async def state(self, request: Request) -> Response:
@@ -162,7 +163,7 @@ class RecordingCalls:
 
     @answers_errors
     async def start(self, request: Request) -> Response:
-        """Connect the robot and start a recording."""
+        """Connect to the robot and start a recording."""
         from urc.runtime.recording.recorder import check_installed  # an extra
 
         name, service = service_of(self._services(), request)
@@ -258,7 +259,7 @@ def _files(folder: Path) -> list[RecordingInfo]:
                         RecordingInfo(entry.name, match["robot"], match["began"], size, False)
                     )
     except FileNotFoundError:
-        return []  # nothing was recorded yet
+        return []  # nothing has been recorded yet
     except OSError as error:
         raise ApiError(409, f"{folder.name}: {error.strerror}", "not-readable") from None
     found.sort(key=lambda one: (one.began, one.file), reverse=True)

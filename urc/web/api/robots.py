@@ -59,7 +59,7 @@ _STATUS: Final = {
     "not-allowed": 409,
     "stopped": 409,
 }
-"""HTTP status for each failure code of a command; the robot causes failures with other codes."""
+"""HTTP status for each failure code of a command; failures with other codes come from the robot."""
 _BY_ROBOT: Final = 424
 _NO_STORE: Final = {"cache-control": "no-store"}
 _T = TypeVar("_T")
@@ -74,12 +74,12 @@ class RobotCalls:
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
         times: Callable[[str], ContactTimes],
     ) -> None:
-        """Prepare.
+        """Create the endpoints.
 
         Args:
             services: function that returns the robots, keyed by their names in paths.
-            followed: function that returns a context. While the context is open, the callback is
-                called after each change of rights.
+            followed: function that takes a callback and returns a context. While the context is
+                open, the callback is called after each change of rights.
             times: function that returns when a robot was last used and last sent data.
         """
         self._services = services
@@ -164,7 +164,7 @@ class RobotCalls:
             return answer(value_of(signal, sample, now_s))
         if sample is None or not isinstance(sample.value, bytes):
             raise ApiError(404, f"no value of {wanted!r} has arrived", "no-value")
-        request.state.is_file = True  # the robot's bytes must not act as a page of URC
+        request.state.is_file = True  # the robot's bytes must not act as a URC page
         age_ms = str(round(max(0.0, now_s - sample.time_s) * 1000))
         headers = {**_NO_STORE, "x-urc-age-ms": age_ms}
         return Response(sample.value, headers=headers, media_type=media_type(sample.value))
@@ -180,7 +180,7 @@ class RobotCalls:
         visitor = visitor_of(request)
         with ExitStack() as stack:
             live = await opened(service, peer, stack)
-        return EventStream(  # type: ignore[return-value]  # an ASGI application, as a response is
+        return EventStream(  # type: ignore[return-value]  # an ASGI application, like a response
             live,
             names,
             service.clock,
@@ -221,7 +221,7 @@ class RobotCalls:
         return answer(CommandAnswer({key: plain(one) for key, one in outcome.values.items()}))
 
     def _confirmation(self, session: ProgramSession, asked: CommandAsked, wanted: str) -> str:
-        """Return a token for a confirmed command; "" if the command asks no question."""
+        """Return a token for a confirmed command; "" if the command needs no confirmation."""
         known = session.service.robot.profile.driver.commands[wanted]
         questioned = questions(known, asked.arguments)
         if any(one.is_two_person for one in questioned):
@@ -261,7 +261,7 @@ class RobotCalls:
 
     @answers_errors
     async def motion(self, request: Request) -> Response:
-        """Pass an input of a held command to the robot's controls."""
+        """Pass an input for a held command to the robot's controls."""
         name, service = service_of(self._services(), request)
         asked = await body_of(request, MotionAsked)
         self._moving_peer(request, name, service)
@@ -285,7 +285,7 @@ class RobotCalls:
 
 
 async def _first(service: RobotService, live: LiveSession, is_there: Callable[[], bool]) -> None:
-    """Wait for the first value, until at most `FIRST_VALUE_S` seconds after connecting."""
+    """Wait for the first value, for at most `FIRST_VALUE_S` seconds after connecting."""
     hub = live.session.hub
     left_s = live.began_s + FIRST_VALUE_S - service.clock.now()
     if is_there() or left_s <= 0:

@@ -1,9 +1,9 @@
 """Operator sessions of programs that drive over HTTP.
 
 Layer 5. A page has a socket, so the server notices immediately when the page disconnects. A program
-sends only single requests. Its operator session therefore ends after `IDLE_S` seconds without a
-request, or when its right ends. Motion stops earlier, because the lease of a held command lasts at
-most one second.
+sends only separate requests. Its operator session therefore ends after `IDLE_S` seconds without a
+request, or when the program's right ends. Motion stops earlier, because the lease of a held command
+lasts at most one second.
 """
 
 import secrets
@@ -31,7 +31,7 @@ __all__ = ["IDLE_S", "MOST_SESSIONS", "ProgramSession", "ProgramSessions"]
 IDLE_S: Final = 10.0
 """How long a session stays open after its last request, in seconds."""
 MOST_SESSIONS: Final = 8
-"""Maximum number of one visitor's open sessions, counted over all robots."""
+"""Maximum number of one visitor's open sessions, counted across all robots."""
 _Followed = Callable[[Callable[[], None]], AbstractContextManager[None]]
 
 
@@ -102,7 +102,7 @@ class ProgramSession:
         )
 
     def move(self, asked: MotionAsked) -> MotionAnswer:
-        """Pass an input of a held command to the robot's controls.
+        """Pass an input for a held command to the robot's controls.
 
         Raises:
             ApiError: the input was refused.
@@ -139,11 +139,11 @@ class ProgramSessions:
     """The open sessions of all programs."""
 
     def __init__(self, followed: _Followed) -> None:
-        """Begin without sessions.
+        """Start with no open sessions.
 
         Args:
-            followed: function that returns a context. While the context is open, the callback is
-                called after each change of rights.
+            followed: function that takes a callback and returns a context. While the context is
+                open, the callback is called after each change of rights.
         """
         self._followed = followed
         self._open: dict[str, _OpenSession] = {}
@@ -153,7 +153,7 @@ class ProgramSessions:
     def temporary(
         self, service: RobotService, live: LiveSession, peer: SocketPeer
     ) -> Iterator[ProgramSession]:
-        """Add a temporary operator, for one command, while the context is open."""
+        """Add a temporary operator for one command while the context is open."""
         session = _entered(service, live, peer)
         try:
             yield session
@@ -161,7 +161,7 @@ class ProgramSessions:
             service.controls.remove_page(session.operator)
 
     async def begin(self, service: RobotService, peer: SocketPeer) -> ProgramSession:
-        """Open a session and connect the robot.
+        """Open a session and connect to the robot.
 
         Raises:
             ApiError: URC cannot connect to the robot, or too many sessions are open.
@@ -192,7 +192,8 @@ class ProgramSessions:
             ),
             None,
         )
-        # A session of another visitor gets the same answer, so that the answer confirms no secret.
+        # Another visitor's session gets the same answer, so that the answer never confirms a
+        # secret.
         is_ours = (
             kept is not None
             and kept.session.service is service

@@ -55,7 +55,7 @@ class ConnectionInfo(ApiMessage, frozen=True):
     state: Literal["idle", "connecting", "live", "silent", "lost"]
     """``idle`` means that no client needs the robot, so URC is not connected."""
     address: str = ""
-    """Display text of the target, such as ``tcp 192.168.1.5:6789``."""
+    """Display text for the target, such as ``tcp 192.168.1.5:6789``."""
     detail: str = ""
     """Reason for an abnormal state, as one line of text."""
 
@@ -84,7 +84,7 @@ class RobotSummary(ApiMessage, frozen=True):
     """A robot as a list entry."""
 
     name: str
-    """Robot's name in paths."""
+    """The robot's name in paths."""
     title: str
     summary: str
     tags: tuple[str, ...]
@@ -97,7 +97,7 @@ class RobotSummary(ApiMessage, frozen=True):
     emulated: bool
     """Whether the robot is emulated or a playback."""
     role: Role
-    """Visitor's role for this robot."""
+    """The visitor's role for this robot."""
     connected: bool = False
     """Whether a session is open, because a page or program needs the robot."""
     detail: str = ""
@@ -162,7 +162,7 @@ class HoldInfo(ApiMessage, frozen=True):
     period_s: float
     """Interval between the setpoints that the server sends to the robot."""
     lease_s: float
-    """How long after the last motion request the robot stops."""
+    """Time from the last motion request until the robot stops."""
     release: dict[str, Any]
     """Arguments that stop the robot."""
 
@@ -174,7 +174,7 @@ class CommandInfo(ApiMessage, frozen=True):
     title: str
     description: str
     role: Role
-    """Required role for the command."""
+    """Role required for the command."""
     allowed: bool
     """Whether the visitor's role and token scope permit the command."""
     moves: bool
@@ -206,7 +206,7 @@ class SignalInfo(ApiMessage, frozen=True):
     precision: int | None
     """Number of displayed digits after the decimal point; null if undeclared."""
     states: dict[str, str]
-    """Display texts by raw value, for enumerated signals."""
+    """Display text for each raw value, for enumerated signals."""
     limits: dict[str, float]
     """Alarm limits by name: ``lolo``, ``low``, ``high``, ``hihi``."""
     stale_after_s: float
@@ -222,7 +222,7 @@ class RobotInfo(ApiMessage, frozen=True):
 
     robot: RobotSummary
     missing: tuple[str, ...]
-    """Names of required settings without a value; URC connects only if all have values."""
+    """Names of required settings without a value; URC connects only if all of them have values."""
     connections: tuple[ConnectionInfo, ...]
     confirmed: bool
     """Whether the robot has received the last stop."""
@@ -258,7 +258,7 @@ class CommandAsked(ApiMessage, frozen=True):
     """A command with its arguments."""
 
     arguments: Arguments = {}
-    """Values by argument; an omitted argument has its default."""
+    """Values by argument; an omitted argument takes its default."""
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
     """Longest wait for the reply; null means 30 s for a command and 600 s for a sequence."""
     confirmed: bool = False
@@ -283,12 +283,12 @@ class LeaseAsked(ApiMessage, frozen=True):
     verb: Verb | Literal["keep"]
     """Requested action; ``keep`` only keeps the session open."""
     for_s: Annotated[float, msgspec.Meta(ge=0, le=600)] = 10.0
-    """Time limit for the holder's answer to ``ask``, in seconds; the server uses 3 to 60 s."""
+    """Time limit for the holder's answer to ``ask``, in seconds, clamped to 3 to 60 s."""
     session: _Word = ""
     """Secret of an open session; "" opens a new session."""
     stops: int | None = None
-    """Number of STOPs of the last answer. A reset is refused if STOP was pressed again meanwhile;
-    null means the current number."""
+    """Number of STOP presses in the last answer. A reset is refused if STOP was pressed again
+    meanwhile; null means the current number."""
 
 
 class MotionNotice(ApiMessage, frozen=True):
@@ -329,7 +329,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
 
 
 class MotionAsked(ApiMessage, frozen=True):
-    """The newest input of a held command. A pause longer than the lease stops the robot."""
+    """The newest input for a held command. A pause longer than the lease stops the robot."""
 
     session: _Word
     """Session secret from the lease answer."""
@@ -338,11 +338,11 @@ class MotionAsked(ApiMessage, frozen=True):
     epoch: _Count
     """Number of the lease, from the lease answer."""
     number: _Count
-    """Number of this input; each input of the command needs a higher number."""
+    """Number of this input; each new input for the command needs a higher number."""
     beat: _Count
     """Newest received heartbeat number, at most 0.4 s old."""
     arguments: Arguments = {}
-    """Values by argument; an omitted argument has its default."""
+    """Values by argument; an omitted argument takes its default."""
     release: bool = False
     """Whether the control is released; a release stops the robot immediately."""
 
@@ -361,17 +361,17 @@ class MotionAnswer(ApiMessage, frozen=True):
 
 
 class RecordingInfo(ApiMessage, frozen=True):
-    """A file with a recording."""
+    """A recording file."""
 
     file: str
     """File name in paths."""
     robot: str
-    """Recorded robot's name."""
+    """Name of the recorded robot."""
     began: str
     """Start of the recording (UTC), in the form ``20261123T141502Z``."""
     bytes: int
     active: bool
-    """Whether a program's recording is writing the file now."""
+    """Whether a program's recording is currently writing the file."""
 
 
 class RecordingList(ApiMessage, frozen=True):

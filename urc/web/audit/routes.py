@@ -1,7 +1,7 @@
-"""Routes of the audit log: the page, the search, the export, and the timeline of a robot.
+"""Routes for the audit log: the page, the search, the export, and the timeline of a robot.
 
 Layer 5. Visitors with the role ``maintain`` for all robots see all entries. Other visitors see the
-entries of robots that they may maintain. The log is read in threads.
+entries about robots that they may maintain. The log is read in threads.
 """
 
 import asyncio
@@ -48,7 +48,7 @@ _EXPORTS: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class AuditPage:
-    """Context of ``audit.html.j2``: the filters. The page itself loads the entries."""
+    """Context for ``audit.html.j2``: the filters. The page itself loads the entries."""
 
     head: PageHead
     nav: Nav
@@ -59,7 +59,7 @@ class AuditPage:
 
 
 class AuditRoutes:
-    """The routes of the audit log."""
+    """The routes for the audit log."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class AuditRoutes:
         robots: Callable[[], Iterable[str]],
         ways: NavigationLinks,
     ) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             log: the audit log; None if the server has no data folder.

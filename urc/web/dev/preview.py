@@ -58,7 +58,7 @@ def preview(
     Args:
         driver: the loaded driver.
         settings: value of every setting, with a placeholder for each secret.
-        command: its name.
+        command: the command's name.
         arguments: values for some arguments of the command; all others have their defaults.
     """
     found = driver.commands.get(command)

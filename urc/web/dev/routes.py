@@ -1,4 +1,4 @@
-"""Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
+"""Routes for the developer pages: traffic log, parser try-out and command preview of each robot.
 
 Layer 5. These routes exist only with ``--dev``. They require the start key, because the pages show
 all of a robot's traffic. `urc.web.app` creates at most one `Dev`.
@@ -33,7 +33,7 @@ CLIENTS = 16
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """Context of ``dev.html.j2``. The page receives all other data through two sockets."""
+    """Context for ``dev.html.j2``. The page receives all other data through two sockets."""
 
     head: PageHead
     title: str
@@ -44,7 +44,7 @@ class DevPage:
     socket: str
     """Path of the developer page's WebSocket."""
     timeline: str
-    """Path of the robot's audit log of motion."""
+    """Path of the robot's timeline in the audit log."""
 
 
 def dev_url(name: str) -> str:
@@ -70,7 +70,7 @@ class Dev:
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
     ) -> None:
-        """Prepare.
+        """Create the pages.
 
         Args:
             services: the robots' services, keyed by the robots' names in URLs.
@@ -91,7 +91,7 @@ class Dev:
                 group.create_task(watch.run())
 
     def routes(self) -> list[BaseRoute]:
-        """Return the routes of the developer pages and their sockets."""
+        """Return the routes for the developer pages and their sockets."""
         return [
             ProtectedRoute("/robots/{name}/dev", self._page, LOCAL),
             ProtectedSocket("/robots/{name}/dev/ws", self._socket, LOCAL),

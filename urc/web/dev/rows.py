@@ -22,12 +22,12 @@ __all__ = [
 ]
 
 SHOWN_BYTES = 4096
-"""Maximum number of displayed bytes of one frame; any more are only counted."""
+"""Maximum number of bytes displayed for one frame; further bytes are only counted."""
 THUMBNAIL_BYTES = 48 * 1024
 """Maximum size of a displayed image, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")
 _NAMES = ("topic", "action", "service", "method", "path", "url")
-"""Attributes with the source or target of a message, highest priority first."""
+"""Attributes that name the source or target of a message, highest priority first."""
 
 
 class TrafficRow(msgspec.Struct, omit_defaults=True):
@@ -39,7 +39,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
     kind: str
     """Kind of the row: ``sent``, ``received`` or ``note``."""
     line: str
-    """Transport of the data."""
+    """Transport that carried the data."""
     size: int = 0
     data: bytes = b""
     verb: str = ""
@@ -93,7 +93,7 @@ def fill(row: TrafficRow, envelope: Envelope) -> None:
 
 
 def _fill_bytes(row: TrafficRow, data: bytes) -> None:
-    row.size = len(data)  # size of the shown text: the length of a secret must not leak
+    row.size = len(data)  # size of the displayed text: the length of a secret must not leak
     kind = media_type(data)
     if kind in _SHOWN:
         row.text = f"<{grouped(len(data))} bytes, {kind}>"

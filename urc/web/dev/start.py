@@ -46,7 +46,7 @@ class PinnedRobot:
 
 @dataclass(frozen=True, slots=True)
 class DevStartPage:
-    """Context of ``dev_start.html.j2``: the fixed values, and the start button."""
+    """Context for ``dev_start.html.j2``: the fixed values, and the start button."""
 
     head: PageHead
     nav: Nav
@@ -63,7 +63,7 @@ class DevStart:
         take: Callable[[str, Robot], None],
         ways: NavigationLinks,
     ) -> None:
-        """Prepare.
+        """Create the page.
 
         Args:
             fleet: the robots.

@@ -45,7 +45,7 @@ class FrameConsumer(NamedTuple):
     samples: tuple[tuple[str, object, str], ...]
     """Signal, value, alarm."""
     refused: tuple[str, ...]
-    """Invalid values with the reasons; for an error reply, the error text."""
+    """Invalid values, each with the reason; for an error reply, the error text."""
 
 
 class ParsedPiece(NamedTuple):
@@ -85,7 +85,7 @@ class _Candidate(NamedTuple):
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
-    r"""Return the bytes represented by a pasted text.
+    r"""Return the bytes represented by pasted text.
 
     Args:
         text: the input.
@@ -170,7 +170,7 @@ def _cut(
 
 def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
     body: object = data
-    if spec.type == "ros":  # its messages are structured data; all others are bytes
+    if spec.type == "ros":  # ROS messages are structured data; all others are bytes
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Message types of the developer page's WebSocket.
+"""Message types for the developer page's WebSocket.
 
 Layer 5. Messages are JSON text in both directions; bytes are encoded as base64. Messages from the
 server to the page, listed by their tag ``t``::
@@ -46,7 +46,7 @@ MOST_PROBLEMS = 100
 class ParseRequest(
     msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True
 ):
-    """A request to parse a pasted text."""
+    """A request to parse pasted text."""
 
     id: int
     transport: str

@@ -32,8 +32,8 @@ from urc.web.wire import drive as wire
 __all__ = ["BEAT_S", "ControlService", "OperatorSession"]
 
 BEAT_S = 0.05
-"""Interval between heartbeat numbers to the page in control, in seconds. The page's ticks echo the
-numbers."""
+"""Interval between heartbeat numbers sent to the page in control, in seconds. The page's ticks echo
+the numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between a control's applied ticks, in seconds."""
 PATIENCE_S = 0.25
@@ -83,7 +83,7 @@ class ControlService:
 
     @property
     def operators(self) -> tuple[OperatorSession, ...]:
-        """The sessions of all pages of the robot."""
+        """The sessions of all the robot's pages."""
         return tuple(self._operators.values())
 
     @property
@@ -156,7 +156,7 @@ class ControlService:
 
         Args:
             peer: the person or program at the page.
-            wake: callback that is called when new messages to the page are ready.
+            wake: callback that is called when new messages for the page are ready.
         """
         self._peers += 1
         who = peer.identity
@@ -189,7 +189,7 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def name_screen(self, operator: OperatorSession, name: str) -> None:
-        """Set the name of a screen of this computer or of a visitor who has not signed in.
+        """Set the name of a screen on this computer or of a visitor who has not signed in.
 
         People, devices and programs keep the names of their sign-ins. If another page already has
         the name, the screen number is appended, so that no page can impersonate another.
@@ -306,10 +306,10 @@ class ControlService:
                 self._drive(operator, said)
 
     def stop(self, by: str, who: Operator | None = None) -> None:
-        """Stop and latch. Never refused.
+        """Stop the robot and latch STOP. The call is never refused.
 
         Args:
-            by: name of the person or page, which all pages show.
+            by: name of the person or page, shown on all pages.
             who: the person or page in the audit log; None for a stop by URC itself.
         """
         for operator in self._operators.values():
@@ -421,7 +421,7 @@ class ControlService:
     def _stopped(self, command: str, reason: StopReport) -> None:
         self.controller.stopped(command, reason)
         if reason == "lost":
-            return  # it is written again, and then reported
+            return  # the stop is written again, and then reported
         self.recorder.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the operator released the control, or the lease message reports the stop
@@ -430,7 +430,7 @@ class ControlService:
             operator.notice(command, wire.encode_stopped(command, reason))
 
     def _refused(self, command: str, why: str) -> None:
-        """Notify every page why the robot refused the motion."""
+        """Tell every page why the robot refused the motion."""
         self.recorder.stopped(command, why, self._clock.now())
         for operator in self._operators.values():
             operator.forget(command)
@@ -507,7 +507,7 @@ class ControlService:
 
 
 def _roles(driver: Driver) -> dict[str, Role]:
-    """Return the required role of each held command, by command name."""
+    """Return the role required for each held command, by command name."""
     return {name: one.role for name, one in driver.commands.items() if one.hold is not None}
 
 

@@ -1,4 +1,4 @@
-"""The state of one of a robot's pages: pending ticks, pending notices and lease.
+"""The state of one page of a robot: pending ticks, pending notices and lease.
 
 Layer 5.
 """
@@ -35,7 +35,7 @@ class RedundantLine(Protocol):
 
 
 class OperatorSession:
-    """The state of one of a robot's pages."""
+    """The state of one page of a robot."""
 
     def __init__(
         self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES
@@ -48,7 +48,7 @@ class OperatorSession:
         self.wake = wake
         self.heartbeat: int | None = None
         self.on_role: set[Callable[[], None]] = set()
-        """Callbacks after each change of the role in `client`."""
+        """Callbacks to call after each change of the role in `client`."""
         self.notices: dict[str, str] = {}
         """Newest notice about each control or verb, by name."""
         self.seen = -1

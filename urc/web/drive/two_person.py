@@ -1,6 +1,6 @@
 """The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. All pages and devices of one person count as one person, and cannot approve that person's
+Layer 5. One person's pages and devices count as one person, and cannot approve that person's
 commands. Programs are not people, so a token cannot approve a command. The local user counts as one
 person. On a server without sign-in, each page of an unknown visitor counts as one person. The
 number of pending questions and the time for an answer are limited.
@@ -34,7 +34,7 @@ __all__ = ["TOKEN_S", "WAIT_S", "TwoPersonRule"]
 WAIT_S: Final = 30.0
 """Maximum wait for the second person's approval, in seconds."""
 TOKEN_S: Final = 5.0
-"""Validity of a token, in seconds."""
+"""How long a token is valid, in seconds."""
 _MOST: Final = 8
 """Maximum number of one robot's pending questions, and of one page's tokens."""
 
@@ -62,7 +62,7 @@ class TwoPersonRule:
     """The pending questions of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Prepare without questions; `operators` returns the sessions of the robot's pages."""
+        """Start with no questions; `operators` returns the sessions of the robot's pages."""
         self._operators = operators
         self._clock = clock
         self._numbers = count(1)
@@ -95,7 +95,7 @@ class TwoPersonRule:
             asker: the page that runs the command.
             run: the page's number for this run of the command.
             known: the command.
-            arguments: its arguments.
+            arguments: the command's arguments.
             token: single-use token from `prepare`; "" if the operator confirmed nothing.
 
         Raises:

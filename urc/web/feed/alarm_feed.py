@@ -44,7 +44,7 @@ class AlarmFeed:
         self._messages: dict[tuple[int, int], str] = {}
         self._encoded_at = (-1, -1)
         self._head = 0
-        """Revision of the last flush; newer changes wait for the next flush."""
+        """Revision at the last flush; newer changes wait for the next flush."""
         alarms.on_change = self._changed
 
     def join(self, wake: Callable[[], None]) -> AlarmPlace:

@@ -24,7 +24,7 @@ __all__ = [
 
 
 class ClientSocket(Protocol):
-    """The interface of an accepted WebSocket for clients."""
+    """The interface of a client's accepted WebSocket."""
 
     async def receive(self) -> Message:
         """Return the next ASGI message."""
@@ -33,11 +33,11 @@ class ClientSocket(Protocol):
         """Send one text message."""
 
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
-        """Begin the closing handshake of the WebSocket."""
+        """Begin the WebSocket's closing handshake."""
 
 
 class FlowControl(Protocol):
-    """Flow control of a client's socket."""
+    """Flow control for a client's socket."""
 
     def is_free(self) -> bool:
         """Whether the kernel has accepted all written data."""
@@ -148,7 +148,7 @@ class TokenBucket:
 
 
 class PeerRights(Protocol):
-    """The current rights of a socket's peer at the socket's robot."""
+    """The current rights of a socket's peer for the socket's robot."""
 
     def role(self) -> Role | None:
         """Return the current role; None if the peer no longer has any right."""

@@ -24,7 +24,7 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time limit for reusing an encoded frame, in seconds. Ages in a frame are valid at the time of
+"""Time limit for reusing an encoded frame, in seconds. Ages in a frame are those at the time of
 encoding."""
 
 
@@ -97,7 +97,7 @@ class Fanout:
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        """Hub revision of the last flush. Newer values wait for the next flush."""
+        """Hub revision at the last flush. Newer values wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
         """Hub revision of the encoded `_updates`."""

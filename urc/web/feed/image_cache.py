@@ -63,7 +63,7 @@ class ImageCache:
         self._count = 0
 
     def next_image(self, subscription: ImageSubscription) -> EncodedImage | None:
-        """Return a new image for the client, or None; mark it as sent."""
+        """Return a new image for the client and mark it as sent; None if there is no new image."""
         count = len(subscription.names)
         for step in range(count):
             name = subscription.names[(subscription.turn + step) % count]

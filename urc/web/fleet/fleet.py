@@ -44,7 +44,7 @@ class Fleet:
             service: function that creates the service of a robot.
 
         Raises:
-            UrcError: two robots use different widgets of the same name.
+            UrcError: two robots use different widgets with the same name.
         """
         self._service = service
         self.widgets: Assets = _assets(robots)
@@ -108,8 +108,8 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver it. Without a session it does
-        not count, because otherwise a wrong robot address could not be corrected.
+        A pending stop counts as driving while a session can deliver it. Without a session, it does
+        not count, so that a wrong robot address can still be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -120,7 +120,7 @@ class Fleet:
         return t("a pending stop") if service.is_open else ""
 
     def is_out_of_reach(self, name: str) -> bool:
-        """Return whether a robot has no client and no connection: its address may be wrong."""
+        """Return whether a robot has no client and no connection; its address may be wrong."""
         service = self.services.get(name)
         if service is None or service.controls.controller.lease.state.holder is not None:
             return False
@@ -150,7 +150,7 @@ def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[
 
 
 def _assets(robots: Mapping[str, Robot]) -> Assets:
-    """Return the files of all widgets; identical widgets of several robots are merged."""
+    """Return the files of all widgets; identical widgets from several robots are merged."""
     return widget_assets(
         unified(one for robot in robots.values() for one in robot.profile.widgets.values())
     )

@@ -1,6 +1,6 @@
 """A factory for a dashboard's robots, from documents, settings and installed packages.
 
-Layer 5. The factory reads files and stores settings, but opens no sessions of served robots.
+Layer 5. The factory reads files and stores settings, but opens no sessions for served robots.
 Reading files takes time, so the factory is called in a thread.
 """
 
@@ -39,7 +39,7 @@ class RobotOptions:
     """Options of the robot factory, set when the dashboard starts."""
 
     data: Path
-    """Folder of the settings and packages."""
+    """Folder for the settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
     """Function that creates a robot from a profile with the given settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
@@ -92,7 +92,7 @@ class RobotFactory:
     def _roots(self) -> frozenset[str]:
         try:
             return frozenset(lock.root for lock in self.store.installed())
-        except PackageError:  # the managers' pages report it
+        except PackageError:  # the manager pages report the error
             return frozenset()
 
     def stamp(self) -> object:
@@ -179,7 +179,7 @@ class RobotFactory:
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return a robot's installed package, such as ``drivers/puppet``; "" if not installed."""
+        """Return a robot's installed package, such as ``drivers/puppet``; "" if it has none."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts
@@ -218,7 +218,7 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return a dict from the name of each installed package with a robot to its versions.
+        """Return the versions of each installed package with a robot, keyed by package name.
 
         Versions are in ascending order. If a robot package and a driver package have the same
         name, the result contains only the package in use.

@@ -2,7 +2,7 @@
 
 Layer 5. The session opens when the first client connects, and closes shortly after the last client
 disconnects. Reloading the page therefore keeps the robot connected. Leaving the page disconnects
-it.
+the robot.
 """
 
 import asyncio
@@ -69,7 +69,7 @@ class Playback(Protocol):
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback is playing."""
+        """Whether the playback is running."""
 
     @property
     def speed(self) -> float:
@@ -106,7 +106,7 @@ log = logging.getLogger(__name__)
 
 
 class SessionLike(MotionSession, Protocol):
-    """The dashboard's interface to an opened profile."""
+    """The dashboard's interface to an open profile."""
 
     @property
     def hub(self) -> Hub:
@@ -144,7 +144,7 @@ class Robot:
     settings: Mapping[str, Value]
     """Current values of the settings, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Function that returns a context, which keeps the robot connected while the context is open.
+    """Function that returns a context. The robot stays connected while the context is open.
     Entering the context must not wait for a reply from the robot."""
     glimpse: Callable[[], Glimpse] | None = None
     """Function that returns a view of an emulated robot without connecting. None for a real
@@ -165,7 +165,7 @@ class LiveSession:
     session: SessionLike
     fanout: Fanout
     number: str
-    """Number of the session, unique even across restarts of the server."""
+    """Number of the session, unique even across server restarts."""
     ended: asyncio.Event
     """Event that is set when the session ends, for any reason."""
     began_s: float
@@ -221,7 +221,8 @@ class RobotService:
             clock: the clock.
             latch: store that preserves a latched STOP across restarts; None stores no latch.
             recorder: receives the audit events; None records no events.
-            start_lock: lock shared by all of a server's robots, so that sessions start one by one.
+            start_lock: lock shared by all of a server's robots, so that sessions start one at a
+                time.
             alarms: the robot's alarms; None creates alarms that are not stored.
         """
         self.robot = robot
@@ -360,7 +361,7 @@ class RobotService:
             self._changed.set()
 
     def replace(self, robot: Robot, latch: LatchStore | None = None) -> None:
-        """Switch to another version of the robot, for its next session; end an open session.
+        """Switch to another version of the robot for its next session; end any open session.
 
         The robot must be at rest (`is_at_rest`), because the switch disconnects it briefly.
         """
@@ -404,8 +405,9 @@ class RobotService:
     @asynccontextmanager
     async def _opened(self) -> AsyncIterator[SessionLike]:
         async with AsyncExitStack() as stack:
-            # The start of a session compiles the driver and launches the guard, which blocks the
-            # loop for up to 40 ms. The pause lets in the input of driven robots between two starts.
+            # Starting a session compiles the driver and launches the guard, which blocks the loop
+            # for up to 40 ms. The pause lets the loop read the input for driven robots between two
+            # starts.
             async with self._start_lock:
                 session = await stack.enter_async_context(self.robot.open_session())
                 await asyncio.sleep(0)
@@ -431,7 +433,7 @@ class RobotService:
                     for task in tasks:
                         task.cancel()
         finally:
-            if self._next is opened:  # otherwise, a client already waits for the next session
+            if self._next is opened:  # otherwise, a client is already waiting for the next session
                 self._next = None
             self._keep_picture(session.hub)
             self.controls.recorder.attend(None, self.clock.now)
@@ -441,8 +443,8 @@ class RobotService:
     async def _until_deserted(self) -> None:
         while True:
             await self._wait_for(present=False)
-            # The alarm decides about the end of the wait, not the clock: a timer of the loop may
-            # fire a fraction of a millisecond early, and would then not fire again.
+            # The alarm, not the clock, decides when the wait ends: a loop timer may fire a fraction
+            # of a millisecond early, and would then not fire again.
             rung = asyncio.Event()
 
             def ring(rung: asyncio.Event = rung) -> None:
@@ -459,7 +461,7 @@ class RobotService:
                 return
 
     async def _until_stopped(self) -> None:
-        """Wait while a stop has not reached the robot, for at most `STOP_DUE_S`."""
+        """Wait until every stop has reached the robot, for at most `STOP_DUE_S` seconds."""
         end_s = self.clock.now() + STOP_DUE_S
         while self.controls.controller.is_stop_due and self.clock.now() < end_s:
             if self._has_clients or self._is_unwanted:

@@ -119,7 +119,7 @@ def folder_assets(folder: Path) -> Assets:
 
 
 def widget_assets(widgets: Iterable[Widget]) -> Assets:
-    """Return the pages' widget files: modules, style sheets and small assets.
+    """Return the widget files for pages: modules, style sheets and small assets.
 
     Each file is listed as ``<widget>/<path in its folder>``. Hidden files and links out of the
     folder are omitted.

@@ -1,4 +1,4 @@
-"""Routes of the pages' files: modules, styles, widgets, catalogues and map tiles.
+"""Routes for the pages' files: modules, styles, widgets, catalogues and map tiles.
 
 Layer 5. Each request is looked up in a table; see `urc.web.load.assets`.
 """
@@ -19,13 +19,13 @@ __all__ = ["FileRoutes"]
 
 
 class FileRoutes:
-    """The routes.
+    """The routes for the pages' files.
 
     Args:
-        vendor: folder of the build's third-party modules; None if there is no build.
-        tiles: folder of map tiles, ``z/x/y.png``; None if the server has no tiles.
-        widgets: function that returns the tables of widget files. The first table with a file takes
-            precedence.
+        vendor: folder with the build's third-party modules; None if there is no build.
+        tiles: folder with map tiles, ``z/x/y.png``; None if the server has no tiles.
+        widgets: function that returns the tables of widget files. The first table that contains a
+            file takes precedence.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class FileRoutes:
         self._widgets = widgets
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes, which must follow the routes of the widget pages."""
+        """Return the routes, which must follow the routes for the widget pages."""
         return [
             ProtectedRoute("/favicon.ico", self._favicon, ANYONE),
             ProtectedRoute("/app.webmanifest", self._manifest, ANYONE),
@@ -50,7 +50,7 @@ class FileRoutes:
         ]
 
     def has_widget(self, name: str) -> bool:
-        """Return whether there are files of a widget with this name."""
+        """Return whether a widget with this name has any files."""
         return any(f"{name}/widget.js" in table.files for table in self._widgets())
 
     async def _favicon(self, request: Request) -> Response:
@@ -64,7 +64,7 @@ class FileRoutes:
         return self._static.respond("sw.js", request)
 
     async def _words(self, request: Request) -> Response:
-        """Serve the catalogue of one language as a JavaScript module."""
+        """Serve the catalogue for one language as a JavaScript module."""
         tag = request.path_params["tag"]
         if tag not in words.LANGUAGES:
             raise HTTPException(404)

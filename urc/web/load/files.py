@@ -1,4 +1,4 @@
-"""Map tiles, and the files listed in widget options of a robot's documents.
+"""Map tiles, and the files that a robot's documents list in widget options.
 
 Layer 5. A URL contains either a key of a table in the loaded profile, or the three numbers of a
 tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
@@ -86,7 +86,7 @@ def uses_of(profile: Profile) -> Iterator[WidgetUse]:
 
 
 def _key(name: str, place: str) -> str:
-    # The digest distinguishes files of the same name. The path follows the digest, because models
+    # The digest distinguishes files with the same name. The path follows the digest, because models
     # refer to their parts by path.
     return f"{hashlib.blake2b(place.encode(), digest_size=6).hexdigest()}/{name}"
 

@@ -1,6 +1,6 @@
 """A watch over the block lists, which stops and disables robots with blocked packages.
 
-Layer 5. Imports on the command line and this watch's hourly requests change the lists.
+Layer 5. The lists change through imports on the command line and this watch's hourly requests.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ class BlockWatch:
         own_interfaces: Callable[[str, Robot], set[str]],
         ask: Callable[[], None],
     ) -> None:
-        """Prepare.
+        """Create the watch.
 
         Args:
             store: the installed packages.

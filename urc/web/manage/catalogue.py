@@ -32,7 +32,7 @@ class PackageCatalog:
         """Prepare the lists without contacting any repository.
 
         Args:
-            folder: folder of the packages and the list of repositories.
+            folder: folder with the packages and the list of repositories.
             now: function that returns the current time, in seconds.
         """
         self._folder = folder

@@ -1,6 +1,6 @@
 """Installation jobs, each with planning, review, approval and installation.
 
-Layer 5. A job can be cancelled until the installation starts. No function of this module blocks the
+Layer 5. A job can be cancelled until the installation starts. No function in this module blocks the
 event loop. Downloads run in a thread, which is abandoned if the job is cancelled. The package store
 changes only at the end, in one step.
 """
@@ -36,7 +36,7 @@ _WIRE_MOST: Final = 100
 """Maximum number of reported changes to the frames sent to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Maximum number of abandoned threads that still wait for a server."""
+"""Maximum number of abandoned threads that are still waiting for a server."""
 
 
 Wanted = PackageRequirement | Path | FileSource | Lock
@@ -53,13 +53,13 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without the user having set them."""
+    """Resources of this machine that the package uses without a setting."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
     """Version replaced by the update; None for a new installation."""
     stays: Lock | None = None
-    """Version that stays in use after the installation of another version, if any."""
+    """Version that stays in use after another version is installed, if any."""
     changes: UpdateDiff | None = None
 
 
@@ -67,7 +67,7 @@ class _Planned(NamedTuple):
 class Job:
     """One installation job, from the request to the result.
 
-    The job's thread changes only the job's texts and numbers.
+    The job's thread changes only the job's text and numbers.
     """
 
     number: int
@@ -149,12 +149,12 @@ class Jobs:
         sources: Callable[[Callable[[str], None]], Sequence[Source]],
         used: Callable[[PackageId], Lock | None] = lambda _: None,
     ) -> None:
-        """Prepare.
+        """Create the job queue.
 
         Args:
             store: the store of installed packages.
             sources: function that returns the repositories and reports warnings to its argument.
-            used: function that returns the version in use of a package, or of a package with the
+            used: function that returns a package's version in use, or that of a package with the
                 same name.
         """
         self._store = store

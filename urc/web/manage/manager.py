@@ -1,4 +1,4 @@
-"""A manager of packages, which keeps the menu's robots consistent with installed packages.
+"""A package manager that keeps the menu's robots consistent with the installed packages.
 
 Layer 5. The manager has no routes and no pages: `urc.web.manage.routes` uses it.
 """
@@ -42,7 +42,7 @@ class Manager:
         now: Callable[[], float],
         renew: Callable[[str, Robot], None],
     ) -> None:
-        """Prepare.
+        """Create the manager.
 
         Args:
             factory: the factory that creates the robots.
@@ -63,7 +63,7 @@ class Manager:
             lambda: self.catalogue.refresh(force=True),
         )
         self._packages: dict[str, Lock] = {}
-        """For each robot from an installed package, the version that is served, by robot name."""
+        """Served version of each robot from an installed package, by robot name."""
         self._offered: dict[str, str] = {}
         """Digest of each installed interface, by name."""
         self._seen: object = None
@@ -106,7 +106,7 @@ class Manager:
                 self._packages.get(name),
             )
             if served in locks and not kept.version:
-                lock = served  # the user must choose another program's newer version
+                lock = served  # a newer version from another program needs the user's choice
             if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
             profile = await asyncio.to_thread(self.factory.profile, lock)
@@ -305,7 +305,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: PackageId) -> Lock | None:
-        """Return the version in use of a package; robot packages match by name."""
+        """Return a package's version in use; robot packages match by name."""
         installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
@@ -319,7 +319,7 @@ class Manager:
     def check_idle(self, name: str, *, is_correction: bool = False) -> None:
         """Raise `Busy` while an operator drives the robot, or a stop is pending.
 
-        With `is_correction`, a pending stop for an unreachable robot does not count, because the
+        With `is_correction`, a pending stop for an unreachable robot does not count, because wrong
         settings may be the reason.
         """
         driver = self.fleet.driven_by(name)
@@ -339,7 +339,7 @@ class Manager:
             may_manage: whether the visitor may change packages and settings.
         """
         catalogue = self.catalogue
-        # Read first, so that replies that arrive during the search cause one more request.
+        # Read first: if replies arrive during the search, the page then makes one more request.
         is_asking = catalogue.is_asking
         locks = self.factory.store.installed()
         hits = catalogue.hits(words, kinds)

@@ -1,4 +1,4 @@
-"""Routes of the manager pages, and of the pages' requests under ``/api/v1``.
+"""Routes for the manager pages, and for the pages' requests under ``/api/v1``.
 
 Layer 5. Changes are POST requests with a JSON body, sent by the server's own pages;
 `urc.web.serve.policy` checks their origin. Each change requires the role `maintain` and a recent
@@ -47,12 +47,12 @@ KINDS = {
     "interfaces": ("interface",),
     "widgets": ("widget",),
 }
-"""Kinds of packages on each manager page, by name of the page."""
+"""Kinds of packages on each manager page, by page name."""
 
 
 @dataclass(frozen=True, slots=True)
 class ManagePage:
-    """Context of ``manage.html.j2``: repositories, installed packages and available packages."""
+    """Context for ``manage.html.j2``: repositories, installed packages and available packages."""
 
     head: PageHead
     nav: Nav
@@ -64,7 +64,7 @@ class ManagePage:
     may_manage: bool
     """Whether the visitor may change packages and settings."""
     may_name_paths: bool
-    """Whether the visitor may enter paths on this machine, for which the start key is required."""
+    """Whether the visitor may enter paths on this machine, which requires the start key."""
     is_shown: bool
     """Whether the menu shows the installed robots."""
 
@@ -137,7 +137,7 @@ class ManageRoutes:
     """The manager routes of a dashboard."""
 
     def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             manager: the operations.
@@ -174,7 +174,7 @@ class ManageRoutes:
         }
 
     async def page(self, request: Request) -> Response:
-        """Show a manager."""
+        """Show a manager page."""
         which = request.url.path.split("/")[1]
         html = manage_page(
             request.state.nonce,
@@ -222,7 +222,7 @@ class ManageRoutes:
 
     @_api
     async def disconnect(self, request: Request) -> Response:
-        """Remove a repository; packages installed from it stay."""
+        """Remove a repository; packages installed from it remain installed."""
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
         self._record(request, "repository remove", [said.url])

@@ -1,4 +1,4 @@
-"""Data of a robot's settings page, with one form field per setting, chosen by type.
+"""Data for a robot's settings page, with one form field per setting, chosen by the setting's type.
 
 Layer 5. This module fills the fields, and `urc.web.manage.settings_routes` reads their values.
 """
@@ -64,7 +64,7 @@ class Field:
     is_set: bool
     """Whether a value is stored for the secret."""
     is_withheld: bool
-    """Whether the stored secret is not used because it was entered for another destination."""
+    """Whether the stored secret is ignored because it was entered for another destination."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class FieldGroup:
 
 @dataclass(frozen=True, slots=True)
 class SettingsPage:
-    """Context of ``settings.html.j2``: the driver's settings, the driver, and the interface."""
+    """Context for ``settings.html.j2``: the driver's settings, the driver, and the interface."""
 
     head: PageHead
     nav: Nav

@@ -1,4 +1,4 @@
-"""Routes of a robot's settings page, for testing, storing and applying settings.
+"""Routes for a robot's settings page, for testing, storing and applying settings.
 
 Layer 5. If the test fails, for example because the robot is switched off, the settings are stored
 only if the user confirms.
@@ -48,10 +48,10 @@ _END_S: Final = 5.0
 
 
 class SettingsRoutes:
-    """The routes of all robots' settings pages."""
+    """The routes for all robots' settings pages."""
 
     def __init__(self, manager: Manager, ways: NavigationLinks, recorder: ServerRecorder) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             manager: the operations on packages and robots.
@@ -64,7 +64,7 @@ class SettingsRoutes:
         self._trying: set[str] = set()
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the route of the settings page."""
+        """Return the route for the settings page."""
         return [ProtectedRoute("/robots/{name}/settings", self.page, WATCH)]
 
     def endpoints(self) -> dict[str, Endpoint]:
@@ -267,7 +267,7 @@ def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
 
 
 def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the valid inputs and the errors of invalid inputs, each by field."""
+    """Return the valid inputs and the errors for invalid inputs, each by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():

@@ -32,7 +32,7 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
 
     Args:
         name: file name from the browser, used for its suffix and in messages.
-        data: its content.
+        data: the file's content.
         installed: installed packages. A document without a package gets an unused version number.
 
     Raises:

@@ -99,7 +99,7 @@ class JobNews(ManageMessage, frozen=True):
     """The job's current activity or result, in one line."""
     done: int
     of: int
-    """Number of steps of the job; 0 while the number is unknown."""
+    """Number of steps in the job; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
     """Origin and signer of each package; for an update, the changed versions."""
@@ -315,7 +315,7 @@ class SettingsAnswer(ManageMessage, frozen=True):
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """One-line error of each invalid setting, by setting name."""
+    """One-line error for each invalid setting, by setting name."""
     missing: tuple[str, ...] = ()
     """Titles of required settings without a value."""
     lines: tuple[ProbedTransport, ...] = ()

@@ -38,10 +38,10 @@ LINK_OVER = "this link is unknown or has ended"
 
 
 class AccountRoutes:
-    """The routes."""
+    """The routes for accounts and guests."""
 
     def __init__(self, sign_ins: BrowserSignIns, links: LinkMaker) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
@@ -64,7 +64,7 @@ class AccountRoutes:
 
     @answers_changes
     async def guest(self, request: Request) -> Response:
-        """Admit a guest with the secret of a link."""
+        """Admit a guest with the secret from a link."""
         said = await body_of(request, CodeRequest)
         self._sign_ins.check_wait(request)
         who = self._control.identify(said.code)
@@ -106,7 +106,7 @@ class AccountRoutes:
 
     @answers_changes
     async def passphrase(self, request: Request) -> Response:
-        """Change the visitor's own passphrase; all other sign-ins of the person end."""
+        """Change the visitor's own passphrase; all the person's other sign-ins end."""
         sign_ins = self._sign_ins
         said = await body_of(request, PassphraseRequest)
         who = visitor_of(request).identity
@@ -127,7 +127,8 @@ class AccountRoutes:
                 raise ApiError(403, t("The current passphrase is wrong."))
             kept = await asyncio.to_thread(hash_of, said.passphrase, name=who.name)
         await asyncio.to_thread(replace_passphrase, store, who.principal, kept)
-        # Before `reload`, after which this request has no identity: its own sign-in has ended, too.
+        # Record this before `reload`, which leaves the request without an identity, because its own
+        # sign-in has ended, too.
         sign_ins.recorder.access_changed(actor_of(request), "people passphrase", name=who.name)
         done = answer(SignInResult(who.name))
         await self._control.reload()
@@ -156,7 +157,7 @@ class AccountRoutes:
         device = self._control.directory.principals.get(said.id)
         if device is None or not _is_person(who) or device.owner != who.principal:
             raise ApiError(404, t("That device is not yours, or was removed."))
-        actor = actor_of(request)  # before the change, which may concern the visitor
+        actor = actor_of(request)  # read before the change, which may affect the visitor
         await asyncio.to_thread(self._sign_ins.store.remove, device.id)
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, "devices remove", name=device.name)
@@ -173,7 +174,7 @@ class AccountRoutes:
         found = self._control.directory.sign_ins.get(said.id)
         if found is None or found.principal not in self._own(visitor_of(request).identity):
             raise ApiError(404, t("This sign-in has already ended."))
-        actor = actor_of(request)  # before the change, which may concern the visitor
+        actor = actor_of(request)  # read before the change, which may affect the visitor
         await self._control.end_sign_in(said.id)
         self._sign_ins.recorder.revoked(actor, "sign-in", name=actor.name, agent=found.agent)
         return answer(ResultLine(t("the sign-in has ended")))

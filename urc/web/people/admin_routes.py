@@ -1,7 +1,7 @@
-"""Routes of administrators: people, devices, tokens, guests and sign-ins.
+"""Routes for administrators: people, devices, tokens, guests and sign-ins.
 
-Layer 5. Each change is one transaction of the store, takes effect immediately, and is recorded in
-the audit log.
+Layer 5. Each change is one store transaction, takes effect immediately, and is recorded in the
+audit log.
 """
 
 import asyncio
@@ -59,14 +59,14 @@ _PLURALS: Final[dict[Kind, str]] = {
 
 
 class AdminRoutes:
-    """The routes."""
+    """The routes for administrators."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, links: LinkMaker) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the pending pairings of administrators.
+            pairings: the administrators' pending pairings.
             links: the maker of pairing, invitation and guest links.
         """
         self._sign_ins = sign_ins
@@ -229,7 +229,7 @@ class AdminRoutes:
 
     @answers_changes
     async def guest(self, request: Request) -> Response:
-        """Return a guest link to one robot."""
+        """Return a guest link for one robot."""
         said = await body_of(request, GuestRequest)
         store, now = self._sign_ins.store, self._control.now()
         ends_at = now + said.hours * 3600
@@ -266,7 +266,7 @@ class AdminRoutes:
 
     async def _changed(self, request: Request, command: str, **about: object) -> None:
         """Apply a change immediately, and record it."""
-        actor = actor_of(request)  # before the change, which may concern the administrator
+        actor = actor_of(request)  # read before the change, which may affect the administrator
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, command, **about)
 

@@ -1,4 +1,4 @@
-"""The API calls for people, devices, tokens and sign-ins, for the table of all calls.
+"""The API calls for people, devices, tokens and sign-ins, which the table of all calls includes.
 
 Layer 5. Pure.
 """
@@ -33,7 +33,7 @@ class PeopleCall(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Unique name, and key of the endpoint."""
+        """Unique name, which is also the endpoint's key."""
         path = self.path.removesuffix("s/{id}")
         return path.replace("/", "_").replace("-", "_")
 

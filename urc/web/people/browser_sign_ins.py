@@ -57,12 +57,12 @@ class BrowserSignIns:
         throttle: Throttle | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare.
+        """Set up the common part of all sign-in methods.
 
         Args:
             access: identities and rights.
-            recorder: recorder of sign-ins in the audit log.
-            throttle: failed attempts of all sign-in methods; None to create a separate count.
+            recorder: recorder that writes sign-ins to the audit log.
+            throttle: failed attempts with all sign-in methods; None to create a separate count.
             clock: function that returns the monotonic time, in seconds.
         """
         self.access = access
@@ -163,7 +163,8 @@ class BrowserSignIns:
             ends_at=min(ends, default=None), idle_s=PERSON.idle_s,
             place=address_of(request), agent=agent_of(request),
         )  # fmt: skip
-        # The previous sign-in ends last, so that the browser keeps it if opening the new one fails.
+        # The previous sign-in ends last, so that the browser keeps it if opening the new sign-in
+        # fails.
         await self._end_previous(request)
         return self.admit(request, response, secret)
 

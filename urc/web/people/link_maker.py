@@ -31,11 +31,11 @@ class LinkMaker:
     """A maker of links to one server."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, data: Path | None) -> None:
-        """Prepare.
+        """Create the maker.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the pending pairings of administrators.
+            pairings: the administrators' pending pairings.
             data: the data folder; None if the server has no data folder.
         """
         self._sign_ins = sign_ins
@@ -43,7 +43,7 @@ class LinkMaker:
         self._data = data
 
     def link(self, request: Request, page: str, secret: str, ends_at: float) -> SecretLink:
-        """Return the link with a secret.
+        """Return a link that contains a secret.
 
         Args:
             request: the administrator's request.

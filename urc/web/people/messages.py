@@ -132,7 +132,7 @@ class PairingCode(PeopleMessage, frozen=True):
     link: str
     """Link with the code in its fragment."""
     qr: str
-    """QR code of the link, as the ``data:`` URL of an image."""
+    """QR code for the link, as the ``data:`` URL of an image."""
     code: str
     fingerprint: str
     """Fingerprint of the local certificate authority; "" if there is no authority."""
@@ -173,9 +173,9 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     sign_ins: int
     """Number of open sign-ins."""
     used_at: float | None
-    """Last request of an open sign-in, in seconds since 1970 (UTC), or null."""
+    """Time of the last request with an open sign-in, in seconds since 1970 (UTC), or null."""
     created_at: float
-    """Time of the creation, in seconds since 1970 (UTC)."""
+    """Time of creation, in seconds since 1970 (UTC)."""
     ends_at: float | None
     """Time at which the access ends, in seconds since 1970 (UTC); null for never."""
 
@@ -197,7 +197,7 @@ class SignInInfo(PeopleMessage, frozen=True):
     agent: str
     """Browser and operating system in words."""
     place: str
-    """Network address at the sign-in."""
+    """Network address at sign-in."""
     created_at: float
     """Time of the sign-in, in seconds since 1970 (UTC)."""
     used_at: float
@@ -277,7 +277,7 @@ class SecretLink(PeopleMessage, frozen=True):
 
     link: str
     qr: str
-    """QR code of the link, as the ``data:`` URL of an image."""
+    """QR code for the link, as the ``data:`` URL of an image."""
     ends_at: float
     is_reachable: bool
     """Whether other devices can open the link."""

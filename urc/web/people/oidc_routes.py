@@ -24,14 +24,14 @@ from urc.web.show.pages import PageHead, render
 __all__ = ["CALLBACK", "OidcRoutes", "ProviderPage"]
 
 CALLBACK: Final = "/sign-in/oidc/callback"
-"""Path of the redirect URL, which must be registered at the provider."""
+"""Path of the redirect URL, which must be registered with the provider."""
 _COOKIE: Final = "urc-provider-"
 _NO_STORE: Final = {"cache-control": "no-store"}
 
 
 @dataclass(frozen=True, slots=True)
 class ProviderPage:
-    """Context of ``provider.html.j2``: the result of a sign-in with the provider."""
+    """Context for ``provider.html.j2``: the result of a sign-in with the provider."""
 
     head: PageHead
     fault: str
@@ -41,10 +41,10 @@ class ProviderPage:
 
 
 class OidcRoutes:
-    """The routes of the provider sign-in; without a provider, both routes refuse requests."""
+    """The routes for signing in with a provider; without one, both routes refuse requests."""
 
     def __init__(self, sign_ins: BrowserSignIns, provider: OidcSignIn | None) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
@@ -107,7 +107,7 @@ class OidcRoutes:
         try:
             person = await asyncio.to_thread(admit_account, self._sign_ins.store, account, now)
         finally:
-            # Roles may have ended even after a refusal.
+            # Even a refusal may have ended roles.
             await self._sign_ins.control.reload()
         await self._sign_ins.open(request, response, person, "oidc", ends_at=account.ends_at)
 

@@ -38,18 +38,18 @@ class GrantScope(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PeoplePage:
-    """Context of ``people.html.j2``."""
+    """Context for ``people.html.j2``."""
 
     head: PageHead
     nav: Nav
     scopes: tuple[GrantScope, ...]
     robots: tuple[GrantScope, ...]
-    """Choices of single robots; the value is the robot's name in URLs."""
+    """Choices for single robots; each value is a robot's name in URLs."""
 
 
 @dataclass(frozen=True, slots=True)
 class AccountPage:
-    """Context of ``account.html.j2``."""
+    """Context for ``account.html.j2``."""
 
     head: PageHead
     nav: Nav
@@ -57,7 +57,7 @@ class AccountPage:
 
 @dataclass(frozen=True, slots=True)
 class OneTimeCodePage:
-    """Context of ``pair.html.j2``, ``join.html.j2`` and ``guest.html.j2``."""
+    """Context for ``pair.html.j2``, ``join.html.j2`` and ``guest.html.j2``."""
 
     head: PageHead
 
@@ -71,7 +71,7 @@ class PeoplePages:
         robots: Callable[[], Mapping[str, str]],
         tags_of: Callable[[str], tuple[str, ...]],
     ) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             ways: navigation links of this server.
@@ -114,7 +114,7 @@ class PeoplePages:
 
 
 class CodePages:
-    """The routes of pages for links with a code, for new devices, invited people and guests."""
+    """The routes of the pages that code links open for new devices, invited people and guests."""
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes."""

@@ -36,7 +36,7 @@ from urc.web.words import t
 __all__ = ["PairingRoutes"]
 
 MOST_LINKS: Final = 8
-"""Limit on listed robots on a new device's page; above the limit, the page links to the menu."""
+"""Limit on robots listed on a new device's page; above the limit, the page links to the menu."""
 
 
 class PairingRoutes:
@@ -48,11 +48,11 @@ class PairingRoutes:
         pairings: Pairings,
         robots: Callable[[], Mapping[str, str]],
     ) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            pairings: the pending pairings of administrators.
+            pairings: the administrators' pending pairings.
             robots: function that returns the titles of all robots, keyed by their names in URLs.
         """
         self._sign_ins = sign_ins
@@ -89,7 +89,7 @@ class PairingRoutes:
 
     @answers_refusals
     async def pair(self, request: Request) -> Response:
-        """Make this browser a device with its own key."""
+        """Pair this browser as a device with its own key."""
         sign_ins = self._sign_ins
         said = await body_of(request, PairRequest)
         found = await self._invitation(request, said.code)
@@ -142,7 +142,7 @@ class PairingRoutes:
         return done
 
     async def _invitation(self, request: Request, code: str) -> Invitation:
-        """Return the invitation of a code; count and report an unknown code."""
+        """Return the invitation for a code; count and report an unknown code."""
         sign_ins = self._sign_ins
         sign_ins.check_wait(request)
         found = await asyncio.to_thread(sign_ins.store.invitation, code, sign_ins.control.now())

@@ -1,6 +1,6 @@
-"""Pending pairings of administrators, one for each displayed code.
+"""The administrators' pending pairings, one for each displayed code.
 
-Layer 5. Pure. The store contains the codes. This module has only their digests.
+Layer 5. Pure. The store contains the codes. This module keeps only their digests.
 """
 
 import secrets

@@ -1,4 +1,4 @@
-"""Requests and responses of the pages for sign-in and for visitors' own passkeys.
+"""Requests and responses for the pages for sign-in and for visitors' own passkeys.
 
 Layer 5. Pure.
 """
@@ -45,7 +45,7 @@ class PasskeyLine(msgspec.Struct, frozen=True):
     id: str
     name: str
     host: str
-    """Host name at which browsers offer the passkey."""
+    """Host name for which browsers offer the passkey."""
     created_at: float
     """UTC time at which the passkey was added, in seconds since 1970."""
     used_at: float | None

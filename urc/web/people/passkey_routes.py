@@ -32,10 +32,10 @@ __all__ = ["PasskeyRoutes"]
 
 
 class PasskeyRoutes:
-    """The routes."""
+    """The routes for passkeys."""
 
     def __init__(self, sign_ins: BrowserSignIns) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
@@ -63,7 +63,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def sign_in_options(self, request: Request) -> Response:
-        """Return the WebAuthn options of a sign-in."""
+        """Return the WebAuthn options for a sign-in."""
         self._sign_ins.check_wait(request)
         found = await asyncio.to_thread(
             self._passkeys.authentication, _party(request), address_of(request)
@@ -105,7 +105,7 @@ class PasskeyRoutes:
 
     @answers_refusals
     async def options(self, request: Request) -> Response:
-        """Return the WebAuthn options of a new passkey."""
+        """Return the WebAuthn options for a new passkey."""
         found = await asyncio.to_thread(
             self._passkeys.registration, _person(request), _party(request), address_of(request)
         )
@@ -163,7 +163,7 @@ def _person(request: Request) -> Principal:
 def _party(request: Request) -> RelyingParty:
     authority = parse_host(request.headers["host"])
     if authority is None:
-        raise ApiError(400, "the request names no host")  # the page policy refused it before
+        raise ApiError(400, "the request names no host")  # the page policy has already refused it
     return relying_party(authority.host, authority.port)
 
 

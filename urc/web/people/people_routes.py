@@ -1,6 +1,6 @@
-"""All routes for people, devices, tokens and sign-ins of one server.
+"""All of a server's routes for people, devices, tokens and sign-ins.
 
-Layer 5. Only wires.
+Layer 5. The module contains only wiring.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -23,7 +23,7 @@ __all__ = ["PeopleRoutes"]
 
 
 class PeopleRoutes:
-    """The routes."""
+    """The routes for people, devices, tokens and sign-ins."""
 
     def __init__(
         self,
@@ -35,11 +35,11 @@ class PeopleRoutes:
         ways: NavigationLinks,
         data: Path | None,
     ) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             ways_in: the sign-in methods.
-            stoppable: function that returns all robots with motion.
+            stoppable: function that returns all robots that can move.
             robots: function that returns the titles of all robots, keyed by their names in URLs.
             tags_of: function that returns a robot's tags.
             ways: navigation links of this server.
@@ -64,5 +64,5 @@ class PeopleRoutes:
         return {name: one for part in self._calls for name, one in part.endpoints().items()}
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of the pages."""
+        """Return the routes for the pages."""
         return [route for one in self._pages for route in one.routes()]

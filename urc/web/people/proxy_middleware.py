@@ -1,7 +1,7 @@
 """Requests from trusted proxies: the person in the proxy's header becomes the request's visitor.
 
-Layer 5. This ASGI middleware is outermost. It removes proxy headers from all requests, so no other
-part of the server can see or trust a forged header.
+Layer 5. This is the outermost ASGI middleware. It removes proxy headers from all requests, so no
+other part of the server can see or trust a forged header.
 
 Theory of operation. Each request contains the proxy's proof. A browser's first request opens a
 sign-in, whose secret never leaves this process. The middleware adds the secret to the request's
@@ -44,12 +44,12 @@ class _Browser(NamedTuple):
 
 
 class ProxyMiddleware:
-    """The middleware."""
+    """The outermost middleware."""
 
     def __init__(
         self, app: ASGIApp, sign_ins: BrowserSignIns, proxies: Sequence[TrustedProxy]
     ) -> None:
-        """Prepare.
+        """Create the middleware.
 
         Args:
             app: the wrapped application, with the page policy.

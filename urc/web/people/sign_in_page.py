@@ -1,6 +1,6 @@
 """The sign-in page, which replaces the requested page for every visitor who has not signed in.
 
-Layer 5. The page also has a STOP button for each robot with motion.
+Layer 5. The page also has a STOP button for each robot that can move.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,10 +23,10 @@ _REFUSED: Final = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class Stoppable(NamedTuple):
-    """A robot with motion."""
+    """A robot that can move."""
 
     name: str
-    """Robot's name in URLs."""
+    """The robot's name in URLs."""
     title: str
 
     @property
@@ -45,7 +45,7 @@ class FurtherWays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """Context of ``door.html.j2``: the sign-in methods or a link to the page, and STOP buttons."""
+    """Context for ``door.html.j2``: the sign-in methods or a link to the page, and STOP buttons."""
 
     head: PageHead
     url: str
@@ -73,11 +73,11 @@ class SignInPages:
         robots: Callable[[], Iterable[Stoppable]],
         ways: FurtherWays = FurtherWays(),  # noqa: B008 - immutable
     ) -> None:
-        """Prepare.
+        """Create the pages.
 
         Args:
             access: the identities and rights of the server.
-            robots: function that returns all robots with motion.
+            robots: function that returns all robots that can move.
             ways: additional sign-in methods.
         """
         self._access = access

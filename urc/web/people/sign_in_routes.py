@@ -23,10 +23,10 @@ __all__ = ["SignInRoutes"]
 
 
 class SignInRoutes:
-    """The routes."""
+    """The routes for signing in and out."""
 
     def __init__(self, sign_ins: BrowserSignIns) -> None:
-        """Prepare.
+        """Create the routes.
 
         Args:
             sign_ins: the sign-ins of all browsers.
@@ -74,7 +74,7 @@ class SignInRoutes:
         if who.kind in ("person", "guest"):
             self._sign_ins.recorder.signed_out(actor_of(request))
         if who.kind == "person":  # other guests may use the same link
-            with suppress(AccessError):  # ended meanwhile
+            with suppress(AccessError):  # it has ended in the meantime
                 await access.control.end_sign_in(who.sign_in)
         done = answer(SignInResult(""))
         for line in access.forgotten(request.scope["headers"]):

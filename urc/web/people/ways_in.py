@@ -20,23 +20,23 @@ __all__ = ["SignInOptions", "WaysIn"]
 
 
 class SignInOptions(NamedTuple):
-    """Options of the sign-in methods."""
+    """Options for the sign-in methods."""
 
     oidc: OidcOptions | None = None
-    """Options of the identity provider; None if there is no provider."""
+    """Options for the identity provider; None if there is no provider."""
     proxies: tuple[TrustedProxy, ...] = ()
-    """Trusted proxies, which identify the person of a request."""
+    """Trusted proxies, which identify the person behind each request."""
 
 
 class WaysIn:
     """The sign-in methods of one server."""
 
     def __init__(self, access: Access, recorder: ServerRecorder, options: SignInOptions) -> None:
-        """Prepare.
+        """Create the sign-in methods.
 
         Args:
             access: identities and rights.
-            recorder: recorder of sign-ins in the audit log.
+            recorder: recorder that writes sign-ins to the audit log.
             options: the options.
 
         Raises:

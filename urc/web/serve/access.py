@@ -52,14 +52,15 @@ class Access:
         key: str = "",
         instance: str = "",
     ) -> None:
-        """Prepare.
+        """Set up access to one server.
 
         Args:
             control: identities and rights; None creates a control with only the local user.
             anonymous: role of visitors who have not signed in; None permits them only to press
                 STOP.
             key: the start key of a server without `control`; "" to generate a key.
-            instance: identifier of this server start in cookie names; "" to generate an identifier.
+            instance: identifier of this server start, used in cookie names; "" to generate an
+                identifier.
         """
         self.control = control or AccessControl(key=key)
         self.anonymous = anonymous

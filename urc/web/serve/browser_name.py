@@ -1,6 +1,6 @@
 """The name of a browser and its operating system, for lists of sign-ins.
 
-Layer 5. Pure. The browser itself sends this information, so it proves nothing.
+Layer 5. Pure. The browser itself sends this information, so the name proves nothing.
 """
 
 from typing import Final

@@ -39,7 +39,7 @@ class LoadedCertificate(NamedTuple):
     name: str
     """A host name or address from the certificate."""
     authority: bytes
-    """The local authority in PEM, for devices to trust; b"" for a given certificate."""
+    """The local authority in PEM format, for devices to trust; b"" for a given certificate."""
     notes: tuple[str, ...] = ()
     """Notes for the operator, for example about a new authority."""
 
@@ -58,7 +58,7 @@ class LocalCertificate:
     """A certificate from the local authority, for this machine's names and addresses."""
 
     def __init__(self, folder: Path, host: str, allowed_hosts: Iterable[str] = ()) -> None:
-        """Prepare.
+        """Store the folder and the names.
 
         Args:
             folder: the authority's folder.
@@ -114,7 +114,7 @@ class GivenCertificate:
     """A certificate and a key from the operator's files."""
 
     def __init__(self, chain: Path, key: Path) -> None:
-        """Prepare.
+        """Store the paths of the files.
 
         Args:
             chain: PEM file with the server's certificate, followed by intermediate certificates.
@@ -128,7 +128,7 @@ class GivenCertificate:
         """Read both files.
 
         Raises:
-            UrcError: a file cannot be read, or certificate and key do not match.
+            UrcError: a file cannot be read, or the certificate and key do not match.
         """
         self._seen = self._stamps()
         try:
@@ -168,7 +168,7 @@ class Certificates:
     """The current certificate of a running server."""
 
     def __init__(self, source: CertificateSource, first: LoadedCertificate) -> None:
-        """Begin with a certificate loaded from `source`."""
+        """Start with a certificate loaded from `source`."""
         self._source = source
         self.current = first
 
@@ -204,7 +204,7 @@ class Certificates:
 
 
 def names_of(host: str, allowed_hosts: Iterable[str]) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the required and the optional names and addresses of a certificate.
+    """Return the required and the optional names and addresses for a certificate.
 
     The page policy accepts the same names. Public IPv6 addresses are omitted if the machine has
     other addresses, because providers change them often and the authority must list each address.

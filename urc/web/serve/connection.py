@@ -26,8 +26,8 @@ the oldest idle connection from the address with the most idle connections."""
 RESERVE = 64
 """Number of additional connections that accept only STOP, used while no connection is idle."""
 REQUEST_S = 5.0
-"""Time limit for receiving a complete request with its body, in seconds. The time starts when
-the connection opens for the first request, and at the first byte for later requests."""
+"""Time limit for receiving a complete request with its body, in seconds. For the first request, the
+time starts when the connection opens; for later requests, at the first byte."""
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
@@ -112,11 +112,11 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def handle_events(self) -> None:
-        """Read the requests in the received bytes, STOP immediately and others in turn."""
+        """Read the requests in the received bytes: STOP immediately, and all others in turn."""
         if self._is_urgent:
             super().handle_events()
         elif not self._turns.take(self, self._handle_events):
-            self.flow.pause_reading()  # the turn resumes it
+            self.flow.pause_reading()  # the turn resumes reading
 
     def _handle_events(self) -> None:
         if self.transport.is_closing():
@@ -136,7 +136,7 @@ class HttpConnection(H11Protocol):
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def shutdown(self) -> None:
-        """Allow the response in progress to end; the server calls this method when it ends."""
+        """Allow the response in progress to end; called when the server ends."""
         super().shutdown()
         self._closing.set()
 
@@ -192,5 +192,5 @@ class HttpConnection(H11Protocol):
         if self.conn.our_state is h11.IDLE:
             self.transport.write(refusal(status, text))
             self.transport.close()
-        else:  # the application is responding, and a second response would corrupt its response
+        else:  # the application is responding, and a second response would corrupt the first
             self.transport.abort()

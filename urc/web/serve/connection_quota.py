@@ -1,4 +1,4 @@
-"""Limits on the concurrent requests of one visitor, so that other visitors can still connect.
+"""Limits on each visitor's concurrent requests, so that other visitors can still connect.
 
 Layer 5. Pure. Each person, device and program has a separate count; unknown visitors are
 counted by address. STOP requests are not counted, because they are always accepted.
@@ -18,8 +18,8 @@ PLACES = 32
 sockets and six requests, so the limit permits several pages, and a few people behind one
 address."""
 KNOWN_PLACES = 256
-"""Maximum number of concurrent requests and sockets of one known person, device or program. A known
-visitor may watch many robots."""
+"""Maximum number of concurrent requests and sockets from one known person, device or program. A
+known visitor may watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 
@@ -30,10 +30,10 @@ def is_stop(method: str, path: str) -> bool:
 
 
 class ConnectionQuota:
-    """Counters of concurrent requests by visitor."""
+    """Counters of concurrent requests, one for each visitor."""
 
     def __init__(self) -> None:
-        """Begin with zero."""
+        """Start all counts at zero."""
         self._taken: Counter[str] = Counter()
 
     @contextmanager

@@ -27,7 +27,7 @@ class WebSocketFrames:
         self._is_between = True
         """Whether the next byte starts a new message."""
         self._left = 0
-        """Number of missing bytes of the current frame."""
+        """Number of bytes still missing from the current frame."""
         self._head = b""
         """Bytes of an incomplete frame header."""
         self._is_inside = False

@@ -58,8 +58,8 @@ _FIXED_HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (
         b"permissions-policy",
-        # Only URC's own origin has the features needed for driving; all others are off, also for
-        # widgets.
+        # Only URC's own origin has the features needed for driving. All other features are off,
+        # even for widgets.
         b"accelerometer=(self), gyroscope=(self), magnetometer=(self), gamepad=(self), "
         b"fullscreen=(self), screen-wake-lock=(self), camera=(), microphone=(), geolocation=(), "
         b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
@@ -172,7 +172,7 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 
 
 def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
-    """Return a frame's policy, which permits only code from URC and one widget.
+    """Return a frame's policy, which permits only code from URC and from one widget.
 
     The policy has no nonce, because a nonce would permit scripts and styles from any address. Any
     request to a foreign address can leak data. The digest permits only the import map.
@@ -241,7 +241,7 @@ class Policy:
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
             if not origins and scope["state"]["visitor"].is_program:
-                pass  # pages of other sites cannot send a token
+                pass  # pages from other sites cannot send a token
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")
@@ -254,11 +254,11 @@ class Policy:
 
 
 class _Answer:
-    """A wrapper of `send` that adds the page policy's headers to a response.
+    """A wrapper around `send` that adds the page policy's headers to a response.
 
-    A route may set three keys in the request state. ``frame_policy`` is a frame's policy in place
-    of the page policy. ``is_code`` marks files that frames may also load. ``is_file`` marks
-    third-party content, which must not act as a page of URC when opened directly.
+    A route may set three keys in the request state. ``frame_policy`` is a frame's policy, which
+    replaces the page policy. ``is_code`` marks files that frames may also load. ``is_file`` marks
+    third-party content, which must not act as a URC page when opened directly.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:

@@ -43,7 +43,7 @@ class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     code: str
     """Reason code for programs, such as ``not-found``."""
     message: str
-    """Reason for people, in one line."""
+    """Reason for human readers, in one line."""
     error: str
     """Same as `message`; earlier versions had only this key."""
 

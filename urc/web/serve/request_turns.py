@@ -1,8 +1,8 @@
-"""Turns for the requests of all visitors, so that a crowd does not delay the ticks of a page.
+"""Turns for all visitors' requests, so that a crowd does not delay a page's ticks.
 
 Layer 5. The event loop runs everything that is ready before it reads sockets again. Hundreds of
-requests that arrive together would therefore delay a tick by more than a lease. Decision record:
-docs/decisions/0051-a-crowd-waits-for-turns.md.
+requests that arrive together would therefore delay a tick by more than the duration of a lease.
+Decision record: docs/decisions/0051-a-crowd-waits-for-turns.md.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ class RequestTurns:
     """The connections of one server with unread requests, oldest first."""
 
     def __init__(self, *, most: int = REQUESTS_AT_ONCE) -> None:
-        """Begin without connections.
+        """Start with no connections.
 
         Args:
             most: maximum number of turns in one iteration of the event loop.

@@ -63,8 +63,8 @@ class Right(NamedTuple):
 
 
 FRESH_S: Final = 300.0
-"""Period after a sign-in during which people can change packages, settings and rights, in seconds.
-A tablet that was left signed in is therefore not enough."""
+"""Time after a sign-in, in seconds, during which people can change packages, settings and rights. A
+tablet that was left signed in is therefore not enough."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
@@ -106,7 +106,7 @@ class ProtectedRoute(Route):
         self.right = right
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Call the endpoint; raise `HTTPException` 403 without the right."""
+        """Call the endpoint; raise `HTTPException` 403 for visitors without the right."""
         if not _may(scope, self.right):
             raise HTTPException(403, self.right.refusal)
         if self.right.is_fresh and not scope["state"]["visitor"].is_fresh:

@@ -94,7 +94,7 @@ async def serve(
 
 
 def _config(app: ASGIApp, connection: Callable[..., asyncio.Protocol]) -> uvicorn.Config:
-    """Return the configuration of the HTTP server."""
+    """Return the configuration for the HTTP server."""
     return uvicorn.Config(
         app,
         loop="none",
@@ -118,7 +118,7 @@ def _config(app: ASGIApp, connection: Callable[..., asyncio.Protocol]) -> uvicor
 def _first_bytes(
     handshakes: Handshakes, connection: Callable[..., asyncio.Protocol], **options: Any
 ) -> FirstBytes:
-    """Return the protocol of a new connection to a port with TLS."""
+    """Return the protocol for a new connection to a TLS port."""
     return FirstBytes(handshakes, partial(connection, **options))
 
 
@@ -308,7 +308,8 @@ def _ending(server: _UvicornServer) -> Iterator[None]:
     caught: list[signal.Signals] = []
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # In a thread and on Windows, loops have no signal handlers, so the caller's handlers stay.
+        # In a thread and on Windows, loops have no signal handlers, so the caller's handlers stay
+        # in place.
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
             loop.add_signal_handler(number, server.end)
             caught.append(number)

@@ -88,7 +88,7 @@ def _watchdog_s(environment: Mapping[str, str]) -> float:
 async def answers(url: str, within_s: float) -> bool:
     """Return whether a server answers a plain HTTP request for `/healthz` in time.
 
-    Any answer counts, even a refusal because of too many connections, because a busy server is not
+    Any answer counts, even a refusal due to too many connections, because a busy server is not
     broken.
 
     Args:

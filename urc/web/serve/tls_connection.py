@@ -38,7 +38,8 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             context: certificate and options of the server.
             make: function that creates the upper protocol after the handshake.
             on_data: callback for received handshake data, which `continue_handshake` processes.
-            on_end: callback when the handshake has succeeded, failed or lost its connection.
+            on_end: callback that is called when the handshake has succeeded, failed or lost its
+                connection.
         """
         super().__init__()
         self._tcp = tcp
@@ -52,7 +53,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._out = ssl.MemoryBIO()
         self._tls = context.wrap_bio(self._in, self._out, server_side=True)
         self._protocol: asyncio.BaseProtocol | None = None
-        """The upper protocol; None before the handshake and after the connection's end."""
+        """The upper protocol; None before the handshake and after the connection has ended."""
         self._is_ready = False
         self._is_reading = True
         self._is_closing = False

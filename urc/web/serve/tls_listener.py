@@ -36,12 +36,12 @@ class Handshakes:
         most: int = HANDSHAKES,
         limit_s: float = HANDSHAKE_S,
     ) -> None:
-        """Begin without connections.
+        """Start with no connections.
 
         Args:
             context: function that returns the current certificate and options.
             most: maximum number of unfinished handshakes.
-            limit_s: time limit of a handshake, in seconds.
+            limit_s: time limit for a handshake, in seconds.
         """
         self.context = context
         self._most = most
@@ -57,7 +57,7 @@ class Handshakes:
         return len(self._open)
 
     def add(self, one: "FirstBytes") -> None:
-        """Set the time limit of a new connection; if there are too many connections, close one."""
+        """Set the time limit for a new connection; if there are too many connections, close one."""
         loop = asyncio.get_running_loop()
         self._open[one] = loop.call_later(self._limit_s, one.abort)
         if len(self._open) > self._most:
@@ -113,7 +113,7 @@ class FirstBytes(asyncio.Protocol):
     """The protocol of a new connection until its first bytes show TLS or plain HTTP."""
 
     def __init__(self, handshakes: Handshakes, make: Callable[[], asyncio.Protocol]) -> None:
-        """Prepare.
+        """Create the protocol.
 
         Args:
             handshakes: the unfinished handshakes of the server.

@@ -1,8 +1,9 @@
 """Plain HTTP on a TLS port, and TLS from a web server in front of URC.
 
 Layer 5. The module contains two ASGI middlewares around the application. `TlsPort` redirects plain
-HTTP to HTTPS. Exceptions are connections from this machine, STOP, and the pages that a device needs
-before it trusts the certificate. `BehindProxy` sets the secure scheme of requests to public names.
+HTTP to HTTPS. The exceptions are connections from this machine, STOP, and the pages that a device
+needs before it trusts the certificate. `BehindProxy` sets the secure scheme for requests to public
+names.
 """
 
 import ipaddress
@@ -34,14 +35,14 @@ _PLAIN = re.compile(
 
 
 class TlsPort:
-    """The middleware of a TLS port."""
+    """The middleware for a TLS port."""
 
     def __init__(self, app: ASGIApp, allowed_hosts: Iterable[str] = ()) -> None:
-        """Prepare.
+        """Create the middleware.
 
         Args:
             app: the application.
-            allowed_hosts: additional host names to redirect, besides addresses and this machine's
+            allowed_hosts: host names to redirect, in addition to addresses and this machine's
                 names.
         """
         self._app = app
@@ -59,10 +60,10 @@ class TlsPort:
 
 
 class BehindProxy:
-    """The middleware of a server that has public names behind a web server that provides TLS."""
+    """The middleware for a server with public names, behind a web server that provides TLS."""
 
     def __init__(self, app: ASGIApp, names: Iterable[str]) -> None:
-        """Prepare.
+        """Create the middleware.
 
         Args:
             app: the application.

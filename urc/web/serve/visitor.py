@@ -43,12 +43,12 @@ class Visitor:
     def __init__(
         self, rights: VisitorRights, identity: Identity = NOBODY, *, is_program: bool = False
     ) -> None:
-        """Keep the identity.
+        """Store the identity.
 
         Args:
             rights: source of the current rights.
             identity: the proven identity; `NOBODY` for an unknown visitor.
-            is_program: whether the request contains a token, valid or not. Pages of other sites
+            is_program: whether the request contains a token, valid or not. Pages from other sites
                 cannot send such requests.
         """
         self._rights = rights
@@ -144,7 +144,7 @@ def peer_of(connection: HTTPConnection, robot: str, *, only_watches: bool = Fals
     Args:
         connection: the handshake.
         robot: name of the robot.
-        only_watches: whether the page may only watch; pages with ``?watch`` always only watch.
+        only_watches: whether the page may only watch; pages with ``?watch`` may never do more.
     """
     visitor = visitor_of(connection)
     host = connection.client.host if connection.client else ""

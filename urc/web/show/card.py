@@ -1,6 +1,6 @@
 """The content of a robot's menu card: a camera image, its picture, its world, or the main values.
 
-Layer 5. A card never connects a robot. A robot with a picture shows the picture, or its camera
+Layer 5. A card never connects to a robot. A robot with a picture shows the picture, or its camera
 while it is connected. An emulated robot without a picture shows its simulated world. A real robot
 without a picture shows data while it is connected, and the last image afterwards.
 """
@@ -23,7 +23,7 @@ from urc.web.words import t
 __all__ = ["VALUES", "Cards", "small_values"]
 
 VALUES = 4
-"""Maximum number of displayed values on a card without an image."""
+"""Maximum number of values displayed on a card without an image."""
 _FRESH = {"cache-control": "no-store"}
 _UNSHOWN = ("image", "blob", "array")
 

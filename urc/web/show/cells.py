@@ -58,7 +58,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class WidgetContext:
-    """Context of ``widgets/*/template.html.j2``; its fields are the variables of the template.
+    """Context for ``widgets/*/template.html.j2``; its fields are the variables of the template.
 
     The page shows the markup before the widget's module has loaded, so the markup must be
     understandable without values.
@@ -70,8 +70,8 @@ class WidgetContext:
     options: Mapping[str, object]
     """Checked options. Every declared option has a key; None means that the option has no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Signal of each input, or list of signals of each multiple input, by input name.
-    Unbound inputs are omitted."""
+    """Each input's signal, or each multiple input's list of signals, by input name. Unbound inputs
+    are omitted."""
     widget: str
     """The widget's name."""
     uid: str
@@ -82,7 +82,7 @@ class WidgetContext:
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
-    """Return the widget's markup; propagate any exception of its template."""
+    """Return the widget's markup; propagate any exception from its template."""
     source, variables = _source(widget), _variables(context)
     return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
 

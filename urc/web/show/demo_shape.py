@@ -97,9 +97,9 @@ _FOLLOW: Final = dict.fromkeys(
 
 
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
-    """Return all problems of a demo.
+    """Return all problems in a demo.
 
-    A demo's states refer to its bindings, so the options of states are checked only if the bindings
+    A demo's states refer to its bindings, so the states' options are checked only if the bindings
     are valid.
     """
     data = document.data

@@ -1,6 +1,6 @@
 """A widget's ``demo.yaml``: its states, each as a small robot with fixed values.
 
-Layer 5. The gallery, the tests and the images of the manual use these states.
+Layer 5. The gallery, the tests and the manual's images use these states.
 """
 
 import base64

@@ -1,4 +1,4 @@
-"""Routes of the files and third-party pages that a robot's documents list for widgets.
+"""Routes for the files and third-party pages that a robot's documents list for widgets.
 
 Layer 5. A document without scripts displays a third-party page in a frame. The dashboard's policy
 permits only frames from the dashboard's own origin. The document around the third-party page has a
@@ -27,7 +27,7 @@ from urc.web.show.pages import render
 
 __all__ = ["FramedPage", "ExternalPages", "framed_page"]
 
-# White, as pages without a background expect; a dark page paints its own.
+# White, as pages without a background expect; a dark page paints its own background.
 _STYLE: Final = Markup(
     "html,body,iframe{display:block;width:100%;height:100%;margin:0;border:0;background:white}"
 )
@@ -40,7 +40,7 @@ _POLICY: Final = (
 
 @dataclass(frozen=True, slots=True)
 class FramedPage:
-    """Context of ``framed.html.j2``: the document around one third-party page."""
+    """Context for ``framed.html.j2``: the document around one third-party page."""
 
     title: str
     """Host name of the third-party page."""
@@ -53,7 +53,7 @@ class FramedPage:
 
 
 class ExternalPages:
-    """The routes of files and third-party pages.
+    """The routes for files and third-party pages.
 
     Args:
         robots: function that returns the served robots, keyed by their names in URLs.
@@ -63,7 +63,7 @@ class ExternalPages:
         self._robots = robots
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the routes of files and third-party pages."""
+        """Return the routes for files and third-party pages."""
         return [
             ProtectedRoute("/robots/{name}/files/{file:path}", self._file, WATCH),
             ProtectedRoute("/robots/{name}/framed/{page}", self._page, WATCH),
@@ -85,7 +85,7 @@ class ExternalPages:
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
     """Return the document around a page from a widget option; respond with 404 for other pages.
 
-    Pages of this server are refused, because they could access the dashboard from the frame.
+    Pages from this server are refused, because they could access the dashboard from the frame.
     """
     pages = (many for use in uses_of(profile) for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}

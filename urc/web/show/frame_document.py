@@ -25,7 +25,7 @@ __all__ = ["FramePage", "FrameDocuments"]
 
 @dataclass(frozen=True, slots=True)
 class FramePage:
-    """Context of ``frame.html.j2``: the document around one third-party widget."""
+    """Context for ``frame.html.j2``: the document around one third-party widget."""
 
     title: str
     import_map: Markup
@@ -37,10 +37,10 @@ class FramePage:
 
 
 class FrameDocuments:
-    """Makes the documents.
+    """A maker of the documents.
 
     Args:
-        modules: import map of the pages.
+        modules: the pages' import map.
         has: function that returns whether a named widget exists.
         place: path prefix of code for frames.
     """

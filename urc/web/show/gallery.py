@@ -115,7 +115,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class GalleryEntry:
-    """One widget in the list of the gallery."""
+    """One widget in the gallery's list."""
 
     name: str
     title: str
@@ -127,7 +127,7 @@ class GalleryEntry:
 
 @dataclass(frozen=True, slots=True)
 class GalleryPage:
-    """Context of ``widgets.html.j2``: the list of all widgets."""
+    """Context for ``widgets.html.j2``: the list of all widgets."""
 
     head: PageHead
     nav: Nav
@@ -168,14 +168,14 @@ class WidgetProblem:
 
 @dataclass(frozen=True, slots=True)
 class DemoPage:
-    """Context of ``widget.html.j2``: widgets in their demo states."""
+    """Context for ``widget.html.j2``: widgets in their demo states."""
 
     head: PageHead
     title: str
     summary: str
     exhibits: tuple[DemoView, ...]
     faults: tuple[WidgetProblem, ...]
-    """Problems of widgets that cannot be shown."""
+    """Problems in widgets that cannot be shown."""
     stamp_url: str
     """URL of the current stamp, for reloads after an edit; "" for a page that does not reload."""
     stamp: str
@@ -186,7 +186,7 @@ class Gallery:
     """Pages and files of all widgets in the gallery.
 
     Args:
-        modules: import map of the pages.
+        modules: the pages' import map.
         profiles: function that returns the profiles of the served robots.
         is_dev: whether pages reload when one of their widgets' files is saved.
         ways: navigation links of this server.
@@ -211,7 +211,7 @@ class Gallery:
         """Files of the shown widgets, including unused widgets."""
 
     def routes(self) -> list[ProtectedRoute]:
-        """Return the gallery's routes, which must precede the route of the widget files."""
+        """Return the gallery's routes, which must precede the route for the widget files."""
         return [
             ProtectedRoute("/widgets", self.index, SIGNED_IN),
             ProtectedRoute("/widgets/", self.index, SIGNED_IN),

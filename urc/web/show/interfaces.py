@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 DEBUGGING: Final = Interface(DEBUG, "Debug")
-"""Placeholder for the debug interface, because the debug interface has no grid."""
+"""Placeholder for the debug interface, which has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
 """Name of the cookie that stores the interface that this device last showed for a robot. The
@@ -61,7 +61,7 @@ class PageTab:
 
 @dataclass(frozen=True, slots=True)
 class DebugPart:
-    """Context of ``debug.html.j2``: all of a robot's signals and commands."""
+    """Context for ``debug.html.j2``: all of a robot's signals and commands."""
 
     signals: tuple[Signal, ...]
     commands: str
@@ -95,7 +95,7 @@ def choices(
 
     Args:
         profile: profile of the robot.
-        interface: the shown interface.
+        interface: the interface that the page shows.
         url: path of the robot's page.
         more: suffix of each URL.
     """

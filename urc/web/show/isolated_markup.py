@@ -4,7 +4,7 @@
 input, and writes the markup to standard output. Layer 5.
 
 The template sandbox blocks access to Python objects but cannot stop endless loops. Markup is
-cached, because it depends only on template, variables and language.
+cached, because it depends only on the template, variables and language.
 """
 
 import json
@@ -26,8 +26,8 @@ __all__ = ["MOST_CHARACTERS", "RenderedMarkup", "markup_of"]
 MOST_CHARACTERS: Final = 65536
 """Maximum number of characters in the markup of one cell."""
 TOTAL_S: Final = 20.0
-"""Time limit for rendering several templates together, in seconds. It is long enough for slow or
-busy machines."""
+"""Time limit for rendering several templates together, in seconds. The limit is long enough even
+for slow or busy machines."""
 PROCESSOR_S: Final = 4
 MEMORY_BYTES: Final = 512 << 20
 _COMMAND: Final = ("-P", "-m", "urc.web.show.isolated_markup")

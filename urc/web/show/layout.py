@@ -4,22 +4,22 @@ Layer 5. Pure. The rules contain only numbers, so no text from a document can cl
 element.
 
 A row or column without a slot is a margin. The margin keeps its position, at an eighth of the
-normal size. Phones show no margins. A phone in portrait shows the first available grid of
-``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``portrait`` or
+normal size. Phones show no margins. A phone in portrait shows the first grid that is available out
+of ``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``portrait`` or
 ``landscape`` in reading order if the grid has more than two columns. A phone in landscape shows
 ``phone_landscape``, or else ``landscape``.
 
-Over a background, each widget has the size of its footprint, and is placed at its slot's side of
+Over a background, each widget has the size of its footprint, and is placed on its slot's side of
 the screen. Empty rows and columns fill the remaining space, where the background is visible. On a
-phone in portrait, the background fills the space above the widgets; the values of the first rows
+phone in portrait, the background fills the space above the widgets; the values in the first rows
 are over its lower edge.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
 extend down next to it. Over a background, columns of buttons and values in the corners also extend
 down, but rows of buttons and values do not.
 
-A screen's grid can lack slots of the wide grid. A button then switches to a second page with these
-slots.
+A screen's grid can lack slots of the base grid, which is ``landscape`` or else the first grid. A
+button then switches to a second page with these slots.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -46,9 +46,9 @@ LEFT_HAND = ':root[data-hand="left"]'
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
 """Row height on a phone in landscape, where two such rows fit on the screen. A phone in portrait
-uses it for rows of values and buttons, so that a stick next to two of them is above STOP."""
+uses it for rows of values and buttons, so that a stick next to two such rows is above STOP."""
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
-"""Sizes of rows and columns over a background: with a widget, and empty."""
+"""Sizes of rows and columns over a background: with a widget, and without."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _GAP = "var(--urc-space-3)"
@@ -61,7 +61,7 @@ _SHRINKING = ("value", "instrument", "view", "list")
 _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-drive)"}
 """Heights of footprints with a fixed height."""
 _SOFT = "minmax(3.625rem,max-content)"
-"""Height of a shrinking row, at least the height of a value."""
+"""Height of a shrinking row: at least the height of a value."""
 _SIDES = ("start", "center", "end")
 
 
@@ -280,7 +280,7 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
 
 
 def _kinds(row: int, grid: Layout, canvas: _Canvas) -> set[str]:
-    """Return the footprints of the widgets that have only this row."""
+    """Return the footprints of the widgets that occupy only this row."""
     return {
         canvas.footprints.get(slot.name, "")
         for slot in grid.slots
@@ -316,7 +316,7 @@ def _is_corner(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
 
 
 def _has_neighbour(slot: Slot, grid: Layout) -> bool:
-    """Return whether a slot is next to another slot of the last row."""
+    """Return whether a slot is next to another slot in the last row."""
     ends = (slot.column, slot.column + slot.column_span)
     return any(
         other.row + other.row_span == grid.rows
@@ -362,7 +362,7 @@ def _third(first: int, span: int, count: int) -> int:
 
 
 def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> str:
-    """Return the rules of one cell; with `is_below`, the background fills the first row."""
+    """Return the rules for one cell; with `is_below`, the background fills the first row."""
     if slot is None:
         return "display:none"
     row, column = slot.row + 1 + is_below, slot.column + 1

@@ -34,7 +34,7 @@ class NavigationLinks:
 
 @dataclass(frozen=True, slots=True)
 class Nav:
-    """Context of ``nav.html.j2``: the navigation bar."""
+    """Context for ``nav.html.j2``: the navigation bar."""
 
     current: str
     """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
@@ -61,7 +61,7 @@ class Card:
     """One robot, as shown on the menu."""
 
     name: str
-    """Robot's name in URLs."""
+    """The robot's name in URLs."""
     title: str
     summary: str
     url: str
@@ -97,7 +97,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class MenuPage:
-    """Context of ``menu.html.j2``: the served robots."""
+    """Context for ``menu.html.j2``: the served robots."""
 
     head: PageHead
     nav: Nav

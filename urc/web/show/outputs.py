@@ -99,7 +99,7 @@ def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return the required confirmations of a command, and of single argument values."""
+    """Return the confirmations required for a command and for single argument values."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]
@@ -164,7 +164,7 @@ def _ranges(
 def _rest(command: Command, argument: Argument, least: float) -> float:
     stop = _release_of(command).get(argument.name, argument.default)
     is_number = isinstance(stop, (int, float)) and not isinstance(stop, bool)
-    return float(stop) if is_number else max(0.0, least)  # type: ignore[arg-type]  # it is one
+    return float(stop) if is_number else max(0.0, least)  # type: ignore[arg-type]  # a number
 
 
 def _neutral(command: Command | None, port: WidgetPort, given: OutputBinding) -> dict[str, Reading]:

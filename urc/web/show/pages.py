@@ -69,12 +69,12 @@ class PageHead:
 
 @dataclass(frozen=True, slots=True)
 class RobotPage:
-    """Context of ``robot.html.j2``: a live interface of a robot."""
+    """Context for ``robot.html.j2``: a robot's live interface."""
 
     head: PageHead
     title: str
     url: str
-    """Path of the page, to return to it from the sign-in page."""
+    """Path of the page, for returning from the sign-in page."""
     socket: str
     """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]
@@ -110,13 +110,13 @@ class RobotPage:
     hints: str
     """The driver's hints for lost connections, by transport, as a JSON object."""
     on_demand: str
-    """Transports that only commands open, as a JSON list. Without them, the robot does not count as
-    lost."""
+    """Transports that only commands open, as a JSON list. The robot does not count as lost while
+    they are closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """Context of ``error.html.j2``: a one-sentence message and a link back."""
+    """Context for ``error.html.j2``: a one-sentence message and a link back."""
 
     head: PageHead
     status: int
@@ -146,7 +146,7 @@ class RobotPageRequest:
     is_watching: bool = False
     """Whether the page may only watch."""
     is_part: bool = False
-    """Whether an open page requests this page to switch its interface."""
+    """Whether an open page requests this page in order to switch its interface."""
     may_act: bool = True
     """Whether the visitor has the role ``drive`` for the robot."""
     dev_url: str = ""
@@ -160,7 +160,7 @@ def robot_page(
     server: ServerParts,
     request: RobotPageRequest,
 ) -> str:
-    """Return the page of one of a robot's interfaces.
+    """Return the page for one of a robot's interfaces.
 
     Another process renders third-party widgets; the call blocks until that process has ended.
 
@@ -168,7 +168,7 @@ def robot_page(
         name: the robot's name in URLs.
         robot: the robot or playback.
         interface: the interface to show.
-        server: the shared parts of all pages.
+        server: the parts that all pages share.
         request: the visitor's request.
     """
     profile, is_recorded = robot.profile, robot.playback is not None

@@ -27,7 +27,7 @@ FIRST_HEADING = 4
 
 
 def markdown(text: str) -> Markup:
-    """Return a CommonMark text as HTML, with support for tables and strikethrough."""
+    """Return CommonMark text as HTML, with support for tables and strikethrough."""
     parser = _parser()
     tokens = parser.parse(text)
     _lower_headings(tokens)

@@ -29,7 +29,7 @@ _HEADERS = {"cache-control": "no-store"}
 
 @dataclass(frozen=True, slots=True)
 class DeviceGuide:
-    """A guide for one kind of device, after the download of the certificate."""
+    """A guide for one kind of device, to follow after downloading the certificate."""
 
     name: str
     """Identifier for scripts, such as ``ios``."""
@@ -37,9 +37,9 @@ class DeviceGuide:
     steps: tuple[str, ...]
     """Steps after the download, in order."""
     removal: str
-    """Step to remove the certificate again."""
+    """Step for removing the certificate."""
     command: str = ""
-    """Command of the last step; "" if it has no command."""
+    """Command for the last step; "" if the step has no command."""
     removal_command: str = ""
 
 
@@ -109,7 +109,7 @@ _GUIDES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class TrustPage:
-    """Context of ``trust.html.j2``."""
+    """Context for ``trust.html.j2``."""
 
     head: PageHead
     fingerprint: tuple[str, ...]
@@ -123,10 +123,10 @@ class TrustPage:
 
 
 class TrustPages:
-    """The routes of the connection page and of the authority's certificate."""
+    """The routes for the connection page and for the authority's certificate."""
 
     def __init__(self, certificates: Certificates | None) -> None:
-        """Prepare. Without `certificates`, the server uses plain HTTP."""
+        """Create the routes. Without `certificates`, the server uses plain HTTP."""
         self._certificates = certificates
 
     def routes(self) -> list[ProtectedRoute]:

@@ -1,1 +1,1 @@
-"""Encoders and decoders of the messages on the dashboard's sockets."""
+"""Encoders and decoders for the messages on the dashboard's sockets."""

@@ -1,4 +1,4 @@
-"""Encoder of a robot's alarms for pages.
+"""Encoder of a robot's alarms as messages for pages.
 
 Layer 5. Pure.
 """
@@ -22,11 +22,11 @@ def encode_alarms(
     is_full: bool,
     is_flooded: bool,
 ) -> str:
-    """Return the message with changed alarms.
+    """Return a message with the changed alarms.
 
     Args:
         records: changed alarms.
-        gone: signals whose alarm has become normal.
+        gone: signals whose alarm has returned to normal.
         signals: the robot's signals, with causes and operator actions.
         now: UTC time in seconds since 1970.
         is_full: whether `records` contains all alarms.

@@ -1,4 +1,4 @@
-"""Encoders of the messages about questions and sequences.
+"""Encoders for the messages about questions and sequences.
 
 Layer 5. `urc.web.wire.messages` documents the direction of each message.
 """

@@ -1,4 +1,4 @@
-"""Encoders of the messages about the controls, and the decoder of ticks.
+"""Encoders for the messages about the controls, and the decoder for ticks.
 
 Layer 5. `urc.web.wire.messages` documents the direction of each message.
 """
@@ -88,12 +88,12 @@ def encode_beat(number: int) -> str:
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
-    """Return the message that a control was stopped before its release."""
+    """Return the message that reports a control stopped before its release."""
     return encoded(StoppedMessage(command, reason))
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
-    """Return the message that a tick or a request about the controls was refused."""
+    """Return the message that reports a refused tick or a refused request about the controls."""
     return encoded(RefusedMessage(about, cut(message), command))
 
 

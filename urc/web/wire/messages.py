@@ -1,6 +1,6 @@
-"""Encoders and decoders of the messages on a dashboard's WebSocket.
+"""Encoders and decoders for the messages on a dashboard's WebSocket.
 
-Layer 5. `urc.wire` contains the shapes of the messages. Messages are JSON text in both directions.
+Layer 5. `urc.wire` defines the shapes of the messages. Messages are JSON text in both directions.
 Times are in milliseconds on the server's monotonic clock. Ages are in milliseconds at the time of
 encoding. Messages with values use indexes into the names in `HelloMessage`.
 
@@ -9,19 +9,19 @@ Messages from the server to the page, listed by their tag ``t``::
     hello   once, first: names, meaning of each signal, role of each command, the server's clock
     v       changed signals: i indexes, v values, a ages (one number if all are equal),
             s alarms (left out if all are normal). A signal with a history may have several values,
-            oldest first; e has the number of its first one, by index
+            oldest first; e has the number of its first value, by index
     links   the state of every transport
     log     lines, oldest first; a gap in the numbers shows dropped lines
     reply   the only reply to a command
     pong    the reply to a ping
     error   the reason why a message was invalid, or why the socket closes
 
-    lease   the page that drives, the page that asks to, and the latch of STOP
-    beat    a heartbeat number every 50 ms for the page that drives: its ticks echo it
-    stopped a control stopped before it was let go: it needs a new gesture
+    lease   the page that drives, the page that asks to drive, and the STOP latch
+    beat    a heartbeat number every 50 ms for the page that drives, whose ticks echo it
+    stopped a control stopped before its release; it needs a new gesture
     refused a tick, or a request about the controls, was refused
 
-    ask     a question for a second person; ``asked``: it is over
+    ask     a question for a second person; ``asked`` closes it
     token   the reply to ``prepare``: allows one command, once, within 5 s
     progress the state of the sequences
     alarms  changed alarms of the robot; the first message has all alarms

@@ -1,7 +1,7 @@
 """Images and other byte values of a signal, as binary messages over a dashboard's WebSocket.
 
-Layer 5. Pure. Each message contains one complete image. `urc.wire.picture` defines its layout, and
-``frames.js`` decodes it.
+Layer 5. Pure. Each message contains one complete image. `urc.wire.picture` defines the message's
+layout, and ``frames.js`` decodes the message.
 
 All clients receive identical bytes, so the WebSocket frame is built only once. According to RFC
 6455, section 5.2, a server does not mask frames.
@@ -23,7 +23,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     """Return the binary message with an image.
 
     Args:
-        index: index of the signal in the names of `HelloMessage`.
+        index: index of the signal in the names in `HelloMessage`.
         data: the robot's image.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.

@@ -1,4 +1,4 @@
-"""Encoding of messages to pages: base type, and repair of invalid texts.
+"""Encoding of messages to pages: the base type, and the repair of invalid text.
 
 Layer 5.
 """
@@ -15,7 +15,7 @@ __all__ = [
 ]
 
 TEXT_CHARACTERS = 4096
-"""Maximum length of a text value, in characters; longer texts are cut and end with an ellipsis."""
+"""Maximum length of a text value, in characters; longer text is cut and ends with an ellipsis."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -46,7 +46,7 @@ def repaired(tree: object) -> object:
 
 
 def cut(text: str) -> str:
-    """Return a text, cut to `TEXT_CHARACTERS` characters."""
+    """Return text, cut to `TEXT_CHARACTERS` characters."""
     return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
 
 
