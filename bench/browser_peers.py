@@ -104,7 +104,7 @@ async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
     """Return the ages from one measurement; repeat the measurement if too few values were shown."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
-            await ages(one, SETTLE_S, 0.0)  # it shows values, so its start is over
+            await ages(one, SETTLE_S, 0.0)  # it shows values, so it has started
             try:
                 return await ages(one, seconds, RATE_HZ)
             except TooFew:

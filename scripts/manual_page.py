@@ -20,7 +20,7 @@ def manual_page(date: str) -> str:
     """
     from argparse_manpage.manpage import Manpage
 
-    os.environ["COLUMNS"] = COLUMNS  # argparse breaks lines at the width of the terminal
+    os.environ["COLUMNS"] = COLUMNS  # argparse wraps lines at the terminal's width
     page = Manpage(command_tree(), format="single-commands-section")
     page.date = date
     page.source = f"urc {__version__}"

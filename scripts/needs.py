@@ -92,7 +92,7 @@ NEEDS = (
         purpose="tests of the pages in WebKit",
     ),
     Need(
-        # WebKitGTK's browser has no mode without windows.
+        # WebKitGTK's browser cannot run without a window.
         name="xvfb",
         executables=("Xvfb",),
         package="xvfb",

@@ -18,7 +18,7 @@ def run(work: Coroutine[Any, Any, _Result]) -> _Result:
 
 def _fastest() -> Callable[[], asyncio.AbstractEventLoop] | None:
     """Return the factory of the fastest available event loop; None for Python's default."""
-    if sys.platform == "win32":  # the default loop of Windows cannot watch the pipe to the guard
+    if sys.platform == "win32":  # Windows' default loop cannot watch the pipe to the guard
         return asyncio.SelectorEventLoop
     try:
         import uvloop

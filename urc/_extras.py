@@ -54,7 +54,7 @@ def install_command(extra: str) -> str:
     if Path(sys.prefix, "pipx_metadata.json").is_file():
         return f"pipx inject urc {packages}"
     python = _shown(sys.executable)
-    if find_spec("pip") is None:  # environments of uv have no pip
+    if find_spec("pip") is None:  # uv environments have no pip
         return f"uv pip install --python {python} {packages}"
     return f"{python} -m pip install {packages}"
 

@@ -275,7 +275,7 @@ def _verified(verify: Callable[..., Any], **given: Any) -> Any:
     try:
         return verify(**given)
     except Exception as error:
-        # The library does not catch errors of its parsers, such as KeyError and struct.error.
+        # The library does not catch errors from its parsers, such as KeyError and struct.error.
         log.info("refused a passkey: %s", error)
         raise AccessError(_REFUSED) from None
 

@@ -313,7 +313,8 @@ async def _session(
             profile = await stack.enter_async_context(stand_in(profile, settings, emulated_robot))
         session = Session(profile, settings, transports, motion=motion)
         if keep is not None:
-            # Opened first and closed last, to record the start and end of the session.
+            # The recording opens first and closes last, to capture the start and end of the
+            # session.
             await stack.enter_async_context(keep(session))
         yield await stack.enter_async_context(session)
 

@@ -176,7 +176,7 @@ class RemoteMotion(ProgramControls):
             return
         refusal = await self._ask("leave", lambda: not _is_ours(self.lease))
         if refusal and self.lease is not None:
-            # The server stops the robot of a closed socket.
+            # The server stops a robot whose socket has closed.
             self._socket.abort()
             raise MotionEnded(f"the server did not confirm the stop: {refusal}")
 
