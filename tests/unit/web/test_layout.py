@@ -184,6 +184,13 @@ def test_on_a_phone_in_portrait_the_first_values_are_over_the_background() -> No
     assert '[data-place="ground"]{grid-row:1/4;--urc-ground-foot:calc(2*' in phone
 
 
+def test_on_a_phone_in_portrait_at_most_two_rows_of_values_are_over_the_background() -> None:
+    """More rows would hide the middle of the background, for example the robot on a map."""
+    values: dict[str, Footprint] = dict.fromkeys("abcdefgh", "value")
+    phone = phone_rules("a b", "c d", "e f", "g h", **values)
+    assert '[data-place="ground"]{grid-row:1/4;' in phone
+
+
 def test_on_a_phone_in_portrait_controls_are_never_over_the_background() -> None:
     """Nor are values below or next to a control."""
     for rows in (["go a", "b c"], ["a move", "b move"]):

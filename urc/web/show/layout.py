@@ -11,8 +11,8 @@ of ``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``
 
 Over a background, each widget has the size of its footprint, and is placed on its slot's side of
 the screen. Empty rows and columns fill the remaining space, where the background is visible. On a
-phone in portrait, the background fills the space above the widgets; the values in the first rows
-are over its lower edge.
+phone in portrait, the background fills the space above the widgets; values in the first two
+rows are over its lower edge.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
 extend down next to it. Over a background, columns of buttons and values in the corners also extend
@@ -53,6 +53,9 @@ _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _GAP = "var(--urc-space-3)"
 """Space between the rows of a grid."""
+_MOST_COVERED = 2
+"""Maximum number of rows of values over the background on a phone in portrait. More rows would hide
+its middle, for example the robot on a map."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
 do."""
@@ -252,12 +255,12 @@ def _ground(covered: int) -> str:
 
 
 def _leading_values(grid: Layout, canvas: _Canvas) -> int:
-    """Return the number of rows at the top that contain only values."""
+    """Return the number of rows at the top with only values, at most `_MOST_COVERED`."""
     tall = _used((slot.row, slot.row_span) for slot in grid.slots if slot.row_span > 1)
     is_value = [
         row not in tall and _kinds(row, grid, canvas) == {"value"} for row in range(grid.rows)
     ]
-    return [*is_value, False].index(False)
+    return min([*is_value, False].index(False), _MOST_COVERED)
 
 
 def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str]) -> list[str]:

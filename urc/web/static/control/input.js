@@ -302,8 +302,11 @@ export class Input {
   leaseChanged() {
     for (const control of this.controls.values()) {
       if (control.phase !== "spent") continue;
-      if (this.drive.isLatched) this.spend(control, this.against());
-      if (control.grips.size > 0 || this.drive.isLatched) continue;
+      if (this.drive.isLatched) {
+        this.spend(control, this.against());
+        continue;
+      }
+      if (control.grips.size > 0) continue;
       control.phase = "idle";
       for (const grip of this.grips) if (grip.control === control) grip.show();
     }
