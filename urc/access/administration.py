@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
-"""Sign-in methods of devices and programs, whose sign-ins stay valid until they are removed."""
+"""Sign-in methods of devices and programs."""
 
 
 class PrincipalStatus(NamedTuple):
