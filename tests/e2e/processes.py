@@ -18,6 +18,8 @@ from tests.e2e.keys import learn
 ROOT = Path(__file__).resolve().parents[2]
 READY_TIMEOUT_S = 40.0
 EXIT_TIMEOUT_S = 40.0
+BUSY_MACHINE = "warning: urc.runtime.loop_watchdog: the server was blocked for "
+"""Start of a line that URC writes when the machine delays it, not when something is wrong."""
 
 
 class UrcProcess:
@@ -31,7 +33,7 @@ class UrcProcess:
         self.output: list[str] = []
         """Lines of standard output so far, without line ends."""
         self.errors: list[str] = []
-        """Lines of standard error so far."""
+        """Lines of standard error so far, without reports of a busy machine."""
         self._changed = threading.Condition()
         self._open_streams = 2
         self._process = subprocess.Popen(
@@ -127,6 +129,8 @@ class UrcProcess:
 
     def _read_lines(self, stream: IO[str], lines: list[str]) -> None:
         for line in stream:
+            if line.startswith(BUSY_MACHINE):
+                continue
             with self._changed:
                 lines.append(learn(line.rstrip("\n")))
                 self._changed.notify_all()

@@ -45,8 +45,7 @@ async def test_the_card_stays_in_another_interface(new_page: PageMaker) -> None:
         page = await new_page()
         await lose(page, address, robot)
         await page.locator("[data-interface-choice]").select_option("debug")
-        await page.locator("[data-debug]").wait_for()
-        await page.wait_for_load_state("networkidle")
+        await page.locator("[data-debug]:not([aria-busy])").wait_for()
         await expect(page.locator(CARD)).to_be_visible()
 
 

@@ -161,7 +161,7 @@ async def each_interface(page: Page, robot: Overheard) -> None:
         await is_whole(page)
     await page.get_by_role("button", name="This device").click()
     await choose(page, "debug")
-    await page.locator("[data-debug]").wait_for()
+    await page.locator("[data-debug]:not([aria-busy])").wait_for()
 
 
 def in_order(robot: Overheard) -> list[Sample]:

@@ -78,6 +78,7 @@ export class ViewSwitch {
     const { Debug } = await import("../dev/debug.js");
     if (!el.isConnected) return; // another interface was opened meanwhile
     this.debug = new Debug(el, this.doors);
+    el.removeAttribute("aria-busy");
     this.doors.wake();
   }
 
