@@ -25,7 +25,7 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Smallest delay that can cause a stop, in ms; longest time until that stop, in nanoseconds."""
+"""Shortest delay that can cause a stop, in ms, and the time limit for that stop, in ns."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Largest allowed number of stops per minute, by packet loss in percent.
 

@@ -52,4 +52,4 @@ def _write(data: Path, event: "Callable[[ServerRecorder, Actor], None]") -> None
         is_written = log.settle(_WAIT_S)
         fault = log.fault
     if fault or not is_written:
-        complain(f"urc: the audit log does not record this action: {fault or 'the file is busy'}")
+        complain(f"urc: this action is missing from the audit log: {fault or 'the file is busy'}")

@@ -20,7 +20,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
     """Public key from the first installation, by package name, such as ``drivers/puppet``. Removing
-    a package does not delete its key, because a reinstallation would then bypass the key check.
+    a package keeps its key; otherwise, a reinstallation would bypass the key check.
     """
     before: dict[str, Lock] = {}
     """Previous lock, for undoing the last update, by digest of the installed lock."""

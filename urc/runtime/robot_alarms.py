@@ -48,7 +48,7 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""URC's own alarm for a monitored robot, so that a silent robot does not seem to work."""
+"""URC's own alarm for a monitored robot. Without it, a silent robot would look healthy."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 

@@ -54,7 +54,7 @@ def test_command_and_server_write_one_chain(file: Path) -> None:
 def test_log_that_cannot_be_written_is_told(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file.mkdir()
     audit_packages("remove", ["drivers/puppet 1.0.0"])
-    assert capsys.readouterr().err.startswith("urc: the audit log does not record this action: ")
+    assert capsys.readouterr().err.startswith("urc: this action is missing from the audit log: ")
 
 
 def test_each_change_of_trust_is_recorded(

@@ -220,7 +220,7 @@ def _pixels(image: bytes) -> bytes:
         if kind == b"IHDR" and len(chunk) == 13:
             width, height, *form = struct.unpack(">IIBBBBB", chunk)
             if form != [8, 2, 0, 0, 0]:
-                raise BadOperation("a png is not 8-bit RGB")
+                raise BadOperation("a PNG image must be 8-bit RGB")
         elif kind == b"IDAT":
             packed += chunk
     size = height * (width * 3 + 1)

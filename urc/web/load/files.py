@@ -113,7 +113,7 @@ def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> R
     """Return a map tile from ``folder/z/x/y.kind``; for a missing file, a transparent tile.
 
     Raises:
-        HTTPException: 404 if a number is out of range, or the media type is unknown.
+        HTTPException: 404 if a number is out of range or the media type is unknown.
     """
     if kind not in TILE_TYPES or not 0 <= z <= DEEPEST_ZOOM or not (0 <= x < 2**z > y >= 0):
         raise HTTPException(404)

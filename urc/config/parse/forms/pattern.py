@@ -53,7 +53,7 @@ def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
         if piece[0] in ("{{", "}}"):
             literal += piece[0][0]
         elif piece[1] is None:
-            hint = "write {{ or }} for a brace of the frame"
+            hint = "write {{ or }} for a literal brace"
             raise _PatternFault(f"{piece[0]!r} has no matching brace", piece.start(), hint=hint)
         else:
             # Before a field of fixed width, the number of blanks is significant.
