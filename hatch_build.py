@@ -1,4 +1,4 @@
-"""Build hook that adds the third-party browser modules, and the data folders of a real wheel.
+"""Build hook that adds the third-party browser modules and, to a real wheel, the data folders.
 
 npm installs the modules as pinned in the committed lock file. The modules form a separate top-level
 package, ``urc_vendor``. The modules are never written into the source tree, where the files could

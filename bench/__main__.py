@@ -58,7 +58,7 @@ PROGRAMS = {
     "page_layouts": ("chromium",),
     "motion_input": ("chromium",),
 }
-"""Programs that each benchmark needs besides Python, by their names in `scripts.needs`."""
+"""Programs that each benchmark needs besides Python, as named in `scripts.needs`."""
 
 
 def main() -> int:

@@ -10,7 +10,7 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""Smallest share of the robot's values that a valid measurement must show."""
+"""Minimum share of the robot's values that the page must show for a valid measurement."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
 # The text in a frame's layout counts, because a page that writes outside frames may change it
@@ -77,7 +77,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
     Args:
         one: the page.
         seconds: duration of the measurement, starting with the first value.
-        rate_hz: rate at which the robot sends its clock.
+        rate_hz: rate at which the robot sends its clock's time.
 
     Raises:
         TooFew: the page showed fewer values than `LEAST_SHARE` requires.

@@ -1,7 +1,7 @@
 """Frame rate of every shipped robot's page in WebKit without a graphics processor.
 
 Without a graphics processor, Mesa composes the page in software, so layers and large repaints lower
-the frame rate. An empty page is measured before each page: its rate shows how busy the machine is.
+the frame rate. Before each page, an empty page is measured; its rate shows how busy the machine is.
 A page that misses the goal is measured again, because another program may have slowed the page.
 """
 

@@ -145,7 +145,7 @@ async def _metrics(line: CDPSession) -> dict[str, float]:
 
 
 def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = None) -> Result:
-    """Return the time between frames divided by the longest allowed time."""
+    """Return the median time between frames, divided by the longest allowed time."""
     periods = sorted(1000 / cost.fps for cost in costs)
     most = 1000 / LEAST_FPS
     middle = periods[len(periods) // 2]

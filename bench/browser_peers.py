@@ -1,9 +1,9 @@
 """Ages of shown values: URC compared with a hand-written page, Node-RED and NiceGUI.
 
-One robot sends its clock over TCP to each of the four dashboards, 50 times a second. A real
+One robot sends its clock's time over TCP to each of the four dashboards, 50 times a second. A real
 Chromium opens one dashboard after another. After each drawn frame, the page measures the age of a
-new value on the screen. Node-RED and NiceGUI are installed from npm and PyPI at first use. A
-dashboard that can't be installed is skipped with a message.
+new value on the screen. Node-RED and NiceGUI are installed from npm and PyPI at first use. If a
+dashboard can't be installed, it is skipped with a message.
 """
 
 import asyncio

@@ -29,7 +29,7 @@ from bench.rig.programs import Server, peer
 __all__ = ["run"]
 
 Row = dict[str, Any]
-"""Share of a core and images shown per second, for each page."""
+"""Share of one core, and number of images shown per second, for each page."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 5.0, 15.0

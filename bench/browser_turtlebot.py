@@ -1,9 +1,9 @@
 """A browser's processor time: the gallery's TurtleBot page compared with two plain pages.
 
-The emulated robot sends its camera, map, laser and battery over rosbridge. One plain page shows
-only the same images, at the same size. The other plain page is hand-written with roslib and has the
-same widgets in the same places. The processor time includes the renderer and the GPU process.
-Rounds of the pages alternate, in one Chromium without a graphics processor.
+The emulated robot sends its camera images, map, laser scans and battery state over rosbridge. One
+plain page shows only the same images, at the same size. The other plain page is hand-written with
+roslib and has the same widgets in the same places. The processor time includes the renderer and the
+GPU process. Rounds of the pages alternate, in one Chromium without a graphics processor.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ OURS, PICTURE, ROS = "URC", "picture alone", "roslib"
 MEASURED = ("renderer", "GPU")
 """Types of the measured processes, as Chromium names them."""
 SLOTS = {"map": "map", "laser": "laser", "stick": "stick", "camera": "camera", "battery": "value"}
-"""Slot of URC's page → cell of the roslib page."""
+"""Cell of the roslib page for each slot of URC's page."""
 LIVE = """
 (count) => document.querySelectorAll(".urc-grid [data-state=live]").length >= count
 """
@@ -92,7 +92,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 async def _round(ours: str, pages: str, robot: int, look_s: float) -> Costs:
-    """Return the costs of the three pages."""
+    """Return the cost of each of the three pages."""
     async with running_browser(is_whole=True) as browser:
         async with opened(browser, ours, script=COUNT) as one:
             await one.page.wait_for_function(LIVE, arg=SHOWS)

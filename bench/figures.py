@@ -1,7 +1,7 @@
 """Results of a run: printed as lines of JSON, and optionally written into the documentation.
 
 `./dev bench --full --write-docs` writes the results into docs/motion.md and docs/performance.md,
-between marks.
+between HTML comments.
 """
 
 import json

@@ -23,7 +23,7 @@ BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Freeze and kill servers until enough trials of each are valid."""
+    """Freeze and kill servers until enough trials of each kind are valid."""
     wanted = TRIALS_IF_FULL if full else TRIALS
     return [_measured("freeze", wanted), _measured("kill", wanted)]
 

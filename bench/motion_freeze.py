@@ -1,8 +1,8 @@
 """Data received after a driven robot's program was frozen for 5 s.
 
-Signals freeze and resume a substitute for rosbridge, while its kernel continues to accept data.
-Several robots are driven in parallel, each with its own program, session and guard. An interrupted
-run can continue.
+SIGSTOP and SIGCONT freeze and resume a substitute for rosbridge, while the kernel continues to
+accept data for it. Several robots are driven in parallel, each with its own program, session and
+guard. An interrupted run can continue.
 """
 
 import asyncio

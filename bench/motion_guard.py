@@ -1,6 +1,7 @@
 """Time until a driven robot stops after its guard is killed.
 
-A new guard replaces the killed one within half a second. The new guard sends the stop first.
+A new guard replaces the killed one within half a second. Before anything else, the new guard
+sends the stop.
 """
 
 import tempfile

@@ -1,9 +1,9 @@
 """Time from a release until the robot receives the stop, for each of the twelve ways to release.
 
-A real Chromium drives through a real ``urc serve`` with its guard. The robot timestamps received
-data. Each time is measured on the machine's monotonic clock, from the page's event until the stop's
-first byte arrives at the robot. The lease lasts one second, so a stop after its expiry would be
-obvious. A late trial is repeated if the machine caused the delay.
+A real Chromium drives a robot through a real ``urc serve`` with its guard. The robot timestamps
+received data. Each time is measured on the machine's monotonic clock, from the page's event until
+the stop's first byte arrives at the robot. The lease lasts one second, so a stop after its expiry
+would be obvious. A late trial is repeated if the machine caused the delay.
 """
 
 import asyncio
@@ -97,7 +97,8 @@ class Scene(NamedTuple):
     one: Opened
     robots: Robots
     witness: Robots
-    """Measures its own late wake-ups, and the processor waits of the server, guard and browser."""
+    """Measures its own late wake-ups, and how long the server, guard and browser wait for a
+    processor."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

@@ -1,8 +1,8 @@
 """Latency of a tick from the page's socket to the robot's socket, compared with a Python relay.
 
 One clock timestamps each tick twice: before the page's socket accepts it, and after the robot has
-read its line. URC and the relay alternate in one run. URC's path includes the checks of the motion
-contract, the engine, and the pipe to the guard.
+read the tick's line. URC and the relay alternate in one run. URC's path includes the checks of the
+motion contract, the engine, and the pipe to the guard.
 """
 
 import json

@@ -52,7 +52,7 @@ commands:
 
 
 class Load(NamedTuple):
-    """A server's load: the number of robots, of signals for each robot, and of pages."""
+    """A server's load: the numbers of robots, signals per robot, and pages."""
 
     robots: int
     signals: int

@@ -24,7 +24,7 @@ def repeated(
         bout: function that runs one round with all robots.
         wanted: required number of valid trials.
         robot_count: number of trials in one round.
-        kept: store of the trials, so that an interrupted run continues.
+        kept: store of the trials, so that an interrupted run can continue.
     """
     trials = [trial for row in kept.rows if (trial := Trial.of(row)).death == death]
     while len(trials) < MOST_BOUTS * wanted:

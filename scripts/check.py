@@ -46,7 +46,7 @@ class Step:
     is_yielding: bool = False
     """Whether the step runs with a lower priority, so that it does not delay a measuring step."""
     is_measuring: bool = False
-    """Whether the step measures times, so that its session comes before all others."""
+    """Whether the step measures times, so that its session has priority over all others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ def javascript_step() -> tuple[Step | None, str]:
 
 
 def install_checkers() -> None:
-    """Update node_modules to the lock file; do nothing if it is up to date."""
+    """Update node_modules to match the lock file; do nothing if it is up to date."""
     lock = hashlib.sha256((ROOT / "package-lock.json").read_bytes()).hexdigest()
     stamp = NODE_MODULES / ".urc-lock"
     if stamp.is_file() and stamp.read_text("utf-8") == lock:

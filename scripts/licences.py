@@ -57,7 +57,7 @@ def _named(one: hatch_sbom.LockedPackage) -> str:
 
 
 def _version(one: hatch_sbom.LockedPackage) -> str:
-    """Return the version; if there are several versions, add the range of Python versions."""
+    """Return the version, with its range of Python versions if the lock has several versions."""
     if not one.marker.startswith("python_full_version") or " and " in one.marker:
         return one.version
     return f"{one.version} (Python {one.marker.removeprefix('python_full_version ')})"

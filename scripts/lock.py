@@ -25,8 +25,8 @@ LOCKS: dict[str, tuple[str, ...]] = {
 }
 """Arguments for each lock file.
 
-`demo` and `build` serve `./dev demo`, `dev` serves `./dev test`, and `node` serves machines without
-npm.
+`demo` and `build` are for `./dev demo`, `dev` is for `./dev test`, and `node` is for machines
+without npm.
 """
 SYSTEMS = "platform_python_implementation == 'CPython' and sys_platform != 'emscripten'"
 """The environments of ``[tool.uv]`` in pyproject.toml."""

@@ -40,7 +40,7 @@ class Need:
 
     name: str
     executables: tuple[str, ...]
-    """Alternative executables; a single executable is sufficient."""
+    """Alternative executables, one of which is sufficient."""
     package: str
     """Debian packages, separated by spaces; "" if npm installs the program."""
     purpose: str

@@ -1,11 +1,11 @@
 """Build the playground as one folder of static files: `python -m scripts.playground FOLDER`.
 
-Any static web server can serve the folder, under any path. The pages use no other hosts. The folder
-contains:
+Any static web server can serve the folder, under any path. The pages contact no other hosts. The
+folder contains:
 
 - the interpreter: Pyodide from npm, in the version from `package-lock.json`;
 - `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
-- `dash/`: the modules and styles of the dashboard and the widgets, with a server's paths;
+- `dash/`: the modules and styles of the dashboard and the widgets, at a server's paths;
 - the page, its worker and its service worker, from `playground/static`.
 
 Packages are copied from this environment, which has the versions from `requirements/`. `msgspec` is

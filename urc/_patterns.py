@@ -170,7 +170,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     cost = _cost(tree, 1 if is_over_bytes else _BEYOND_ASCII)
     if cost > MAX_COST:
         raise PatternError(
-            f"this pattern has {cost} parts, and the limit is {MAX_COST}: use smaller numbers in"
+            f"this pattern has {cost} parts, but the limit is {MAX_COST}: use smaller numbers in"
             " {…}, or start with '^' and let no repeat match the start of the next part"
         )
     return Pattern(text, groups, _re2_search(text), False)

@@ -1,10 +1,10 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
-`urc._grammar` defines the supported subset. The sandbox for expressions has no attributes of Python
-objects, no loops, and no operators that turn short text into very long text. Expressions can call
-only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja converts
-CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong reading must
-not become zero. In Jinja, ``'abc' | int`` is 0.
+`urc._grammar` defines the supported subset. The sandbox for expressions permits no attributes of
+Python objects, no loops, and no operators that turn short text into very long text. Expressions can
+call only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja
+converts CR to LF and drops a final newline. URC raises errors that Jinja hides, because a wrong
+reading must not become zero. In Jinja, ``'abc' | int`` is 0.
 
 If a template consists of a single ``{{ expression }}``, its result has the expression's type.
 """
@@ -273,7 +273,7 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 def digested_settings(template: Template) -> frozenset[str]:
     """Return the settings that an expression uses only in tests, or in hashes with a nonce or time.
 
-    A hash with a nonce or time does not reveal a setting, and cannot be replayed.
+    A hash with a nonce or time does not reveal a setting and cannot be replayed.
     """
     if not template.settings:
         return frozenset()

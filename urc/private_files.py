@@ -1,6 +1,6 @@
 """Writes private files atomically: a power failure leaves either the old or the new content.
 
-The files contain persistent data: settings, a latched STOP, host keys.
+The files contain persistent data: settings, a latched STOP and host keys.
 """
 
 import os

@@ -46,7 +46,7 @@ class Table:
     def get(self, name: str) -> RegistryEntry | None:
         """Return the row with this name; None for an unknown name.
 
-        Entry points are read only if the name is not a built-in row.
+        Entry points are not read if the name is a built-in row.
         """
         if name not in self._rows:
             self._read_entry_points()

@@ -181,7 +181,7 @@ def read_document(path: str, limits: DocumentLimits = _LIMITS) -> Document:
     """Read a file.
 
     Raises:
-        ProblemsError: the file cannot be read, or is not a YAML document within `limits`.
+        ProblemsError: the file cannot be read or is not a YAML document within `limits`.
     """
     return parse_document(read_bytes(path, limits.size_bytes), path, limits)
 

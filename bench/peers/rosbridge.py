@@ -119,7 +119,7 @@ TOPICS: dict[str, tuple[Callable[[float], dict[str, object]], int]] = {
     "/camera/compressed": (camera, CAMERA_HZ),
     "/battery_state": (battery, 10),
 }
-"""For each topic, the message rate and the function that builds a message for a given time."""
+"""For each topic, the function that builds a message for a given time, and the message rate."""
 
 
 async def publish(line: ServerConnection, topic: str) -> None:

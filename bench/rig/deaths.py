@@ -50,7 +50,7 @@ commands:
 
 
 def robot_profile(index: int, host: str, port: int, kind: str = "tcp") -> str:
-    """Return the document of one of the rig's robots: ``M TIME`` moves it, ``M 0`` stops it."""
+    """Return the document of a robot in the rig; ``M TIME`` moves the robot, ``M 0`` stops it."""
     framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
     return _PROFILE.format(index=index, kind=kind, host=host, port=port, framing=framing)
 
@@ -66,9 +66,9 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    The value is the sum of two delays. The first is the latest wake-up of the robots' process. The
-    second is the latest wake-up of an idle program or the longest processor wait of the server or a
-    guard, whichever is larger.
+    The value is the sum of two delays. The first is the longest wake-up delay of the robots'
+    process. The second is the longest wake-up delay of an idle program, or the server's or a
+    guard's longest wait for a processor, whichever is longer.
     """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
@@ -143,7 +143,7 @@ class Rig:
             raise
 
     def _watch(self) -> None:
-        """Start a program that measures the processor waits of the server and its guards."""
+        """Start a program that measures how long the server and its guards wait for a processor."""
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:

@@ -1,8 +1,9 @@
 """Trials in which a driven robot's program freezes for a few seconds.
 
-The robot's program is separate (`bench.rig.robot_process`). Signals suspend and resume this
-program, while its kernel still accepts bytes. A session with a guard drives the robot. Each motion
-frame contains its send time, and the robot's program timestamps each received line.
+The robot's program is separate (`bench.rig.robot_process`). SIGSTOP and SIGCONT suspend
+and resume this program, while the kernel still accepts bytes for it. A session with a guard drives
+the robot. Each motion frame contains its send time, and the robot's program timestamps each
+received line.
 """
 
 import asyncio
@@ -97,9 +98,9 @@ async def freeze(
 ) -> Sequence[Freeze]:
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
-    With `via` set to rosbridge, the robot's program is a substitute; with foxglove, it is the SDK's
-    server. With `is_killed`, the program is killed instead, and a new one starts after `lasts_s`
-    seconds.
+    If `via` is rosbridge, the robot's program is a substitute for rosbridge; if `via` is foxglove,
+    the program is the SDK's server. With `is_killed`, the program is killed instead, and a new one
+    starts after `lasts_s` seconds.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]

@@ -108,7 +108,7 @@ _ASIDE: Final = {
 
 
 class Counterpart(Program):
-    """A third-party program for a robot, which ends on request or with its parent process."""
+    """A robot's third-party program, which ends on request or with its parent process."""
 
     def __init__(self, command: list[str], *, inside: tuple[str, ...], port: int) -> None:
         """Run `command`, and wait until it listens on `port`."""
@@ -132,7 +132,7 @@ def place_of(kind: str, index: int) -> str:
 
 
 def document(kind: str, index: int, port: int, other: Counterpart | None) -> str:
-    """Return a robot's document at `port`, and its third-party program, or None."""
+    """Return the document of a robot at `port`, whose third-party program is `other` or None."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
         options = options.replace("OTHER", str(other.port))

@@ -234,7 +234,7 @@ class Operators(Program):
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """Text that follows a report's first word and its plan's number, by word and number."""
+        """Text after the first word and the plan's number in a report, by word and number."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:

@@ -18,7 +18,7 @@ Orders on standard input, one per line, with times in milliseconds::
     cut PORT a              the same, only from that side; `heal PORT` ends it too
     down a | up a           the network interface of a side
 
-The program ends when its standard input closes. A namespace ends with its last program.
+The program ends when its standard input closes. A namespace is removed when its last program ends.
 """
 
 import ctypes

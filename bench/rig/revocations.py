@@ -106,7 +106,7 @@ class RevocationRig(Rig):
         raise AssertionError("the server does not know the new identity")
 
     def _trial(self, death: str, index: int, began_ns: int, revoked_ns: Mapping[int, int]) -> Trial:
-        """Return the result of one robot: its stop after the revocation, and no motion after it."""
+        """Return one robot's result: it must stop after the revocation and not move again."""
         before = [
             one for one in self.robots.since(index, began_ns) if one.time_ns <= revoked_ns[index]
         ]

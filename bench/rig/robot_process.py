@@ -15,7 +15,7 @@ from the monotonic clock, in nanoseconds::
     waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
                             ``pid:NUMBER`` watches a process and its children
 
-The program ends when its standard input closes, and therefore with its parent.
+The program ends when its standard input closes, so it ends with its parent.
 """
 
 import base64
@@ -229,7 +229,7 @@ class Others:
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
-        """Return the processes that have waited since the last check, with times in nanoseconds."""
+        """Return the processes that waited since the last check, with the times in nanoseconds."""
         found: list[tuple[str, int]] = []
         with contextlib.suppress(OSError):  # the process has ended
             with open(f"/proc/{self._process}/task/{self._process}/children") as children:

@@ -1,4 +1,4 @@
-"""The families of keys: which reference page describes each definition in the schemas."""
+"""The families of keys, which determine the reference page for each definition in the schemas."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

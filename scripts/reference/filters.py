@@ -78,9 +78,9 @@ _OPERATORS = (
     ("`x in [1, 2]`", "membership"),
     ("`'a' if test else 'b'`", "choice"),
     ("`x[0]` `x[1:3]`", "element and slice"),
-    ("`x is defined` `x is none`", "existence of a value; the value none"),
+    ("`x is defined` `x is none`", "whether a value exists or equals `none`"),
     ("`x is number` `x is string`", "type"),
-    ("`x is match('^E')` `x is search('E')`", "match of a pattern at the start, or anywhere"),
+    ("`x is match('^E')` `x is search('E')`", "whether a pattern matches at the start or anywhere"),
 )
 
 

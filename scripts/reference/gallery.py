@@ -38,7 +38,10 @@ def widgets() -> str:
         data = yaml.safe_load(file.read_text("utf-8"))
         name = file.parent.name
         found.append(_Card(f"`{name}`", data["summary"], f"widgets/{name}.png", f"widgets/{name}"))
-    text = "Every widget in its first demo states. Its page lists inputs, outputs and options."
+    text = (
+        "Every widget in its first demo states. Each widget's page lists its inputs, outputs and"
+        " options."
+    )
     return _page("Widgets", text, found)
 
 

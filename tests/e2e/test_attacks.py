@@ -30,7 +30,7 @@ pytestmark = pytest.mark.anyio
 ATTACKS = Path(__file__).resolve().parents[1] / "attacks" / "drivers"
 NAMES = ("steal-secret", "drive-another", "reset-stop")
 PASSWORD = "open-sesame"  # noqa: S105 - of a robot that is not there
-SAID = "this address is the dashboard itself; it cannot be a robot"
+SAID = "this is the address of the dashboard itself, not of a robot"
 VICTIM = """\
 urc: 1
 kind: robot

@@ -86,7 +86,7 @@ async def test_a_hold_renews_the_input_while_it_is_awaited(pair: Pair) -> None:
 async def test_a_program_that_renews_nothing_stops_the_robot(pair: Pair) -> None:
     """And hears of it at its next word to the stick."""
     cart, robot = pair
-    with pytest.raises(MotionEnded, match="no call of the stick for 250 ms"):  # noqa: PT012 - the end of the context raises
+    with pytest.raises(MotionEnded, match="the stick was not called for 250 ms"):  # noqa: PT012 - the end of the context raises
         async with robot.drive() as stick:
             stick(speed=0.5)
             set_s = time.monotonic()
@@ -101,7 +101,7 @@ async def test_a_program_that_renews_nothing_stops_the_robot(pair: Pair) -> None
 async def test_an_early_end_that_nobody_noticed_is_raised_at_the_end(pair: Pair) -> None:
     """The program must not believe that the robot drove on."""
     _, robot = pair
-    with pytest.raises(MotionEnded, match="no call of the stick"):  # noqa: PT012 - the end of the context raises
+    with pytest.raises(MotionEnded, match="the stick was not called"):  # noqa: PT012 - the end of the context raises
         async with robot.drive(valid_s=0.05) as stick:
             stick(speed=0.5)
             await asyncio.sleep(0.3)

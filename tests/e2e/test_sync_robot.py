@@ -137,7 +137,7 @@ def test_a_script_that_hangs_stops_the_robot(pair: Pair) -> None:
     """The loop of the client runs on, and must not drive on for the script."""
     cart, robot = pair
     with (  # noqa: PT012 - the end of the block raises
-        pytest.raises(MotionEnded, match="no call of the stick"),
+        pytest.raises(MotionEnded, match="the stick was not called"),
         robot.drive() as stick,
     ):
         stick(speed=0.5)

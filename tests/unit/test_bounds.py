@@ -61,7 +61,7 @@ def test_a_pattern_that_multiplies_is_refused(
     """The same line with and without RE2: the pattern is judged as it is written."""
     if not is_installed:
         monkeypatch.setitem(sys.modules, "re2", None)
-    with pytest.raises(PatternError, match=r"this pattern has \d+ parts, and the limit is 1000"):
+    with pytest.raises(PatternError, match=r"this pattern has \d+ parts, but the limit is 1000"):
         compile_pattern(source)
 
 

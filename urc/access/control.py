@@ -86,7 +86,7 @@ class AccessControl:
         return self.directory.identify(secret, self.now())
 
     def role(self, who: Identity, robot: str = "", tags: Collection[str] = ()) -> Role | None:
-        """Return the current role of `who` for a robot; "" means the whole server."""
+        """Return the current role of `who` for a robot; if `robot` is "", for the whole server."""
         return self.directory.role(who, self.now(), robot, tags)
 
     # The local user

@@ -92,8 +92,8 @@ def admit_named(
         new_grants: grants for a new person; if empty, the person must already exist.
         proxy: the proxy's name.
         now: UTC time in seconds since 1970.
-        ends_at: UTC time at which the sign-in ends. For a person added by a proxy, all rights end
-            at the same time.
+        ends_at: UTC time at which the sign-in ends. For a person added by a proxy, all rights also
+            end at this time.
 
     Raises:
         AccessError: no person has this name, or the name is invalid.

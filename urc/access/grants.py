@@ -77,7 +77,7 @@ def grants_from_json(text: str) -> tuple[Grant, ...]:
 
 
 def role_at(grants: Iterable[Grant], robot: str = "", tags: Collection[str] = ()) -> Role | None:
-    """Return the highest role of `grants` for a robot; "" means the whole server."""
+    """Return the highest role of `grants` for a robot; if `robot` is "", for the whole server."""
     return highest(grant.role for grant in grants if grant.covers(robot, tags))
 
 

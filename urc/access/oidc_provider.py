@@ -96,7 +96,7 @@ class OidcProvider:
         """Return the provider's keys as JSON Web Keys.
 
         Args:
-            is_fresh: whether the cached keys may be outdated because a token has an unknown key.
+            is_fresh: whether to update the cached keys, because a token has an unknown key.
                 Even then, keys are requested at most once a minute.
 
         Raises:
@@ -242,7 +242,7 @@ def _parsed(found: Mapping[str, Any], issuer: str) -> ProviderMetadata:
 
 
 def _address(found: Mapping[str, Any], key: str, *, is_private: bool) -> str:
-    """Return an address from the description; HTTP is valid only locally, for an HTTP issuer."""
+    """Return an address from the description; plain HTTP is valid only for a local HTTP issuer."""
     text = found.get(key)
     try:
         url = httpx2.URL(text if isinstance(text, str) else "")

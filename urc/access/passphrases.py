@@ -1,9 +1,9 @@
 """Passphrases: rules for new passphrases, argon2id hashes, and the check at sign-in.
 
-Layer 4. A hash is deliberately slow and takes about 50 ms and 64 MiB. Servers therefore compute one
-hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, with the second recommended set
-of parameters). The rules follow NIST SP 800-63B-4: a minimum length, no common passwords, and no
-composition rules.
+Layer 4. Hashing is deliberately slow: each hash takes about 50 ms and 64 MiB of memory. Servers
+therefore compute one hash at a time, in a thread. The hashes follow RFC 9106 (argon2id, with the
+second recommended set of parameters). The rules follow NIST SP 800-63B-4: a minimum length, no
+common passwords, and no composition rules.
 """
 
 import unicodedata
@@ -40,7 +40,7 @@ _NEVER: Final = (
     "$argon2id$v=19$m=65536,t=3,p=4$"
     "Y9S+Qk9ql1FsY7cIblZ4kg$+SK2RqF890o7afnBg00/BKpDnvcql9WqfC07seo0hAU"
 )
-"""Hash compared for unknown names, so that the response time does not reveal which names exist.
+"""Hash checked for unknown names, so that the response time does not reveal which names exist.
 The hash is a literal, because computing it would delay each server start by 50 ms."""
 
 
@@ -69,7 +69,9 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
 
 
 def matches(passphrase: str, kept: str | None) -> bool:
-    """Return whether `passphrase` matches the hash; the check always takes as long as hashing.
+    """Return whether `passphrase` matches the hash.
+
+    The check takes equally long for known and unknown people, so its time reveals no names.
 
     Args:
         passphrase: passphrase entered at the sign-in.

@@ -1,8 +1,8 @@
 """Trusted proxies: web servers in front of URC that sign people in and send their names.
 
-Layer 4. Pure, except for `read_proxy_options`. URC accepts a name only together with the proxy's
-secret, regardless of the network address. Without the secret, both headers are removed, so neither
-a client nor another proxy can set a name.
+Layer 4. All functions except `read_proxy_options` are pure. URC accepts a name only together with
+the proxy's secret, regardless of the network address. Without the secret, both headers are removed,
+so neither a client nor another proxy can set a name.
 """
 
 import re

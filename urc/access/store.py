@@ -348,7 +348,10 @@ class AccessStore:
         return code
 
     def invitation(self, code: str, now: float) -> Invitation | None:
-        """Return a code's invitation; the code stays valid. None for an unknown or expired code."""
+        """Return a code's invitation, or None if the code is unknown or expired.
+
+        The code stays valid.
+        """
         with self._change():
             row = self._base.execute(
                 "SELECT kind, name, grants, owner, ends_at FROM invitations"

@@ -57,7 +57,7 @@ class AlarmList:
 
         Args:
             limits: limits by signal; alarms for other signals are not allowed.
-            records: the records from the last run. Their values are now unknown.
+            records: the records from the last run; the values of these alarms are now unknown.
         """
         self.records: dict[str, AlarmRecord] = {
             one.signal: one._replace(is_known=False) for one in records

@@ -2,7 +2,7 @@
 
 Layer 3. Pure. A flood begins when more than 10 alarms occur in 10 minutes, because one operator can
 handle at most 10. A flood ends when fewer than 5 alarms occur in 10 minutes. A burst is a sequence
-of alarms with short gaps. The first alarm in a burst is often the cause of the others.
+of alarms with short gaps. The first alarm in a burst is often the cause of the other alarms.
 """
 
 from collections import deque

@@ -41,7 +41,10 @@ from urc.web.serve.service_manager import ServiceManager, answers
 __all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""Function that returns a profile's command-line settings, or raises `UrcError` if invalid."""
+"""Function that returns a profile's command-line settings.
+
+The function raises `UrcError` if the settings are invalid.
+"""
 _LOOK = (320, 240)
 """Columns and rows of the preview on a robot's card."""
 

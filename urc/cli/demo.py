@@ -98,7 +98,7 @@ def _invite_phone(address: str) -> None:
 
 
 def _port(arguments: argparse.Namespace) -> int:
-    """Return the given port; by default, the default port if it is free, or any free port."""
+    """Return the given port, otherwise the default port if it is free, otherwise 0 for any port."""
     if arguments.port is not None:
         return int(arguments.port)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET

@@ -41,9 +41,10 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""For each optional package, its purpose and the extra that installs it."""
+"""For each optional package, the extra that installs the package, and the package's purpose."""
 OPTIONAL = {
-    "google-re2": "patterns without provably linear run time; without it, URC refuses them",
+    "google-re2": "patterns without provably linear run time; without this package, URC refuses"
+    " them",
     "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
 }
 FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (

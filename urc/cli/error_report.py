@@ -37,4 +37,4 @@ def _mistake(bug: Exception) -> str:
 
     frames = extract_tb(bug.__traceback__)
     place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
-    return f"this is a bug in URC, please report it: {type(bug).__name__}{place}: {bug}"
+    return f"this is a bug in URC; please report it: {type(bug).__name__}{place}: {bug}"

@@ -129,7 +129,7 @@ def _compare(
     look: "PreviewWorker",
     risks: list[str],
 ) -> "UpdateDiff | None":
-    """Print and return the changes from the installed version, or None for a new installation."""
+    """Print and return the changes from the installed version; None for a new installation."""
     from urc.packages.update import UpdateDiff, staged_difference
     from urc.problems import UrcError, printable
 

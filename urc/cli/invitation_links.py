@@ -101,7 +101,7 @@ def _parsed(address: str) -> str:
 
 
 def _running(data: Path) -> str:
-    """Return the newest server's address, preferably its public address; "" if no server runs."""
+    """Return the newest server's address, preferably its public address; "" if none is running."""
     from urc.runtime.running_servers import servers
 
     running = list(servers(data).values())

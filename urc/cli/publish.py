@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     if is_overheard(url) and not arguments.insecure:
         raise Misuse(
             f"{url} is not encrypted: an attacker on the network can read the token; use https,"
-            " or add --insecure in a trusted network"
+            " or add --insecure on a trusted network"
         )
     token, made = read_token(arguments.token_file), _provenance(arguments)
     key = signer(arguments.key)

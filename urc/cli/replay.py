@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--profile",
         metavar="PROFILE",
-        help="robot file for the display, for a changed interface or third-party widgets"
+        help="robot file to use for the display, with a changed interface or third-party widgets"
         " (default: the profile in the recording)",
     )
     parser.add_argument(

@@ -132,7 +132,7 @@ class UnansweredLog(logging.Handler):
                 self._tell(f"{text} ({count} {again}time{'s' if count > 1 else ''})")
         others = self._forgotten + sum(count for _, count in left[_LAST_LINES:])
         if others:
-            self._tell(f"{others} other frames had no reply")
+            self._tell(f"other frames without a reply: {others}")
         self._counts.clear()
         self._forgotten = 0
 

@@ -70,7 +70,7 @@ def add_tls(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--insecure-plain-http",
         action="store_true",
-        help="plain HTTP although other machines can reach --host: everyone on the network can"
+        help="plain HTTP even if other machines can reach --host: everyone on the network can"
         " read keys and change commands",
     )
 

@@ -107,7 +107,7 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
     if offer.expected != "unknown":
         print(
             f"the key has changed from {offer.expected}:"
-            " either the robot was reinstalled, or an attacker intercepts the connection"
+            " either the robot was reinstalled, or an attacker is intercepting the connection"
         )
     if yes is None and not _is_confirmed():
         print("nothing is stored")

@@ -54,7 +54,7 @@ class _Report:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: documents, format and checks."""
     parser.add_argument(
-        "paths", metavar="PATH", nargs="+", help="documents of any kind, or robot names"
+        "paths", metavar="PATH", nargs="+", help="documents of any kind or robot names"
     )
     parser.add_argument(
         "--format", choices=FORMATS, default="text", help="format of the report (default: text)"

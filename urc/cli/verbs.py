@@ -35,10 +35,10 @@ VERBS: dict[str, str] = {
     "sign-ins": "list and end the sign-ins of browsers, devices and programs",
     "backup": "save people, keys, settings and logs to one file",
     "restore": "restore a backup of people, keys, settings and logs",
-    "discover": "find robots on the network, serial ports and ROS topics",
+    "discover": "find serial ports, ROS topics, and robots on the network",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",
-    "completion": "print the script that completes this command in bash, zsh or fish",
+    "completion": "print the completion script for bash, zsh or fish",
 }
 
 GROUPS: dict[str, tuple[str, ...]] = {

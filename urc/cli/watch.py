@@ -105,7 +105,7 @@ async def _follow(
     seconds: float | None,
     check: Callable[[], None] = lambda: None,
 ) -> None:
-    """Print the robot's events until the duration has elapsed, or `check` raises."""
+    """Print the robot's events until the duration has elapsed, or `check` raises an error."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
     is_over = False
@@ -171,7 +171,7 @@ class _Printer:
         if dropped == self._dropped or not (is_last or now_s >= self._losses_told_s + _LOSSES_S):
             return
         lost, self._dropped, self._losses_told_s = dropped - self._dropped, dropped, now_s
-        text = f"warning: {lost} updates were lost, because the reader of the output is too slow\n"
+        text = f"warning: updates lost, because the reader of the output is too slow: {lost}\n"
         await self._writer.write(sys.stderr, text)
 
     def _time(self, time_s: float) -> float:

@@ -101,7 +101,7 @@ class ConnectedRobot(HubReadings):
 
     @property
     def operator(self) -> str:
-        """Name of the program with the controls in this process; "" if the controls are free."""
+        """Name of the program that has the controls in this process; "" if they are free."""
         holder = self.motion.controller.lease.state.holder
         return holder.name if holder is not None else ""
 

@@ -28,7 +28,11 @@ _LEFT: Final = "the drive context has ended"
 
 
 def only_control(controls: tuple[str, ...], command: str) -> str:
-    """Return the held command `command`; "" selects the only one; raise `UrcError` for no match."""
+    """Return the held command `command`, or the only held command if `command` is "".
+
+    Raises:
+        UrcError: the robot has no such held command, or `command` is "" and the robot has several.
+    """
     known = ", ".join(controls)
     if not controls:
         raise UrcError("this robot has no held command")
@@ -104,7 +108,7 @@ class ProgramControls(ABC):
             raise MotionEnded(early)
 
     def stopped(self, command: str, reason: str) -> None:
-        """End a command's motion because the guard stopped it; "" stands for all commands."""
+        """End motion that the guard stopped: the command's, or all motion if `command` is ""."""
         text = STOP_REASONS.get(reason, reason)
         for name, stick in self.sticks.items():
             if command not in ("", name):

@@ -114,7 +114,7 @@ class HubReadings:
                 lines = list(hub.notes)[-new:] if new else []
                 count = hub.notes_count
                 if lost := new - len(lines):
-                    text = f"{lost} lines of the log were lost, because this program is too slow"
+                    text = f"lines of the log lost, because this program is too slow: {lost}"
                     yield LogEntry(lines[0].time_s, "warning", "urc", text)
                 for line in lines:
                     yield line
@@ -129,7 +129,7 @@ class HubReadings:
         """Raise `ConnectionLost` if no further reading can arrive."""
 
     def shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
-        """Request the images among `names` while the context is open."""
+        """While the context is open, request those of the signals `names` that are images."""
         return nullcontext()
 
     def _check(self, name: str) -> None:

@@ -67,7 +67,7 @@ __all__ = ["RemoteRobot", "open"]
 _MOST_IMAGES: Final = 64
 _GOODBYE_S: Final = 1.5
 _LINKS_S: Final = 1.0
-"""Maximum wait for the transports' state, which follows the first message, in seconds."""
+"""Maximum wait, in seconds, for the transports' state, which follows the first message."""
 _POST_S: Final = 3.0
 
 log = logging.getLogger(__name__)
@@ -236,7 +236,7 @@ class RemoteRobot(HubReadings):
     # -- opening and closing
 
     async def until_ready(self, running: "asyncio.Task[None]", timeout_s: float) -> None:
-        """Wait for the server's first message; raise the reason if none arrives."""
+        """Wait for the server's first message; raise an error with the reason if none arrives."""
         ready = asyncio.ensure_future(self._ready.wait())
         try:
             await asyncio.wait(
@@ -338,7 +338,7 @@ class RemoteRobot(HubReadings):
         """Add the new lines of the log, and report how many lines the server has dropped."""
         known = message.first if self._next_line is None else self._next_line
         if message.first > known:
-            self._note("warning", f"{message.first - known} lines of the log were lost")
+            self._note("warning", f"lines of the log lost: {message.first - known}")
         for row in message.lines[max(0, known - message.first) :]:
             self.hub.log(entry_of(row, now))
         self._next_line = max(known, message.first + len(message.lines))

@@ -220,4 +220,4 @@ class RobotSocket:
 
 
 def _ignore(_: object) -> None:
-    """Ignore an event before the owner has set its callback."""
+    """Ignore an event for which the owner has not yet set a callback."""

@@ -153,7 +153,7 @@ class Stick:
         return f"this program was blocked for {(now_s - self._moved_s) * 1000:.0f} ms"
 
     def sampled(self, now_s: float, *, is_moving: bool) -> None:
-        """Record the time of a sample; a program that moves nothing may be blocked."""
+        """Record a sample's time only during motion; otherwise, a blocked program does no harm."""
         self._moved_s = now_s if is_moving else None
 
     def sample(self) -> tuple[Mapping[str, Reading], float] | None:
@@ -202,7 +202,7 @@ async def sample_stick(
 
 def _late(stick: Stick) -> str:
     return (
-        f"no call of the stick for {stick.valid_s * 1000:.0f} ms: call the stick more often, or"
+        f"the stick was not called for {stick.valid_s * 1000:.0f} ms: call it more often, or"
         " await stick.hold(SECONDS, …)"
     )
 

@@ -1,4 +1,4 @@
-"""Runs the passes that convert YAML documents to the model, and collects their problems.
+"""Runs the passes that convert YAML documents to the model and collects their problems.
 
 The order of the passes is: compose, expand, shape, parse, link, rules. Every pass reports all its
 problems. A pass runs only if the earlier passes found no errors. Warnings do not stop a pass.
@@ -86,7 +86,7 @@ def load_profile(
 def check(
     path: str | PathLike[str], catalog: Registries, registry: WidgetFolder | None = None
 ) -> CheckResult:
-    """Check a document of any kind, and its references.
+    """Check a document of any kind and its references.
 
     Args:
         path: path of the document, as shown in problems.
@@ -133,7 +133,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without the duplicates that the copies of an `each` item cause."""
+    """Return the problems without the duplicates caused by the copies of an `each` item."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem

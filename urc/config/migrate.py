@@ -33,7 +33,7 @@ class Change(NamedTuple):
 
 
 class Migrated(NamedTuple):
-    """The migrated content of a document, and its changes."""
+    """The migrated content of a document and the list of changes."""
 
     content: bytes
     changes: tuple[Change, ...]

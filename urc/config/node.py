@@ -1,8 +1,8 @@
 """A typed view of a valid document for the parsers, and a class that collects problems.
 
-The parsers read documents only through `Node`. Every value therefore has a position for problems,
-and a test can record the keys in use. All functions in this module assume a document that fits its
-schema.
+The parsers read documents only through `Node`. Problems can therefore state the position of every
+value, and a test can record the keys in use. All functions in this module assume a document that
+fits its schema.
 """
 
 import math
@@ -35,7 +35,7 @@ def duration_s(text: str) -> float:
 
 
 class Node(NamedTuple):
-    """A value in a document, and its path."""
+    """A value in a document and its path."""
 
     document: Document
     path: Path
@@ -123,7 +123,7 @@ class Problems:
         self._add(part, code, message, "warning", **place)
 
     def unknown(self, part: Node, code: str, name: str, known: Iterable[str], **place: Any) -> None:
-        """Report an unknown name, and suggest a `known` name; `code` is ``unknown-NOUN``."""
+        """Report an unknown name and suggest a `known` name; `code` is ``unknown-NOUN``."""
         noun = code.removeprefix("unknown-")
         hint = did_you_mean(name, known, f"{noun}s")
         self.error(part, code, f"there is no {noun} {name!r}", hint=hint, **place)
@@ -143,7 +143,7 @@ class Problems:
         least: float = 0.001,
         most: float = _LONGEST_S,
     ) -> float:
-        """Return the duration under `key` in seconds; report a value outside `least` to `most`."""
+        """Return the duration under `key` in seconds; report a value out of range."""
         inner = part.get(key)
         if inner is None:
             return default

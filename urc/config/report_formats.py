@@ -1,4 +1,4 @@
-"""Problem reports in SARIF 2.1.0, and as annotations of GitHub workflow runs.
+"""Problem reports in SARIF 2.1.0 and as annotations of GitHub workflow runs.
 
 `urc.problems` contains the text and JSON formats.
 """

@@ -8,7 +8,7 @@ __all__ = ["closest", "did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""How many words a list may have beyond its maximum before it is shortened."""
+"""Number of words by which a list may exceed its maximum before the list is shortened."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:

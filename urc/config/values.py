@@ -125,7 +125,8 @@ def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None
                     hint="a range needs the type integer or number",
                 )
     elif low is not None and high is not None and low >= high:
-        hint = "swap them" if low > high else "remove 'min' or 'max', or make the range wider"
+        widen = "remove 'min' or 'max', or make the range wider"
+        hint = "swap the two values" if low > high else widen
         text = f"min {low:g} is not below max {high:g}"
         problems.error(part, "wrong-order", text, at="min", hint=hint)
     return low, high

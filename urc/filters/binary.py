@@ -49,7 +49,7 @@ def _short(value: object) -> str:
 
 
 def _data(value: object) -> bytes:
-    """Return bytes unchanged, and text encoded as UTF-8."""
+    """Return bytes unchanged and text encoded as UTF-8."""
     data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
     if not isinstance(data, bytes):
         raise TypeError(f"expected text, found {_short(value)}")

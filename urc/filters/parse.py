@@ -47,7 +47,7 @@ def _check_count(count: int, what: str) -> None:
 
 
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
-    """Return one column of all rows, chosen by name, or by position in a list or separated text."""
+    """Return one column of all rows; `key` is a name, or a position in a list or split text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):
@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """An error: the data has too few bytes for the number."""
+    """Error for data that has too few bytes for the number."""
 
 
 @cache  # there are few type names

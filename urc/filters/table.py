@@ -210,14 +210,14 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter: its function, and its argument count, excluding the filtered value."""
+    """A filter: its function and its argument count, excluding the filtered value."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
     gives_bytes: bool = False
     """Whether the filter returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
-    """Function that checks a constant first argument, and returns an error message or ""."""
+    """Function that checks a constant first argument and returns an error message or ""."""
 
 
 FILTERS: dict[str, Filter] = {

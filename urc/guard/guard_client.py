@@ -1,8 +1,8 @@
-"""The client of the guard: the robot's guarded transports, and the table of held commands.
+"""The client of the guard: the robot's guarded transports and the table of held commands.
 
 Theory of operation. The guard's state is lost when the guard process dies. The client therefore
-keeps a table of all held commands that were armed or stopped. Each entry stores the command's
-terms, and whether it may be moving. A new guard is initialised from this table. The new guard
+keeps a table of all held commands that were armed or stopped. Each entry stores the command's terms
+and whether the command may be moving. A new guard is initialised from this table. The new guard
 receives the list of transports, a pending stop for each command that may be moving, and the terms
 of other armed commands. For each pending stop, the guard opens the connection and writes the stop
 first. Motion never resumes automatically.
@@ -64,7 +64,7 @@ class _Control:
 
 
 class GuardClient:
-    """The guarded transports of one robot, and its held commands.
+    """The guarded transports and the held commands of one robot.
 
     The client implements `urc.runtime.motion_controller.MotionBackend` and `ChannelListener`.
     """
@@ -215,7 +215,7 @@ class GuardClient:
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait for written or lost stops; return the command and the report for each stop.
 
-        Cancelling the wait loses no stop.
+        If the wait is cancelled, no stop is lost.
         """
         while not self._stops:
             self._stopped.clear()

@@ -133,7 +133,8 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """How often the engine's frames were refused because their counters were already used."""
+        """How many times frames of the engine were refused because their counters were already
+        used."""
 
     # -- requests from the engine
 
@@ -177,7 +178,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return the data to send for the next frame in the queue; None if it is outdated."""
+        """Return the data to send for the next queued frame; None if the frame is outdated."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -194,7 +195,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard this round's other frames, because their counter values are used up."""
+        """Discard this round's remaining frames, because their counter values are used up."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
@@ -205,7 +206,7 @@ class GuardedConnection:
             self._credited.set()
 
     def settle(self) -> None:
-        """Report the results of a message batch, and watch liveness during motion."""
+        """Report the results of a message batch and watch liveness during motion."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))

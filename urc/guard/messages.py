@@ -1,7 +1,7 @@
 """The messages between the engine's process and the guard process.
 
 Each message is a MessagePack array that begins with the message type. `line` is a transport's name,
-and `control` is a held command's name. `turn` counts how often the engine has opened the
+and `control` is a held command's name. `turn` counts how many times the engine has opened the
 connection. Messages with an earlier `turn` are dropped.
 """
 
@@ -136,7 +136,7 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop the listed controls, even if they are idle; each entry has line, control and terms."""
+    """Stop the listed controls, even if they are idle, as lines, controls and terms."""
 
     controls: list[tuple[str, str, HoldTerms]]
 

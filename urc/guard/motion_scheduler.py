@@ -2,7 +2,7 @@
 
 Theory of operation. `write_due` writes the due frames of every control. Stops are written first,
 regardless of unsent data. Motion frames are written only if no earlier data has been waiting too
-long. `write_due` runs after every message, and when the next frame is due. Until the other side
+long. `write_due` runs after every message and when the next frame is due. Until the other side
 acknowledges a write, `write_due` also runs every few milliseconds, because the kernel does not
 report sent bytes.
 
@@ -305,7 +305,7 @@ class MotionScheduler:
             self._look_s = _LOOK_S
 
     def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
-        """Return the next frame to write, and its effect on the counters."""
+        """Return the next frame to write and its effect on the counters."""
         if not is_stop:
             return data, self._counts.get(control)
         stops = self._holds[control].terms.stops

@@ -1,9 +1,9 @@
 """A channel that starts, watches and restarts a guard in a separate process.
 
-Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or has
-been silent for half a second, is killed and replaced immediately. A guard that waits for processor
-time is not replaced, because a new guard would also wait. A new guard has no state, so the client
-initialises it first.
+Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or that
+has been silent for half a second, is replaced immediately; a silent guard is killed first. A guard
+that waits for processor time is not replaced, because a new guard would also wait. A new guard has
+no state, so the client initialises it first.
 
 The first guard waits for its turn (`urc.guard.start_turns`), unless a stop must be sent. A guard
 that replaces another guard does not wait.
@@ -119,7 +119,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start and initialise the guard process in its turn; requires a running event loop."""
+        """Start and initialise the guard process when its turn comes, in a running event loop."""
         self._turns = start_turns()
         self._turns.take(self, self._launch)
 

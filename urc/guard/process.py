@@ -1,4 +1,4 @@
-"""Start and end the guard process."""
+"""Starts and ends the guard process."""
 
 import asyncio
 import hmac
@@ -43,7 +43,7 @@ class GuardAcceptor:
         return int(self._listener.getsockname()[1])
 
     async def admitted(self) -> socket.socket:
-        """Return the guard's connection; raise `TimeoutError` after 10 s without one."""
+        """Return the guard's connection; raise `TimeoutError` after 10 s without a connection."""
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(_ADMIT_S):
@@ -81,7 +81,7 @@ class GuardAcceptor:
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the guard process; return the process, and our end of the pipe or the acceptor."""
+    """Start the guard process; return it with either this end of the pipe or the acceptor."""
     return _heir() if is_inherited else _visitor()
 
 

@@ -157,7 +157,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close immediately. Never raises; a second call does nothing."""
+        """Close immediately and raise no exceptions; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()

@@ -102,7 +102,7 @@ class SendQueue(Generic[_Tag]):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     def end(self) -> list[_Tag]:
-        """Stop sending, and return the unsent frames' tags."""
+        """Stop sending and return the unsent frames' tags."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -154,7 +154,7 @@ def tolerant(
 ) -> Callable[_P, _R]:
     """Return `call`, wrapped so that a failure calls `failed` and returns `instead`.
 
-    A third-party transport may raise anything. An exception must not end a lease's timer.
+    A third-party transport may raise any exception, but the exception must not end a lease's timer.
     """
 
     def tried(*args: _P.args, **kwargs: _P.kwargs) -> _R:

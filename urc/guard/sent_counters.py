@@ -40,7 +40,7 @@ class SentCounters:
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop frame with the next counter values; if none fits, return the last one.
+        """Return the stop frame with the next counter values, or the last frame if no frame fits.
 
         A stop with a wrong counter value is better than no stop.
         """

@@ -1,4 +1,4 @@
-"""Turns in which the guards of one event loop start.
+"""The turns in which the guards of one event loop start.
 
 A guard needs a processor for 0.1 to 0.4 s to load its modules. Twenty guards that start together
 leave the server too little processor time for the ticks of driven robots. Decision record:
@@ -17,7 +17,7 @@ START_TIMEOUT_S: Final = 2.0
 """Maximum time for which a guard without a heartbeat keeps its turn, in seconds."""
 _MOST: Final = 4
 """Maximum number of guards that start at the same time. A container may have fewer processors than
-it sees, so the number of processors alone is no limit."""
+it sees, so the number of processors alone is not a reliable limit."""
 
 
 class StartTurns:
@@ -47,7 +47,7 @@ class StartTurns:
             launch()
 
     def end(self, guard: object) -> None:
-        """End a guard's turn or wait, because it has started, failed or is not needed."""
+        """End the turn or the wait of a guard that has started, failed or become unnecessary."""
         self._waiting.pop(guard, None)
         timer = self._starting.pop(guard, None)
         if timer is not None:

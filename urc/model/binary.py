@@ -100,7 +100,7 @@ class Item(NamedTuple):
 
     @property
     def is_given(self) -> bool:
-        """Whether the item is a field when reading, and an argument when sending."""
+        """Whether the item is a field when reading and an argument when sending."""
         return bool(self.id) and self.const is None and self.value is None
 
 

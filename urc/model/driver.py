@@ -258,7 +258,7 @@ class Poll(NamedTuple):
 
 
 class Message(NamedTuple):
-    """A declared unsolicited frame, and the signals that it updates."""
+    """A declared unsolicited frame and the signals that it updates."""
 
     name: str
     transport: str

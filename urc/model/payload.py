@@ -5,8 +5,8 @@ has a parser in `urc.config`, which writes `options`, and a factory in `urc.prot
 `options`. Only the parser and the factory of a form use the content of `options`.
 
 Decoding returns *fields*: raw values by name. A field with the name of a signal sets that signal. A
-field name that starts with ``_`` is private to the document (conditions, correlation, command
-replies).
+field name that starts with ``_`` is private to the document, for use in conditions, correlation and
+command replies.
 """
 
 import json
@@ -78,7 +78,7 @@ class FrameVariants(NamedTuple):
 
 
 class CountedFrame(NamedTuple):
-    """A frame with counters, and a function that renders the frame again."""
+    """A frame with counters and a function that renders the frame again."""
 
     numbered: Numbered
     again: Callable[[], Numbered | None]

@@ -1,4 +1,4 @@
-"""Steps of a sequence: one class for each kind of step, and the union type `Step`.
+"""Steps of a sequence: one class for each kind of step and the union type `Step`.
 
 Modules that handle every kind of step import this module as `sequence`.
 """
@@ -106,7 +106,7 @@ class RepeatStep(NamedTuple):
 
 
 class RunStep(NamedTuple):
-    """Run a command or another sequence, and wait for completion."""
+    """Run a command or another sequence and wait for completion."""
 
     command: str
     arguments: Mapping[str, Template | Value] = NOTHING

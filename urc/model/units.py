@@ -1,4 +1,4 @@
-"""Units by quantity, and the conversion of values between them. Pure.
+"""Units by quantity, and the conversion of values between units. Pure.
 
 The unit table contains only units that occur in robot documents. Unit symbols follow UCUM, unless
 the UCUM symbol is uncommon. A value in an unknown unit can be converted only to the same unit.

@@ -164,7 +164,8 @@ class Signal(NamedTuple):
     """Dead band in `unit`: smaller changes are not reported. An array is reported when any element
     changes by at least the dead band."""
     debounce_s: float = 0.0
-    """Debounce time in seconds: a new value is reported only after this time."""
+    """Debounce time in seconds: a new value is reported only after it has been stable for this
+    time."""
 
 
 class Sample(NamedTuple):

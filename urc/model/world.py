@@ -1,7 +1,7 @@
 """The world of an emulated robot, as declared in a document.
 
-Lengths are in metres, angles in radians, times in seconds. Directions follow REP-103: x forward, y
-left, z up, angles counter-clockwise. `READINGS` lists the names of all sensor values.
+Lengths are in metres, angles in radians, and times in seconds. Directions follow REP-103: x
+forward, y left, z up, angles counter-clockwise. `READINGS` lists the names of all sensor values.
 """
 
 from collections.abc import Mapping

@@ -28,7 +28,7 @@ class ControlInput(NamedTuple):
 
 
 class Freshness:
-    """The heartbeats sent to one page, and the page's newest input for each control."""
+    """The heartbeats sent to one page and the page's newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
         """Create a check that has issued no heartbeats.
@@ -60,7 +60,7 @@ class Freshness:
         if given.epoch != epoch:
             return f"the input belongs to lease {given.epoch}, but the current lease is {epoch}"
         if given.number <= self._newest.get(of, -1):
-            return "the input is not newer than the last one"
+            return "the input is not newer than the previous input"
         back = self._number - given.echo
         if not 0 <= back < len(self._issued):
             return "the input does not echo a beat of this server"
@@ -74,7 +74,7 @@ class Freshness:
         """Store the number of a release, so that earlier inputs for this control no longer count.
 
         Args:
-            number: number of the release, counted together with the inputs; 0 for none.
+            number: number of the release, counted together with the inputs; 0 means no number.
             of: the released control.
         """
         self._newest[of] = max(number, self._newest.get(of, 0))

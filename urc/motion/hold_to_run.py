@@ -1,4 +1,4 @@
-"""One hold-to-run control: its frames during motion, and its stop.
+"""One hold-to-run control: its frames during motion and its stop.
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
 while *ticks of sampled input* arrive. Each tick renews a short lease and replaces any unsent value.
@@ -100,7 +100,7 @@ class HoldToRun:
         return self._waiting is not None
 
     def must_stop(self, now: float) -> bool:
-        """Return whether the control is being stopped, or its lease has expired."""
+        """Return whether the control is being stopped or its lease has expired."""
         return self.state == "stopping" or (self.state == "moving" and now >= self._expires_at)
 
     @property
@@ -113,7 +113,7 @@ class HoldToRun:
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
-        """Replace the terms, but keep a pending stop. A new period resets the rate limiter.
+        """Replace the terms but keep a pending stop. A new period resets the rate limiter.
 
         Raises:
             ValueError: the lease or the period is out of range.
@@ -146,7 +146,7 @@ class HoldToRun:
         return True
 
     def forget(self) -> None:
-        """Drop the unsent value, but keep the lease."""
+        """Drop the unsent value but keep the lease."""
         self._waiting = None
 
     def stop(self, reason: Reason, now: float) -> None:
@@ -193,7 +193,7 @@ class HoldToRun:
         return self.terms.stop
 
     def cut(self, *, is_doubtful: bool = False) -> None:
-        """Record the loss of the connection: drop the unsent value, and owe a stop if needed.
+        """Record the loss of the connection: drop the unsent value and mark a required stop due.
 
         Args:
             is_doubtful: whether a written stop may have been lost with the connection.
@@ -205,6 +205,6 @@ class HoldToRun:
         self._waiting = None
 
     def restored(self, now: float) -> None:
-        """Record that the connection is restored; an owed stop is sent first."""
+        """Record that the connection is restored; a stop that is still due is sent first."""
         if self.owes_stop:
             self.stop("revoked", now)

@@ -153,7 +153,7 @@ class Lease:
     def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
-        """Ask the holder for the lease, and grant it after `for_s` seconds without an answer."""
+        """Ask the holder for the lease and grant it after `for_s` seconds without an answer."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
@@ -204,7 +204,7 @@ class Lease:
     def reset(self, client: Operator, stops: int | None = None) -> LeaseChanged | LeaseRefused:
         """Reset the latch, so that operators can drive the robot again.
 
-        A reset does not start motion, and does not undo a newer STOP. `stops` is the number of
+        A reset neither starts motion nor undoes a newer STOP. `stops` is the number of
         STOPs that `client` knew of. None means the current number.
         """
         if not includes(client.role, "drive"):

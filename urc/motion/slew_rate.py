@@ -18,7 +18,7 @@ _LONGEST_S: Final = 1.0
 
 
 class SlewRateLimiter:
-    """The slew rate limits of one held command, and its current distance from rest."""
+    """The slew rate limits of one held command and its current distance from rest."""
 
     __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
 

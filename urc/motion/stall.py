@@ -67,7 +67,7 @@ class StallWatch:
     def saw(self, unsent: int, now: float) -> bool:
         """Record the number of unsent bytes; return whether the connection is stalled.
 
-        Call this method immediately before each write, and regularly between writes.
+        Call this method immediately before each write and regularly between writes.
         """
         if not unsent:
             self.reset()

@@ -16,7 +16,7 @@ __all__ = ["block", "export_blocks", "unblock"]
 
 
 def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
-    """Add an entry to a repository's block list, and sign the index; return the index.
+    """Add an entry to a repository's block list and sign the index; return the index.
 
     The new entry replaces an entry with the same subject.
 
@@ -32,7 +32,7 @@ def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
 
 
 def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Index:
-    """Withdraw an entry from the block list, and sign the index; return the index.
+    """Withdraw an entry from the block list and sign the index; return the index.
 
     Raises:
         PackageError: as for `block`, or no entry has this subject.

@@ -1,8 +1,8 @@
 """The block lists known on this machine, in ``blocks.json`` in the packages folder.
 
-A list stays known while its repository is unreachable, expired or removed. An entry therefore
-applies until the package is removed, or until a newer list from the same maintainer omits the
-entry.
+A list stays known even if its repository is unreachable or removed, or has an expired index. An
+entry therefore applies until the package is removed, or until a newer list from the same maintainer
+omits the entry.
 """
 
 from collections.abc import Iterable

@@ -27,7 +27,7 @@ class HttpResponse(NamedTuple):
     """A web server's response."""
 
     status: int
-    """Status code: 200, 304 for an unchanged file, or 404 for a permitted missing file."""
+    """Status code: 200, 304 for an unchanged file, or 404 for a file that may be missing."""
     etag: str
     body: bytes
 

@@ -1,4 +1,4 @@
-"""A repository's folder: source packages, and files that any web server can serve.
+"""A repository's folder: source packages and files that any web server can serve.
 
     DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
     DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
@@ -109,7 +109,7 @@ def make_index(
 
 @contextmanager
 def changing(folder: Path) -> Iterator[Path]:
-    """Lock a repository against other processes, and yield a folder for incomplete files.
+    """Lock a repository against other processes and yield a folder for incomplete files.
 
     Raises:
         PackageError: another process has held the lock for more than ten seconds.

@@ -53,7 +53,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
-        """Reject an invalid expiry time, and an expiry time without a signature."""
+        """Reject an invalid expiry time and an expiry time without a signature."""
         if self.expires:
             datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (the format has a Z)
         if bool(self.expires) != isinstance(self.signature, Signature):

@@ -42,7 +42,7 @@ def plan_requirement(
 
     Args:
         required: the requirement.
-        sources: package sources, in the order of requests.
+        sources: package sources, in the order in which they are queried.
         store: store with archives that need no download.
         complain: callback that receives warnings for the user.
         pinned: lock with the only accepted versions and digests, even if a version was withdrawn

@@ -51,7 +51,7 @@ class PackageRequirement(NamedTuple):
 
 
 def parse_key(text: str) -> PackageId:
-    """Return the identity in text like ``drivers/puppet``; raise `PackageError` if invalid."""
+    """Return the identity in text such as ``drivers/puppet``; raise `PackageError` if invalid."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(

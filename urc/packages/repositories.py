@@ -23,7 +23,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""Number of attempts; a repository may change between the two requests for head and index."""
+"""Number of attempts; a repository may change between the requests for the head and the index."""
 
 
 class _RepositoriesFile(msgspec.Struct, frozen=True):
@@ -127,7 +127,7 @@ class Repository:
             self._complain(str(error))
 
     def _asked(self) -> Index | None:
-        """Request head and index once; return None if the index does not match its signed head."""
+        """Request the head and the index once; return None if a signed head names another index."""
         kept = self._kept()
         said = kept[1].said if kept is not None else None
         etag = kept[1].head if kept is not None and said is not None else ""
@@ -216,7 +216,7 @@ class Repository:
 
 
 class Repositories:
-    """The user's repositories, in the order of requests."""
+    """The user's repositories, in the order in which they are queried."""
 
     def __init__(self, folder: Path, complain: Callable[[str], None]) -> None:
         self._folder = folder / "repositories"

@@ -1,6 +1,6 @@
 """Dependency resolution, which chooses a version for every required package.
 
-The search uses `resolvelib`, which is pip's resolver. The resolver backtracks after a conflict, and
+The search uses `resolvelib`, which is pip's resolver. The resolver backtracks after a conflict and
 reports conflicts that have no solution. This module defines packages, dependencies and the
 preferred version, which is the newest match.
 """

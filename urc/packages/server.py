@@ -1,4 +1,4 @@
-"""HTTP server for a repository's listed files, and for the lists in figure B.3 of the URC thesis.
+"""HTTP server for a repository's listed files and for the lists in figure B.3 of the URC thesis.
 
 Only files in the index are served. The server reads the index again after each change, so new
 packages need no restart.
@@ -146,7 +146,7 @@ class UploadService:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return the body if `is_kept`, otherwise b""; raise `SubmissionRefused` for a large body."""
+    """Return the body if `is_kept`, otherwise b""; raise `SubmissionRefused` if it is too large."""
     size = 0
     pieces = []
     async for piece in request.stream():

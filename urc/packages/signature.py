@@ -1,8 +1,9 @@
-"""Ed25519 signatures for packages; each signs a readable text statement.
+"""Ed25519 signatures for packages; each signature covers a statement in readable text.
 
-A signature states that the key's holder declares these bytes to be this version of this package.
-URC does not verify the identity of the key's holder. The first installation of a package pins its
-key. Later versions signed with another key are rejected. SSH handles host keys in the same way.
+A signature states that the key's holder declares an archive's bytes to be a particular version of a
+package. URC does not verify the identity of the key's holder. The first installation of a package
+pins its key. Later versions signed with another key are rejected. SSH handles host keys in the same
+way.
 """
 
 import base64
@@ -52,7 +53,7 @@ class Signature(msgspec.Struct, frozen=True):
     """Signature, 64 bytes in base64."""
 
     def __post_init__(self) -> None:
-        """Reject ambiguous base64, and names with hidden characters."""
+        """Reject ambiguous base64 and names with hidden characters."""
         for text in (self.key, self.value):
             if base64.b64encode(base64.b64decode(text)).decode() != text:
                 raise ValueError("expected base64 without extra bits")

@@ -171,7 +171,7 @@ def merged(
     that is added later therefore cannot offer a newer version of a known package.
 
     Args:
-        sources: package sources, in the order of requests.
+        sources: package sources, in the order in which they are queried.
         complain: callback that receives an error message about each unreachable source.
     """
     found: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}

@@ -184,7 +184,7 @@ class Store:
         return files
 
     def _collect(self) -> None:
-        """Delete the files of removed locks, but leave files still in use for a later change."""
+        """Delete the files of removed locks; a later change deletes files that are still in use."""
         locks = self.state().kept
         digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
         for folder, wanted in (

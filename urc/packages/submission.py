@@ -47,7 +47,7 @@ def take(
     provenance: Provenance | None = None,
     index_signer: IndexSigner | None = None,
 ) -> SubmissionResult:
-    """Check an untrusted package, and list it in the repository's index.
+    """Check an untrusted package and list it in the repository's index.
 
     Args:
         folder: the repository's folder.
@@ -99,7 +99,7 @@ def _noted(notes: Notes, provenance: Provenance | None, entry: IndexEntry) -> No
 
 
 def _opened(file: str, data: bytes, signature: Signature | None) -> tuple[Package, IndexEntry]:
-    """Return the package in an uploaded archive, and its index entry."""
+    """Return the package in an uploaded archive and its index entry."""
     try:
         package = open_package(data, file)
         entry = entry_of(package, signature)

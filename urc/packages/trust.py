@@ -65,7 +65,9 @@ class PinnedKey:
         return pin.number if pin is not None else 0
 
     def check(self, head: IndexHead | None) -> None:
-        """Raise `PackageError` unless a head has the pinned key, is valid, and is not outdated.
+        """Raise `PackageError` for an invalid or outdated head, or one without the pinned key.
+
+        While no key is pinned, a missing head and an unsigned head are accepted.
 
         Args:
             head: the repository's head; None for a missing or damaged head.
@@ -89,7 +91,7 @@ class PinnedKey:
             raise PackageError(
                 f"{self._url}: the index number decreased from {pin.number} to {head.number}; if"
                 f" the maintainer confirms the change, run 'urc repo remove {self._url}' and add"
-                " the repository again"
+                " it again"
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(

@@ -88,7 +88,7 @@ def newer(
 
     Args:
         store: store with the installed packages.
-        sources: repositories, in the order of requests.
+        sources: repositories, in the order in which they are queried.
         complain: callback that receives a message about each unreachable repository and each
             dependency conflict.
 
@@ -150,7 +150,7 @@ def staged_difference(
         look: function that returns the preview of a package's documents.
 
     Raises:
-        UrcError: the new document has errors, or refers to a file outside its package.
+        UrcError: the new document has errors or refers to a file outside its package.
     """
     before = _seen(old, store.make(old), look)
     after = _seen(plan.lock, staged, look)
@@ -161,7 +161,7 @@ def staged_difference(
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return the items that are only in `after`, and the items that are only in `before`."""
+    """Return the items that are only in `after` and the items that are only in `before`."""
     old, new = list(before), list(after)
     return [one for one in new if one not in old], [one for one in old if one not in new]
 
@@ -223,7 +223,7 @@ def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
 
 
 def _is_step_up(old: Lock, new: Lock) -> bool:
-    """Return whether at least one dependency is newer, and no dependency is older."""
+    """Return whether at least one dependency is newer and no dependency is older."""
     pairs = [
         (parse_version(pin.version), parse_version(new.packages[name].version))
         for name, pin in old.packages.items()

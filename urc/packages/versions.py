@@ -1,4 +1,4 @@
-"""Versions according to Semantic Versioning 2.0, and version ranges of dependencies.
+"""Versions according to Semantic Versioning 2.0 and version ranges of dependencies.
 
 `semver` parses and compares versions. The library does not support ranges, so URC parses them:
 ``^1.2``, ``~1.2.3``, ``>=1.2, <2``, ``1.2.3`` and ``*``.

@@ -86,12 +86,12 @@ class Engine:
         driver: a loaded driver, with compiled patterns and templates.
         settings: values of all settings in the profile, keyed by name.
         fresh: sources of time and randomness for sent frames; tests pass fixed sources.
-        is_compiled: whether to generate a function for each message and command. This saves time in
-            live sessions. In short document tests, generating the functions takes more time than it
-            saves.
+        is_compiled: whether to generate a function for each message and command. Generated
+            functions save time in live sessions. In short document tests, generating the functions
+            takes more time than it saves.
 
     Raises:
-        BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
+        BadArgument: a constant frame contains its own delimiter or cannot be encoded.
     """
 
     def __init__(
@@ -261,14 +261,14 @@ class Engine:
         confirmed_by: tuple[str, ...] = (),
         unless: Unless | None = None,
     ) -> list[LineEvent]:
-        """Run a command or sequence, and report the outcome to `sink` exactly once.
+        """Run a command or sequence and report the outcome to `sink` exactly once.
 
         The command is not sent if `unless` returns a reason.
         """
         found = self._commands.get(command)
         if found is None:
             known = ", ".join(self._commands) or "none"
-            text = f"there is no command {command!r}; there are: {known}"
+            text = f"there is no command {command!r}; the commands are: {known}"
             return sink(ExchangeOutcome("unknown-command", text), now)
         try:
             values = self._checks[command](arguments)

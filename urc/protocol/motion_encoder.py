@@ -1,8 +1,8 @@
 """Motion frames: setpoints and stops for held commands.
 
 Pure. Motion frames bypass the connection's request queue. The owner of the transport sends only the
-newest setpoint, and sends a stop before any other frame. Setpoints must meet all requirements of
-the command.
+newest setpoint and sends a stop before any other frame. Setpoints must meet all requirements of the
+command.
 """
 
 from collections.abc import Callable, Container, Mapping

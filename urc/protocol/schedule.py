@@ -70,7 +70,7 @@ class PollState:
         return _submit(self._line, self._ask, self, self._names, now)
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Count missed replies, and report refusals."""
+        """Count missed replies and report refusals."""
         if outcome.code == "timed-out" and self.poll.offline is not None:
             self._misses += 1
             if self._misses >= self.poll.offline.after:
@@ -214,7 +214,7 @@ class PollSchedule:
             poll.stop()
 
     def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit the due requests one at a time, and yield the events for each."""
+        """Submit the due requests one at a time and yield the events for each."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.submit_if_due(now)
@@ -224,7 +224,7 @@ class PollSchedule:
 
 
 def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
-    """Return the labels of requests that count as keepalives; None for all requests."""
+    """Return the labels of requests that count as keepalives; None if all requests count."""
     if not keepalive.after:
         return None
     named = {*keepalive.after, keepalive.run}

@@ -1,9 +1,9 @@
 """The writer of the alarm file.
 
 Layer 4. `AlarmStore.save` queues records and events in memory and returns. A separate thread writes
-them, with one transaction per batch. The queue contains only the newest record of each alarm, so
-its size is limited by the number of signals. If too many events are waiting, the oldest events are
-dropped and counted.
+the queue, with one transaction per batch. The queue contains only the newest record of each alarm,
+so its size is limited by the number of signals. If too many events are waiting, the oldest events
+are dropped and counted.
 """
 
 import logging
@@ -69,7 +69,7 @@ class AlarmStore:
     def load(self, robot: str) -> list[AlarmRecord]:
         """Return a robot's records; [] if the file cannot be read.
 
-        Only the first call reads the file, at the start of the server.
+        Only the first call reads the file, when the server starts.
         """
         with self._wakes:
             if self._known is None:
@@ -82,7 +82,7 @@ class AlarmStore:
             for robot, record in load_records(self.file):
                 known.setdefault(robot, {})[record.signal] = record
         except OSError as error:
-            log.warning("the alarms of the last run are lost: %s", error)
+            log.warning("the alarms of the previous run are lost: %s", error)
         return known
 
     def save(
@@ -108,14 +108,17 @@ class AlarmStore:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait for all writes; return whether they are done. Never call this on the event loop."""
+        """Wait for all writes; return whether they are done.
+
+        Never call this method on the event loop.
+        """
         with self._wakes:
             return self._wakes.wait_for(
                 lambda: not (self._records or self._events or self._is_busy), timeout_s
             )
 
     def close(self) -> None:
-        """Spend at most two seconds writing the queued changes, and end the thread."""
+        """Spend at most two seconds writing the queued changes, then end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()

@@ -40,7 +40,7 @@ _SPARE: Final = 1000
 """Number of excess events that are deleted together."""
 _VERSION: Final = 1
 _LONGEST_S: Final = 5.0
-"""Maximum time of one search, in seconds."""
+"""Maximum duration of one search, in seconds."""
 _STEPS: Final = 50_000
 _COLUMNS: Final = AlarmEvent._fields
 _TYPES: Final = {"at": "REAL", "until": "REAL", "times": "INTEGER"}
@@ -78,8 +78,8 @@ class AlarmQuery(NamedTuple):
 
     robot: str
     text: str = ""
-    """Text to find in the signal, kind, condition, value or name; case does not matter for
-    ASCII."""
+    """Text to find in the signal, kind, condition, value or name; the case of ASCII letters is
+    ignored."""
     kinds: tuple[str, ...] = ()
     """Kinds of events; empty for all kinds."""
     signals: tuple[str, ...] = ()
@@ -95,7 +95,7 @@ class AlarmQuery(NamedTuple):
 
 
 def alarm_file(file: Path) -> sqlite3.Connection:
-    """Return a connection for writing; create the file, readable only by its owner.
+    """Return a connection for writing; create a missing file, which only its owner can read.
 
     Raises:
         sqlite3.DatabaseError: the file is not an alarm file.

@@ -1,4 +1,6 @@
-"""The writer of the audit log, an SQLite file of motion and administration, with person and right.
+"""The writer of the audit log, an SQLite file.
+
+The file records motion and administration, with person and right.
 
 Theory of operation. `AuditLog.add` puts an entry into a short queue and returns. The call never
 waits for a disk, because motion and STOP call `add`. A separate thread writes the queued entries
@@ -90,7 +92,7 @@ class AuditLog:
             return self._wakes.wait_for(lambda: not self._waiting and not self._is_busy, timeout_s)
 
     def close(self) -> None:
-        """Spend at most two seconds writing the queued entries, and end the thread."""
+        """Spend at most two seconds writing the queued entries, then end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()
@@ -126,7 +128,7 @@ class AuditLog:
                 base.close()
 
     def _next_batch(self) -> list[AuditEntry]:
-        """Wait briefly for a batch, and return the queued entries; return [] after `close`."""
+        """Wait briefly for a batch and return the queued entries; return [] after `close`."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()
@@ -155,7 +157,7 @@ class AuditLog:
             lost = self._lost
         entries = [*batch]
         if lost:
-            text = f"{lost} entries could not be written"
+            text = f"entries that could not be written: {lost}"
             entries.append(AuditEntry(self._now(), "", "lost", outcome=text, times=lost))
         base.execute("BEGIN IMMEDIATE")
         try:

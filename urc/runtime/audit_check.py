@@ -1,4 +1,4 @@
-"""Check the audit log's hash chain, and export the log as JSON Lines for later checks.
+"""Check the audit log's hash chain and export the log as JSON Lines for later checks.
 
 Layer 4. All functions block, so servers call them in a thread.
 
@@ -23,7 +23,8 @@ from urc.runtime.sqlite_file import opened_for_reading
 __all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "exported", "line_of"]
 
 _AT_ONCE: Final = 500
-"""Number of entries per read transaction, so that a slow download does not delay the writer."""
+"""Number of entries per read transaction, limited so that a slow download does not delay the
+writer."""
 _SLICE: Final = 25
 _PAUSE_S: Final = 0.001
 """Pause after every `_SLICE` entries, in seconds, so that an export does not delay motion."""
@@ -133,7 +134,7 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
 
 
 def compare(file: Path, export: ExportCheck) -> str:
-    """Return a message if the audit log lacks an export's last entry, or else ""; see `check`.
+    """Return a message if the audit log lacks an export's last entry, otherwise ""; see `check`.
 
     An export kept elsewhere therefore shows whether entries were cut off the end of the log.
 

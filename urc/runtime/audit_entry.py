@@ -28,8 +28,8 @@ class AuditEntry(NamedTuple):
     what: str
     """Kind of event, such as ``moved``, ``STOP`` or ``signed in``."""
     who: str = ""
-    """Name of the person, device or program that caused the event, or of the page if not signed
-    in."""
+    """Name of the person, device or program that caused the event; without a sign-in, the name of
+    the page."""
     role: str = ""
     client: str = ""
     """Identifier of the page's connection to the server, or of a sign-in."""

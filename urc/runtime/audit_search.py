@@ -20,7 +20,7 @@ __all__ = ["MOST", "AuditQuery", "SearchTimeout", "condition", "search"]
 MOST: Final = 1000
 """Maximum number of entries in one result for a page or a program."""
 _LONGEST_S: Final = 5.0
-"""Maximum time of one search, in seconds."""
+"""Maximum duration of one search, in seconds."""
 _STEPS: Final = 50_000
 """Number of SQLite steps between two checks of the clock."""
 _TEXTS: Final = tuple(name for name in COLUMNS if AuditEntry.__annotations__[name] is str)
@@ -42,7 +42,7 @@ class AuditQuery(NamedTuple):
     what: tuple[str, ...] = ()
     """Kinds of events; empty for all."""
     text: str = ""
-    """Text to find in any column; case does not matter for ASCII."""
+    """Text to find in any column; the case of ASCII letters is ignored."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")

@@ -77,7 +77,7 @@ class Retention(NamedTuple):
 
 
 def connected(file: Path) -> sqlite3.Connection:
-    """Return a connection for writing; create or migrate the file, readable only by its owner.
+    """Return a connection for writing; create or migrate the file, which only its owner can read.
 
     Raises:
         sqlite3.DatabaseError: the file is not an audit log.
@@ -96,7 +96,7 @@ def connected(file: Path) -> sqlite3.Connection:
 
 
 def select(base: sqlite3.Connection) -> str:
-    """Return the start of a query for `row_of`, which also suits tables from older versions."""
+    """Return the start of a query for `row_of`; the query also works with older tables."""
     has = _columns(base)
     later = [name if name in has else f"'' AS {name}" for name in COLUMNS[FIRST_COLUMNS:]]
     version = "version" if is_migrated(base) else "1 AS version"
@@ -184,7 +184,7 @@ def _young(base: sqlite3.Connection, since: float) -> int:
 
 
 def _delete(base: sqlite3.Connection, until: int, now: float, reason: str) -> None:
-    """Delete all entries before the number `until`."""
+    """Delete all entries before entry number `until`."""
     before = base.execute(
         "SELECT id, chain FROM entries WHERE id < ? ORDER BY id DESC LIMIT 1", (until,)
     ).fetchone()

@@ -85,7 +85,7 @@ class BackupFile(NamedTuple):
     """One file in an archive."""
 
     path: str
-    """Path relative to the data folder, with ``/``."""
+    """Path relative to the data folder, with ``/`` as the separator."""
     size: int
     mode: int
     """Permission bits."""
@@ -113,7 +113,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
 def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
     """Write a backup of a data folder; return the files in the backup and the unknown files.
 
-    The archive appears only when it is complete, and is readable only by its owner.
+    The archive appears only when it is complete and is readable only by its owner.
 
     Args:
         data: the data folder.
@@ -262,7 +262,7 @@ class BackupReader:
                 break
             target.write(block)
         if left:
-            raise BackupError(f"{self._name}: {one.path!r} has a different size than declared")
+            raise BackupError(f"{self._name}: {one.path!r} does not have its declared size")
 
     def _manifest(self, entry: zipfile.ZipInfo) -> BackupManifest:
         try:
@@ -293,7 +293,7 @@ def opened_backup(file: Path) -> Iterator[BackupReader]:
     """Open a backup.
 
     Raises:
-        BackupError: the file cannot be read, or is not a backup.
+        BackupError: the file cannot be read or is not a backup.
     """
     try:
         opened = file.open("rb")

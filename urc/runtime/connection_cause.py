@@ -79,7 +79,7 @@ CAUSES: Final = (
     ),
     _CauseRow(
         "login",
-        ("steps of the connection are not done",),
+        ("on_connect steps are not complete",),
         "the robot does not answer the login: check user and password, and the kind of robot",
     ),
     _CauseRow(

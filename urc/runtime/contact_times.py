@@ -1,6 +1,6 @@
 """The times of each robot's last use and last data, stored across restarts.
 
-Layer 4. The store keeps the times in memory. Its method `save` writes a small file and may block,
+Layer 4. The store keeps the times in memory. The method `save` writes a small file and may block,
 so the server calls `save` in a thread. If the file is lost, only the order of the robots in the
 menu changes.
 """
@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 
 class ContactTimes(NamedTuple):
-    """The times of a robot's last use and last data."""
+    """The times at which a robot was last used and last sent data."""
 
     used_at: float | None = None
     """UTC time at which a page or program last used the robot, in seconds since 1970; None means
@@ -98,7 +98,7 @@ class ContactStore:
             del self._times[min(self._times, key=lambda each: self._times[each].newest)]
 
     def save(self) -> None:
-        """Write the file if a time has changed; log any failure, and retry on the next call.
+        """Write the file if a time has changed; log any failure and retry on the next call.
 
         The call blocks. This method can run in another thread while the event loop records further
         times.

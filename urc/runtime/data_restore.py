@@ -34,7 +34,7 @@ _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
 """Suffixes of the files that SQLite stores next to a database."""
 _LATCH_BYTES: Final = 4096
 _OLD: Final = "replaced-????????"
-"""Pattern for the name of the folder for replaced files."""
+"""Pattern for the names of folders with replaced files."""
 
 
 def check_target(data: Path, *, replaces: bool) -> None:
@@ -105,7 +105,7 @@ def _folder(data: Path, purpose: str) -> Iterator[Path]:
 
 
 def _tidy(data: Path) -> None:
-    """Remove the folders left by a restore that a power failure interrupted; keep its audit log."""
+    """Remove the folders left by an interrupted restore, but keep the replaced audit log."""
     for folder in data.glob(_OLD):
         _keep_audit(folder, data)
         shutil.rmtree(folder, ignore_errors=True)

@@ -1,7 +1,7 @@
 """A short digest of a robot's network destinations, used to bind secrets to these destinations.
 
 Secrets are sent to the hosts named in the transport options. Each secret is therefore stored with
-its destination, and is never used for a different destination.
+its destination and is never used for a different destination.
 """
 
 import json

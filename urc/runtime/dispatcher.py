@@ -307,7 +307,7 @@ class Dispatcher:
         self._arm()
 
     def stop(self, reason: str) -> None:
-        """Stop calling the engine, and fail every pending command."""
+        """Stop calling the engine and fail every pending command."""
         self._is_stopped = True
         if self._alarm is not None:
             self._alarm.cancel()

@@ -43,7 +43,7 @@ class _Complaint(NamedTuple):
 
 
 def exercise(profile: Profile) -> TestReport:
-    """Run every test of `profile`; return the failures, and the used parts of the driver."""
+    """Run every test of `profile`; return the failures and the used parts of the driver."""
     settings = sample_settings(profile.settings)
     problems = []
     used: set[Exercised] = set()
@@ -147,7 +147,7 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
 
 
 def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
-    """Connect, send the request and feed the reply; return the failure messages."""
+    """Connect, send the request and pass the reply to the engine; return the failure messages."""
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     checks = bool(test.expect or test.sent or test.fails is not None)
     asked = trial.driver.commands.get(command or "")
@@ -260,7 +260,7 @@ def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
-    """Report a missing declared failure, and discard the step's other events."""
+    """Report a missing declared failure and discard the step's other events."""
     failures = list(trial.failures)
     if step.of:
         ended = [one for one in trial.ended if one.command == step.of]

@@ -36,7 +36,7 @@ class FileWatcher:
 
 
 def wait_for_change(watched: FileWatcher, sleep: Callable[[float], None] = time.sleep) -> list[str]:
-    """Wait until at least one file has changed and all files are stable for one period.
+    """Wait until at least one file has changed and all files have been stable for one period.
 
     Return the changed files.
 

@@ -78,9 +78,9 @@ class MotionBackend(Protocol):
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait for written or lost stop frames; return the command and the report for each frame.
 
-        The returned list is in order and never empty. Cancelling the wait loses no stop. After the
-        transport has accepted the stop frame, a control that was stopped by `stop` is reported as
-        ``stopped``, even if it was not moving.
+        The returned list is in order and never empty. If the wait is cancelled, no stop is lost.
+        After the transport has accepted the stop frame, a control that was stopped by `stop` is
+        reported as ``stopped``, even if it was not moving.
         """
 
 
@@ -101,7 +101,7 @@ class MotionSession(Protocol):
 
 @dataclass(slots=True)
 class HeldControl:
-    """The motion controller's state of one held command."""
+    """The motion controller's state for one held command."""
 
     line: str
     hold: Hold
@@ -116,12 +116,12 @@ class HeldControl:
     is_lasting: bool = False
     """Whether the stop frame stays the same while the command is armed."""
     motion_state: Literal["rest", "moving", "ending"] = "rest"
-    """``ending`` means that the control was released, but the stop is not yet reported as
-    written."""
+    """``ending`` means that the control has been released, but the stop has not yet been
+    reported as written."""
     stop: Payload | FrameVariants | None = None
     """Stop frame of the command that was last passed to the motion backend."""
     is_owed_again: bool = False
-    """Whether the stop was sent before the transport was ready, and must be repeated."""
+    """Whether the stop was sent before the transport was ready and must be repeated."""
     needs_release: bool = False
     why: str = ""
     """Reason why the control must be released before new motion; "" if there is no reason."""

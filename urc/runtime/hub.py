@@ -2,7 +2,7 @@
 
 Layer 4. Readers always see the newest reading; a slow reader never receives a queue of old
 readings. Log entries (faults and state changes) are kept in a bounded list, with a count of the
-dropped entries. The hub is used on one event loop, and has no tasks or timers.
+dropped entries. The hub is used on one event loop and has no tasks or timers.
 
 Pages, cards, recordings and the command line all read their values from the hub. The hub therefore
 redacts secret settings in all incoming data.
@@ -82,7 +82,10 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return, by signal, the sequence number of each signal's oldest reading in `names`."""
+        """Return the sequence number of each signal's oldest reading, keyed by signal.
+
+        `names` contains one signal name for each new reading.
+        """
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
@@ -157,7 +160,7 @@ class HubSubscription:
         """Revision of the last change that this reader has taken."""
 
     async def changed(self) -> None:
-        """Return when the hub has a newer revision than `seen`."""
+        """Wait until the hub has a revision newer than `seen`."""
         while self._hub.revision <= self.seen:
             self._event.clear()
             await self._event.wait()
@@ -218,7 +221,7 @@ class EventTap:
         self._event = asyncio.Event()
 
     def push(self, items: Iterable[Tapped]) -> None:
-        """Add events; if the tap exceeds `TAP_KEPT`, drop the oldest ones."""
+        """Add events; if the tap exceeds `TAP_KEPT`, drop the oldest events."""
         for item in items:
             if len(self._kept) == TAP_KEPT:
                 self._kept.popleft()
@@ -227,7 +230,7 @@ class EventTap:
         self._event.set()
 
     async def filled(self) -> None:
-        """Return when events are available."""
+        """Wait until events are available."""
         while not self._kept:
             self._event.clear()
             await self._event.wait()
@@ -394,7 +397,7 @@ class Hub:
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
-        """Return, oldest first, the newest readings and every streamed reading after `revision`.
+        """Return the newest readings and every streamed reading after `revision`, oldest first.
 
         Streamed readings before `joined`, the reader's first revision, are omitted.
         """

@@ -81,7 +81,7 @@ class PreviewWorker:
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Limit the resources of this process, and give it a lower priority than motion.
+    """Limit the resources of this process and give it a lower priority than motion.
 
     On Windows, only the caller's timeout applies.
     """

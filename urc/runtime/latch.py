@@ -1,6 +1,6 @@
 """A small file for the parts of a lease that survive a restart: latch, epoch and pending stop.
 
-Writing can be slow, or fail on a full disk. A stop must not wait for the file. A thread therefore
+Writing can be slow or fail on a full disk. A stop must not wait for the file. A thread therefore
 writes the newest state, and failures are reported without an exception.
 """
 

@@ -9,13 +9,13 @@ connection. Every connection ends through `_end`, and only `_serve` stops the re
 A connection counts as good after its first valid frame, and only a good connection resets the
 backoff. URC therefore does not flood a robot that accepts every connection and then closes it. If
 there are ``on_connect`` steps, frames do not count until the steps are done, because a robot may
-refuse the login after a greeting. Pages show the `LinkStatus`. During failed attempts, only its
-number of attempts changes.
+refuse the login after a greeting. Pages show the `LinkStatus`. During failed attempts, only the
+status's number of attempts changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
-transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
-passed directly to the engine. The engine's bytes are passed directly to the kernel. The reader and
-writer tasks handle bytes that must wait, large amounts of data, and errors.
+transport that implements `Prompt` avoids task switches. Bytes that arrive while the reader waits
+are passed directly to the engine. The engine's bytes are passed directly to the kernel. The reader
+and writer tasks handle bytes that must wait, large amounts of data, and errors.
 """
 
 import asyncio
@@ -59,7 +59,7 @@ SETTLE_S = 1.0
 _GRACE_S = 1.0
 """Extra time for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
-_LOGGING_IN = "connected; the steps of the connection are not done yet"
+_LOGGING_IN = "connected; the on_connect steps are not complete yet"
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ class Link:
         self._hurried_s = float("-inf")
         """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """Future for the reason that the connection ended; None if there is no connection."""
+        """Future for the reason why the connection ended; None if there is no connection."""
         self._forget_connection()
         self._is_overdue = False
         """Whether the robot has been silent since the last request."""
@@ -356,7 +356,7 @@ class Link:
                 self._retry_s = self._clock.now() + self._spec.backoff.initial_s
 
     def _lose(self, state: LinkState, reason: str) -> None:
-        """Count a failed attempt, and schedule the next attempt."""
+        """Count a failed attempt and schedule the next attempt."""
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff

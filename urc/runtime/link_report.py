@@ -95,7 +95,7 @@ class LinkReport:
         self.show(state, detail)
 
     def count(self, fault: Violation) -> None:
-        """Count a protocol violation, and log it at a limited rate."""
+        """Count a protocol violation and log it at a limited rate."""
         self.faults += 1
         self._is_changed = True
         if self.state == "connecting" and self._detail:

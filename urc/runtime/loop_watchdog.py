@@ -1,4 +1,4 @@
-"""A watchdog for the event loop, because a blocked loop delays all work in this process.
+"""A watchdog for the event loop; a blocked loop delays all work in this process.
 
 If the loop is blocked, the guard stops motion when the lease expires. The watchdog detects, counts
 and reports each delay. After a long delay, operators must start a new gesture.

@@ -275,7 +275,8 @@ def _by_itself(watchdog_s: float | None) -> str:
         return "The document does not state whether the robot stops by itself."
     if math.isinf(watchdog_s):
         return "The robot does not stop by itself: the last command continues."
-    return f"Without further commands, the robot stops by itself: {shown_duration(watchdog_s)}."
+    after = shown_duration(watchdog_s)
+    return f"Without further commands, the robot stops by itself after {after}."
 
 
 def _interfaces(profile: Profile) -> Iterator[str]:
@@ -339,7 +340,7 @@ def _descriptions(named: Iterable[Signal | Argument | Setting]) -> Iterator[str]
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield the lines of a table without empty columns."""
+    """Yield the lines of a table, and omit empty columns."""
     kept = [place for place in range(len(header)) if any(row[place] for row in rows)]
     yield f"| {' | '.join(header[place] for place in kept)} |"
     yield f"|{'---|' * len(kept)}"

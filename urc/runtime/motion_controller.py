@@ -1,6 +1,6 @@
 """The motion controller of one robot: the lease, and the state of each held command.
 
-Theory of operation. Pages send ticks of sampled input, and release messages. For each tick, the
+Theory of operation. Pages send release messages, and ticks of sampled input. For each tick, the
 controller checks the page's lease and the age of the tick, and the engine checks the arguments. The
 controller then passes the frame to the motion backend, which owns the connection and enforces the
 time limits. The first tick of a gesture arms the control. The first tick also renders the stop
@@ -84,11 +84,11 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._due: set[str] = set()
-        """Held commands whose stop no backend has, or whose stop was sent too early."""
+        """Held commands whose stop must still be passed to a backend, or was sent too early."""
         self._ended: MotionBackend | None = None
-        """Backend of the previous session, which may deliver its stops while it ends."""
+        """Backend of the previous session; it may still deliver stops while that session ends."""
         self.on_change: Callable[[LeaseState], None] = _ignore
-        """Callback after each change to the lease, and after a stop is confirmed."""
+        """Callback after each change to the lease and after each confirmed stop."""
         self.on_moved: Moved = _unseen
         """Callback for each tick passed to the backend; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
@@ -345,8 +345,8 @@ class MotionController:
     def release(self, client: str, command: str, number: int = 0) -> None:
         """Handle the release of a control; only its holder may release it.
 
-        `number` is the number of the release, or 0 for none. Ticks with lower numbers no longer
-        count.
+        `number` is the number of the release, or 0 if the release has no number. Ticks with lower
+        numbers no longer count.
         """
         holder = self.lease.state.holder
         control = self._controls.get(command)
@@ -376,7 +376,7 @@ class MotionController:
                 self._refused(command, why)
 
     def _refused(self, command: str, why: str) -> None:
-        """Stop a motion that the robot has refused, and report the robot's message."""
+        """Stop a motion that the robot has refused and report the robot's message."""
         control, backend = self._controls.get(command), self._backend
         if control is None or backend is None or control.motion_state != "moving":
             return
@@ -492,7 +492,10 @@ class MotionController:
     def _stop_frames(
         self, commands: Sequence[str] | Mapping[str, object]
     ) -> dict[str, Payload | FrameVariants]:
-        """Return the stop frames; if rendering fails, use the frame rendered at arming."""
+        """Return the stop frames.
+
+        If rendering fails, use the frame that was rendered when the control was armed.
+        """
         made: dict[str, Payload | FrameVariants] = {}
         for name in commands:
             control = self._controls[name]

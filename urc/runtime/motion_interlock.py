@@ -1,6 +1,6 @@
 """The interlock for programs that move a robot without using the robot's server.
 
-Layer 4. Motion is refused while STOP is latched, or while an operator has the controls on one of
+Layer 4. Motion is refused while STOP is latched or while an operator has the controls on one of
 this user's servers.
 """
 

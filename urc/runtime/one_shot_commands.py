@@ -60,7 +60,7 @@ class Drivable(MotionSession, Protocol):
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
     def latch(self, reason: str) -> None:
-        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
+        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
 
 
 class CommandRefused(CommandFailed):
@@ -68,7 +68,7 @@ class CommandRefused(CommandFailed):
 
 
 def can_move(driver: Driver) -> bool:
-    """Return whether the robot can move, and so needs STOP and the latch."""
+    """Return whether the robot can move and so needs STOP and the latch."""
     return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
@@ -131,7 +131,7 @@ class OneShotCommands:
         arguments: Mapping[str, object] = NOTHING,
         stops: int | None = None,
     ) -> str:
-        """Return the reason for refusing a command or sequence to the page now, or "".
+        """Return the reason why the page may not run a command or sequence now, or "".
 
         `stops` is the number of STOPs known to the page when the operator clicked; None means the
         current number.

@@ -24,7 +24,7 @@ _MADE: Final = "default"
 
 
 def open_document(path: str | PathLike[str]) -> Profile:
-    """Load the document of a robot or driver, and return its profile.
+    """Load the document of a robot or driver and return its profile.
 
     Raises:
         ProblemsError: the document has errors; the exception lists them.

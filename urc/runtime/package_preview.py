@@ -1,4 +1,4 @@
-"""A preview of a package's permissions and risks, shown before it is installed or updated.
+"""A preview of a package's permissions and risks, shown before an installation or update.
 
 Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted,
 but the person who installs the package must be informed. The preview therefore lists constants
@@ -51,8 +51,8 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
         *(phrase("makes the browser show the page {url}", url=url) for url in checked.pages),
         *(
             phrase(
-                "widget {name}: a program in a frame of its own; it sees and gives what its cell is"
-                " bound to, and nothing else",
+                "widget {name}: a program in a frame of its own; it sees and sends only what its"
+                " cell is bound to",
                 name=name,
             )
             for name in widgets

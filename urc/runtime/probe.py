@@ -40,8 +40,9 @@ class ProbeResult(NamedTuple):
     address: str
     """Address for display."""
     verdict: Verdict
-    """The result ``answers`` means that the transport is live. The result ``opens`` means that it
-    is connected but the robot sends no data, and ``fails`` means that there is no connection."""
+    """The result ``answers`` means that the transport is live. The result ``opens`` means that the
+    transport is connected but the robot sends no data. The result ``fails`` means that there is no
+    connection."""
     text: str
     """Description of the result, in one line."""
     advice: str

@@ -66,9 +66,10 @@ class RepeatLimiter(Generic[_Key]):
                 yield key, count
 
     def forgotten(self, now: float | None = None) -> int:
-        """Return how many events are no longer counted separately, and reset this number.
+        """Return the number of events that are no longer counted separately, and reset the number.
 
-        Return 0 if no entry may be written at the time `now`; None ignores the limits.
+        The result is 0 if no entry may be written at the time `now`. Without `now`, the limits
+        are ignored.
         """
         count = self._forgotten
         if not count or (now is not None and not self._may_tell(now)):

@@ -2,11 +2,11 @@
 
 Layer 4. Each sample includes its alarm, so a sample costs one comparison, and only changes are
 processed. The object belongs to a robot, not to a session. If there is no session, all values are
-unknown, and the alarms stay.
+unknown, and the alarms persist.
 
-While an expression `suppressed_when` is true, its alarms are suppressed by design. An expression
-with an unknown or stale value is false, except in the first seconds of a session, when the first
-values arrive.
+While an alarm's expression `suppressed_when` is true, the alarm is suppressed by design. An
+expression with an unknown or stale value is false, except in the first seconds of a session, when
+the first values arrive.
 """
 
 import logging
@@ -48,7 +48,7 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""URC's own alarm for a monitored robot. Without it, a silent robot would look healthy."""
+"""URC's own alarm for a monitored robot. Without this alarm, a silent robot would look healthy."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 
@@ -116,7 +116,7 @@ class RobotAlarms:
         self._names: Mapping[str, object] = NOTHING
         self._lost_s: dict[str, float] = {}
         """Time at which each transport was lost, on `clock`; connection attempts do not change
-        it."""
+        this time."""
         self._began_s = 0.0
         """Start time of the session on `clock`, in seconds."""
         self._timer: PeriodicTimer | None = None
@@ -200,7 +200,7 @@ class RobotAlarms:
             self._finish()
 
     def _judge_all(self, samples: Sequence[Sample]) -> None:
-        """Update the suppression, and then process the samples whose alarm has changed."""
+        """Update the suppression and then process the samples whose alarm has changed."""
         if self._inputs:
             self._update_inputs(samples)
         # Most samples need only this comparison, so it avoids calls and field names. Alarms from

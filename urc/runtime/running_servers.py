@@ -27,7 +27,7 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A dashboard that is running, or was running when the power failed."""
+    """A dashboard that is running or was running when the power failed."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""
@@ -66,7 +66,7 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
 
 
 class _Verified(HTTPSConnection):
-    """A connection that trusts one certificate, and expects one name in the server's certificate.
+    """A connection that trusts one certificate and expects one name in the server's certificate.
 
     An operator's own certificate might not include the server's listening address.
     """
@@ -83,7 +83,7 @@ class _Verified(HTTPSConnection):
         self._name = server.name or host
 
     def connect(self) -> None:
-        """Connect, and verify the certificate."""
+        """Connect and verify the certificate."""
         HTTPConnection.connect(self)
         self.sock = self._verifier.wrap_socket(self.sock, server_hostname=self._name)
 
@@ -150,7 +150,7 @@ def _read(file: Path) -> RunningServer | None:
 
 
 def _may_run(pid: int) -> bool:
-    """Return whether the process exists, or may exist."""
+    """Return whether the process exists or may exist."""
     if os.name != "posix":
         return True  # on Windows, signal 0 is Ctrl-C
     try:

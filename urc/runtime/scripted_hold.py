@@ -1,6 +1,6 @@
 """Run a held command from a script for a limited time, under the normal motion rules.
 
-The script does not sample input, but renews the lease with regular ticks. If the script hangs, is
+The script does not sample input but renews the lease with regular ticks. If the script hangs, is
 killed or loses its connection, the lease expires, and the guard writes the stop.
 """
 
@@ -48,7 +48,7 @@ async def hold(
         why_not: function that returns the reason to end early, or "" to continue.
 
     Raises:
-        CommandFailed: the command was refused, or ended early with a stop.
+        CommandFailed: the command was refused or ended early with a stop.
     """
     backend = session.backend
     if backend is None:
@@ -96,7 +96,10 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Send ticks until the end; return whether the robot moved, and the reason for an early end."""
+    """Send ticks for up to `for_s` seconds.
+
+    Return whether the robot moved, and the reason for an early end.
+    """
     number, next_s = 0, _now()
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:

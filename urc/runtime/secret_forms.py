@@ -10,7 +10,7 @@ __all__ = ["HIDDEN", "SecretForms", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
-"""Minimum length of a secret to find in encoded form; shorter secrets match too often."""
+"""Minimum length of a secret to search for in encoded form; shorter secrets match too often."""
 _LONGEST = 4096
 
 

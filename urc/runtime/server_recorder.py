@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class Actor(NamedTuple):
-    """The person, device or program that caused an event, and the right to do so."""
+    """The person, device or program that caused an event, and the right that permitted it."""
 
     name: str = ""
     principal: str = ""

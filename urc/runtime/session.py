@@ -82,7 +82,7 @@ def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:
 
 
 class Session:
-    """One robot, connected while the context is open. A session opens only once.
+    """One robot, connected while the context is open. A session can be opened only once.
 
     ``async with Session(profile, settings, catalog.transports) as session:`` starts the links and
     returns immediately; `hub` publishes their state.

@@ -125,7 +125,7 @@ def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, 
     An option that consists only of an empty setting is omitted.
 
     Raises:
-        UrcError: a template uses a missing setting, or fails.
+        UrcError: a template uses a missing setting or fails.
     """
     options: dict[str, object] = {}
     for name, option in spec.options.items():

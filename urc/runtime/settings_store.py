@@ -57,7 +57,7 @@ class SettingsStore:
         """Return the stored settings; if there is no file, return an empty `StoredSettings`.
 
         Raises:
-            UrcError: the file cannot be read, or is damaged.
+            UrcError: the file cannot be read or is damaged.
         """
         try:
             with open(self.file, "rb") as opened:

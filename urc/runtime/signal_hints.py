@@ -103,7 +103,7 @@ class SignalHints:
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return a hint if no received frame matches the reply format of a sent request, or ""."""
+        """Return a hint if no received frame matches a sent request's reply format, else ""."""
         spec = self._driver.transports[transport]
         for label, reply in self._were_asked(transport):
             reads = [reply.read, *(stage.read for stage in reply.stages)]

@@ -17,7 +17,7 @@ _AGAIN_S: Final = 0.01
 
 
 def open_for_writing(file: Path) -> sqlite3.Connection:
-    """Return a connection without implicit transactions; create a missing file in its folder.
+    """Return a connection without implicit transactions; create the file if it is missing.
 
     The file is readable only by its owner and has a write-ahead log, so readers never wait.
 
@@ -42,7 +42,9 @@ def open_for_writing(file: Path) -> sqlite3.Connection:
 
 @contextmanager
 def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open, for reading, a file that a server may be writing; yield None without a file or tables.
+    """Open a file for reading, even while a server writes to it.
+
+    The context manager yields None if the file does not exist or has no tables.
 
     Raises:
         OSError: the file cannot be read.
@@ -61,7 +63,7 @@ def opened_for_reading(file: Path) -> Iterator[sqlite3.Connection | None]:
 
 
 def set_aside(file: Path) -> Path:
-    """Rename a damaged file to an unused name ending in `.broken…`, and return its new path.
+    """Rename a damaged file to an unused name ending in `.broken…` and return its new path.
 
     Raises:
         OSError: the file cannot be renamed.

@@ -102,7 +102,7 @@ def check_reply(
     wanted: Mapping[str, object],
     of: str,
 ) -> Iterator[str]:
-    """Yield the mismatches of the first finished command, and discard its result."""
+    """Yield the mismatches of the first finished command and discard its result."""
     place = next((place for place, one in enumerate(ended) if of in ("", one.command)), None)
     if place is None:
         yield f"{of or 'the command'} should be done, but no reply arrived or no command was run"

@@ -48,7 +48,7 @@ _MOST_TICKS: Final = 20_000
 
 
 class _RecordingEngine(Engine):
-    """An engine that records its commands, and the messages of decoded frames."""
+    """An engine that records its commands and the messages of decoded frames."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: TimeAndNonce) -> None:
         super().__init__(driver, settings, fresh=fresh)
@@ -110,7 +110,7 @@ class TestEngine:
         self.ended: list[Replied | Failed] = []
         """Finished commands that no check has read yet."""
         self.closed: set[str] = set()
-        """Transports that the engine has closed, and that no check has read yet."""
+        """Transports that the engine has closed and that no check has read yet."""
         self._requests = 0
         self._numbers: dict[str, list[object]] = {}
         """Numbers of the unanswered requests, by transport."""
@@ -209,7 +209,7 @@ class TestEngine:
                 self.perform(self.engine.tick(self.now))
 
     def wait(self, seconds: float) -> None:
-        """Advance the simulated time, and handle all due deadlines."""
+        """Advance the simulated time and handle all due deadlines."""
         end = self.now + seconds
         for _ in range(_MOST_TICKS):
             if not self.pass_to_deadline(end):

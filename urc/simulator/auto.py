@@ -268,9 +268,9 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`, or None.
 
-        A better match with arguments or a reply excludes all other commands. Otherwise, `frame` may
-        mean several commands. A driver's declarations often share a stop frame: the release of a
-        held command, a close message, a command without a reply.
+        There is no result if the best match has arguments or a reply. Otherwise, `frame` may mean
+        several commands. Several declarations of a driver often share a stop frame: the release of
+        a held command, a close message, a command without a reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -281,7 +281,10 @@ class DefaultConnection:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return the labels of all requests that encode to this frame, or of the first match."""
+        """Return the labels of all requests that encode to this frame.
+
+        Without such a request, return the label of the first match.
+        """
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}

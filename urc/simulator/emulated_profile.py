@@ -19,7 +19,7 @@ __all__ = ["stand_in"]
 async def stand_in(
     profile: Profile, settings: Mapping[str, Value], emulated_robot: EmulatedRobot | None = None
 ) -> AsyncIterator[Profile]:
-    """Emulate a robot until the context ends, and yield a profile that connects to it.
+    """Emulate a robot until the context ends and yield a profile that connects to it.
 
     Args:
         profile: profile of the robot.

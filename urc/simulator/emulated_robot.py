@@ -272,7 +272,7 @@ class EmulatedConnection:
     def request(self, data: Payload, now_s: float) -> list[Payload]:
         """Return the replies without injected faults.
 
-        The caller must delay and drop the replies according to the injected faults.
+        The caller must delay or drop the replies according to the injected faults.
         """
         return self._receive(data, now_s, None, self._answer)
 
@@ -397,7 +397,7 @@ class EmulatedConnection:
         return said or []
 
     def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Run all due reactions, and schedule the rest."""
+        """Run all due reactions and schedule the others."""
         said: list[Payload] = []
         while running_rule.ready_reactions and not self.is_over:
             reaction = running_rule.ready_reactions[0]
@@ -412,7 +412,7 @@ class EmulatedConnection:
 
     def _defer(self, running_rule: RunningRule, left_s: float) -> None:
         if len(self._running_rules) >= MOST_COURSES:
-            self._fault(f"{MOST_COURSES} delayed replies are already queued; dropped this reply")
+            self._fault(f"{MOST_COURSES} delayed replies are already queued; reply dropped")
             return
         running_rule.left_s, running_rule.has_waited = left_s, True
         self._running_rules.append(running_rule)

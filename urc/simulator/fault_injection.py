@@ -1,4 +1,4 @@
-"""Fault injection for an emulated robot: inject and remove faults.
+"""Injection and removal of faults in an emulated robot.
 
 Pure.
 """

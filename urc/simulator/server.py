@@ -30,7 +30,7 @@ __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
 _PORTS = {"ssh": 22, "telnet": 23, "ros": 9090}
-"""Default ports of the transport types with an optional `port`."""
+"""Default ports of the transport types whose `port` is optional."""
 
 
 @asynccontextmanager

@@ -151,7 +151,7 @@ def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> 
 def failsafe_of(driver: Driver) -> Failsafe | None:
     """Return a fail-safe from the `watchdog` or `step` of the held commands, or None.
 
-    Return None if there are no held commands, or if any of them has no finite time.
+    Return None if there are no held commands, or if one of these times is missing or infinite.
     """
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]

@@ -110,7 +110,7 @@ class Values:
         *,
         is_plain: bool = False,
     ) -> None:
-        """Create the robot with `initial` signals and state variables, and a world if given."""
+        """Create the robot with `initial` signals and state variables, and any given world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}

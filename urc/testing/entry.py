@@ -22,7 +22,8 @@ CONTROL = AccessControl(STORE, key=KEY)
 ACCESS = Access(CONTROL, instance="test")
 """Access to a dashboard that requires a sign-in."""
 OPEN = Access(CONTROL, instance="test", anonymous="drive")
-"""Access to a dashboard that requires no sign-in; the same browsers have access."""
+"""Access to a dashboard that requires no sign-in; the browsers that `ACCESS` admits also have
+access."""
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
 """Cookies of a browser that has sent the start key."""

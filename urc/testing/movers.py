@@ -49,7 +49,7 @@ class FakeFrames:
             raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
-        """Increment the counter for another frame, and return its new value."""
+        """Increment the counter for another frame and return its new value."""
         self.number = number = self.number + 1
         self.tell(NumbersUsed(line))
         return number
@@ -167,7 +167,7 @@ class FakeMotionBackend:
         self.write_due()
 
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
-        """Wait until stops are written, and return them."""
+        """Wait until stops are written and return them."""
         return [await self._stops.get()]
 
     def write_due(self) -> None:

@@ -46,12 +46,12 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Send each of `chunks` separately, as the robot."""
+        """Send each of `chunks` separately from the robot's side."""
         self._arriving.extend(chunks)
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Close the connection as the robot, once all data fed so far has been received."""
+        """Close the connection from the robot's side once all data fed so far has been received."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 
@@ -93,7 +93,7 @@ class MemoryTransport:
         return chunk
 
     async def send(self, data: bytes) -> None:
-        """Record `data`, and feed the robot's reply."""
+        """Record `data` and feed the robot's reply."""
         await self._flowing.wait()
         if not self.is_open:
             raise PeerClosed("the connection is closed")

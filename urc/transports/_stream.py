@@ -98,7 +98,7 @@ class TcpStream(asyncio.BufferedProtocol):
         return self._buffer[self._filled :] if self._filled else self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass the received bytes to the sink, or store the bytes in the buffer."""
+        """Pass the received bytes to the sink or store the bytes in the buffer."""
         if self.sink is not None and not self._filled and self.sink(bytes(self._buffer[:nbytes])):
             return
         self._filled += nbytes

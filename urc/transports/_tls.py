@@ -77,7 +77,7 @@ class Tls:
         """Perform the TLS handshake over `stream`; close the stream on failure or cancellation.
 
         Raises:
-            ConnectFailed: the peer is not trusted, or does not speak TLS.
+            ConnectFailed: the peer is not trusted or does not speak TLS.
         """
         name = None if self._is_server else self._server_name or host
         try:

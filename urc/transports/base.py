@@ -47,7 +47,7 @@ log and do not prove that the robot is alive.
 
 
 class TransportError(UrcError):
-    """A transport error: the connection cannot be opened, or can no longer be used.
+    """A transport error: the connection cannot be opened or can no longer be used.
 
     - `ConnectFailed`: the attempt was refused or timed out, or the host is unknown.
     - `PeerClosed`: the robot closed the connection, or the connection broke.
@@ -65,7 +65,7 @@ class PeerClosed(TransportError):
 class Transport(Protocol):
     """One connection to a robot.
 
-    A transport may be reopened after `close`, but has at most one connection at a time.
+    A transport may be reopened after `close` but has at most one connection at a time.
     """
 
     @property
@@ -142,7 +142,10 @@ class TransportSetup(NamedTuple):
 
 @runtime_checkable
 class SupportsReady(Protocol):
-    """A transport that URC must prepare first; preparation does not count as connecting."""
+    """A transport that URC must prepare before connecting.
+
+    The preparation does not count as connecting.
+    """
 
     async def ready(self) -> None:
         """Wait until the transport can connect; raise `ConnectFailed` if it cannot be prepared."""
@@ -253,5 +256,5 @@ def unsent_of(stream: ByteStream | None) -> int:
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream, and discard unsent data if the stream supports this."""
+    """Close a stream and discard unsent data if the stream supports this."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

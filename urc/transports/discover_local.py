@@ -12,7 +12,7 @@ _AT_ONCE = 16
 
 
 async def listening(places: Iterable[tuple[str, int]]) -> list[tuple[str, int]]:
-    """Return the `places` (host and port) that accept connections, in the order of `places`."""
+    """Return the `places` (host and port) that accept connections, in their original order."""
     turns = asyncio.Semaphore(_AT_ONCE)
 
     async def is_there(place: tuple[str, int]) -> bool:

@@ -219,7 +219,7 @@ class _OpenConnection:
                 self.queue.forget(place)
 
     async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
-        """Send one request, and add its response to the queue."""
+        """Send one request and add its response to the queue."""
         fault: HttpFault | None = None
         # Read first: the robot may have closed idle connections, which must not be used.
         await asyncio.sleep(0)

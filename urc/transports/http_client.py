@@ -150,7 +150,7 @@ class HttpClient:
     async def answer(
         self, request: httpx2.Request, silence_s: float | None = None
     ) -> AsyncIterator[httpx2.Response]:
-        """Send `request`, and yield its response before the body is read.
+        """Send `request` and yield its response before the body is read.
 
         Every error inside the context is raised as `HttpFault`.
 
@@ -191,7 +191,7 @@ class HttpClient:
         return self._backend.unsent()
 
     def forget(self) -> None:
-        """Close all connections with unsent bytes, and discard the bytes."""
+        """Close all connections with unsent bytes and discard the bytes."""
         self._backend.forget()
 
     async def close(self) -> None:

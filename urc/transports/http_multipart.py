@@ -3,7 +3,7 @@
 The parser does no I/O: the input is bytes, and the output is parts.
 
 Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted
-boundaries, plain boundaries, and headers that include the body's two dashes. Parts without
+and unquoted boundaries, with or without the two leading dashes of the body. Parts without
 Content-Length and lines that end in LF alone are also accepted. Every part and header has a maximum
 size; larger parts or headers make the stream invalid.
 """

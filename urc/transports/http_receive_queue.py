@@ -33,7 +33,7 @@ class HttpReceiveQueue:
         """Number of images that were replaced by newer images."""
 
     def answer(self, place: int, envelope: Envelope) -> None:
-        """Add the response to a request; the limit on requests also limits the responses."""
+        """Add a request's response; the limit on requests also limits the responses."""
         self._waiting["answer", place] = envelope
         self._arrived.set()
 

@@ -65,13 +65,13 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
         path, _, event = topic.partition("#")
         if kind not in KINDS:
             words = "mjpeg, stills, sse or lines"
-            raise TransportError(f"http needs {words} as stream of {topic!r}, not {kind!r}")
+            raise TransportError(f"http needs {words} as 'stream' of {topic!r}, not {kind!r}")
         if event and kind != "sse":
             raise TransportError(
                 f"http supports named events only in streams of type sse: {topic!r}"
             )
         if not isinstance(every_s, int | float) or not 0.01 <= every_s <= 3600:
-            raise TransportError(f"http needs 10ms to 1h as every of {topic!r}, not {every_s!r}")
+            raise TransportError(f"http needs 10ms to 1h as 'every' of {topic!r}, not {every_s!r}")
         spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
         known = found.setdefault(path, spec)
         if (known.kind, known.every_s) != (spec.kind, spec.every_s):
@@ -202,7 +202,7 @@ class HttpStream:
             await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Pass an event to the topic with its name, or otherwise to the path's topic."""
+        """Pass an event to the topic with the event's name, or otherwise to the path's topic."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:

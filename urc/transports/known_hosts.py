@@ -41,7 +41,7 @@ class HostKeys:
     """The trusted host keys of one transport."""
 
     def __init__(self, pinned: str = "", file: str = "") -> None:
-        """Trust a single fingerprint, or the keys in URC's own file and in an additional file.
+        """Trust either a single fingerprint, or the keys in URC's own file and an additional file.
 
         Args:
             pinned: fingerprint ``SHA256:…``; "" to use the files.
@@ -72,7 +72,7 @@ class HostKeys:
         return found
 
     def judge(self, key: asyncssh.SSHKey, known: HostKeyStatus) -> str:
-        """Return "" for a trusted `key`, or a trusted fingerprint, ``revoked`` or ``unknown``."""
+        """Return "" for a trusted `key`; else trusted fingerprints, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
         if key in known.revoked:

@@ -32,7 +32,7 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""Keepalive interval, in seconds. After twice this time without data, the broker is considered
+"""Keepalive interval, in seconds. If no data arrives for twice this time, the broker is considered
 lost."""
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a received message, in bytes."""
@@ -247,7 +247,7 @@ class _MqttSession:
         self._release()
 
     async def _until_writable(self) -> None:
-        """Wait until the kernel accepts more data, or the connection ends."""
+        """Wait until the kernel accepts more data or the connection ends."""
         if self._writable is None:
             self._writable = self._loop.create_future()
             self._loop.add_writer(self.line, self._drained)
@@ -279,7 +279,7 @@ class _MqttSession:
             self._lose(f"the broker sent an invalid packet ({reason(fault)})")
 
     def _tick(self) -> None:
-        """Send keepalives, and close the connection if the broker does not reply."""
+        """Send keepalives; close the connection if the broker does not reply."""
         self._check = self._loop.call_later(_CHECK_S, self._tick)
         self._client.loop_misc()
 
@@ -318,7 +318,7 @@ class _MqttSession:
             self._lose(self._client.fault or HUNG_UP)
 
     def _lose(self, reason: str) -> None:
-        """Wake all waiting tasks and tell them why the connection ended."""
+        """Wake all waiting tasks, and tell them why the connection ended."""
         self.queue.end(reason)
         self._forget(self.line)
         if not self._answered.done():
@@ -385,7 +385,7 @@ class _PahoClient(Client):
         return self._given
 
     def _sock_recv(self, bufsize: int) -> bytes:
-        """Read part of a message, because paho would allocate memory for the whole declared size.
+        """Read only part of a message; paho itself would allocate the whole declared size.
 
         Raises:
             BlockingIOError: the declared size exceeds the limit (see `excess`); nothing is read.
@@ -396,7 +396,7 @@ class _PahoClient(Client):
             return super()._sock_recv(min(bufsize, _READ_BYTES))
 
     def _sock_send(self, buf: bytes | bytearray) -> int:
-        """Send some of the packets, and keep the reason for a failure."""
+        """Send some of the packets; if sending fails, keep the reason."""
         with self._explained():
             return super()._sock_send(buf)
 

@@ -1,4 +1,4 @@
-"""An MQTT transport's options, and the encoding of message bodies.
+"""An MQTT transport's options and the encoding of message bodies.
 
 This module needs no MQTT library.
 """

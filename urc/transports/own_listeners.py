@@ -1,8 +1,8 @@
 """The listening addresses of URC's own dashboard, to which no transport may connect.
 
-A document that connects to the dashboard would have a local program's rights. The address of each
-open connection is checked, so a host name, a redirect or an unusual notation cannot hide it.
-Connections forwarded by a router, a proxy or another machine are not detected.
+A document that connects to the dashboard would have the rights of a local program. The address of
+each open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
+dashboard. Connections forwarded by a router, a proxy or another machine are not detected.
 """
 
 import ipaddress
@@ -19,7 +19,7 @@ class OwnAddressError(OSError):
     """An attempted connection to URC's own dashboard."""
 
     def __init__(self) -> None:
-        super().__init__(None, "this address is the dashboard itself; it cannot be a robot")
+        super().__init__(None, "this is the address of the dashboard itself, not of a robot")
 
 
 class OwnListeners:
@@ -41,11 +41,11 @@ class OwnListeners:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return the addresses as words, to pass to `learn` in a related process."""
+        """Return the addresses as text, to be passed to `learn` in a related process."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add a related process's listening addresses, until this process ends."""
+        """Add a related process's listening addresses; they apply until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))

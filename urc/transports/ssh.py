@@ -1,6 +1,6 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-A shared SSH connection has several users: the transport's own channel, and all transports that name
+A shared SSH connection has several users: the transport's own channel and all transports that name
 this transport in ``tunnel``. The first user opens the connection, the last user closes it, and its
 loss disconnects all users.
 """
@@ -50,7 +50,7 @@ class RemoteProgram(NamedTuple):
     command: str = ""
     """Command for the mode ``exec``."""
     has_pty: bool = True
-    """Whether the program runs on a pseudo-terminal, and therefore shows prompts and echoes input.
+    """Whether the program runs on a pseudo-terminal and therefore shows prompts and echoes input.
     """
     environment: tuple[tuple[str, str], ...] = ()
 
@@ -130,7 +130,7 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
     pairs = []
     for name, text in value.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise TransportError(f"ssh: {name!r} is not a name of an environment variable")
+            raise TransportError(f"ssh: {name!r} is not the name of an environment variable")
         if not isinstance(text, str):
             raise TransportError(
                 f"ssh: environment.{name} must be text; put the value in quotation marks"

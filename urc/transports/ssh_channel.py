@@ -141,7 +141,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged.
 
-        The number includes the unacknowledged bytes of all channels of the SSH connection.
+        The number includes the unacknowledged bytes of all channels on the SSH connection.
         """
         return self._channel.get_write_buffer_size() + self._wire.unsent()
 

@@ -168,8 +168,8 @@ class SharedConnection:
         """Initialise without connecting.
 
         Args:
-            dial: function that opens a connection within the given number of seconds, and frees all
-                resources if cancelled.
+            dial: function that opens a connection within the given number of seconds and, if
+                cancelled, frees all resources.
         """
         self._dial = dial
         self._users = 0
@@ -177,7 +177,7 @@ class SharedConnection:
         """Task that opens the connection; its result is the connection."""
 
     async def join(self, timeout_s: float) -> SshConnection:
-        """Return the shared connection, and open it if necessary; call `leave` afterwards.
+        """Return the shared connection, opening it if necessary; call `leave` afterwards.
 
         The caller sets the timeout; a cancelled caller does not affect other callers.
 
@@ -194,7 +194,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the shared connection, and close it after the last user."""
+        """Release the shared connection; close it after the last user."""
         self._users -= 1
         if self._users:
             return
@@ -207,14 +207,14 @@ class SharedConnection:
             await attempt.result().close()
 
     def break_off(self) -> None:
-        """Reset the connection for all users, and discard unsent data."""
+        """Reset the connection for all users and discard unsent data."""
         if self._attempt is not None and self._attempt.done() and self._is_good(self._attempt):
             self._attempt.result().reset()
 
     async def _again(
         self, before: "asyncio.Task[SshConnection] | None", timeout_s: float
     ) -> SshConnection:
-        """Close a dead connection, if any, and open a new one."""
+        """Open a new connection, after closing the dead connection if there is one."""
         if before is not None and not before.cancelled() and before.exception() is None:
             await before.result().close()
         return await self._dial(timeout_s)

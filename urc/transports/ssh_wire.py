@@ -63,7 +63,7 @@ class SshSocket(asyncio.BufferedProtocol):
         return not self._room.is_set()
 
     async def drained(self) -> None:
-        """Wait until the kernel has accepted all data, or the connection has ended."""
+        """Wait until the kernel has accepted all data or the connection has ended."""
         await self._room.wait()
 
     async def gone(self) -> None:

@@ -33,7 +33,7 @@ _AGAIN_S = 0.1
 """Delay after a failed accept call, in seconds."""
 
 _Caller = tuple[socket.socket, str]
-"""A connected socket, and the remote address."""
+"""A connected socket and the remote address."""
 
 
 class TcpListener(StreamTransport):
@@ -193,7 +193,7 @@ class TcpListener(StreamTransport):
             self._meet(line, address)
 
     def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
-        """Store the newest connection for the next `open`, and end the current connection."""
+        """Store the newest connection for the next `open` and end the current connection."""
         allowed = self._allowed_now[0] if self._allowed_now is not None else None
         if allowed is not None and _plain(address[0]) not in allowed:
             line.close()
@@ -327,6 +327,6 @@ def from_setup(setup: TransportSetup) -> Transport:
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")
     if who == "host" and not only:
-        raise TransportError("tcp needs the address of the permitted robot as host with from: host")
+        raise TransportError("tcp with from: host needs the address of the permitted robot as host")
     tls = Tls.of("tcp", options.get("tls"), is_server=True)
     return TcpListener(bind, port, only=only if who == "host" else "", tls=tls)

@@ -176,7 +176,7 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
 
 
 def _begin(wishes: TelnetOptions) -> tuple[TelnetNegotiation, bytes]:
-    """Return a new negotiation, and the first bytes to send."""
+    """Return a new negotiation and the first bytes to send."""
     binary = (BINARY,) if wishes.binary else ()
     echo = (ECHO,) if wishes.echo else ()
     talk = TelnetNegotiation(

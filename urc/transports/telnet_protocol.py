@@ -119,7 +119,7 @@ class TelnetNegotiation:
         return b"".join(wishes + [self._theirs.request(option) for option in theirs])
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
-        """Return the text in `data`, and the replies to the commands in `data`.
+        """Return the text in `data` and the replies to the commands in `data`.
 
         A command may be split at any byte between two calls. Commands such as Interrupt Process or
         Synch are irrelevant to drivers and are dropped.

@@ -1,9 +1,9 @@
 """The UDP transport; every payload is one datagram, and every datagram is one frame.
 
 UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
-The transport reports errors that UDP can detect: a closed port on the robot, and a missing route.
-If the options contain no address, opening waits for the first datagram, and its sender becomes the
-robot.
+The transport reports the errors that UDP can detect: a closed port on the robot and a missing
+route. If the options contain no address, opening waits for the first datagram, and its sender
+becomes the robot.
 
 If the receive queue is full, the oldest datagrams are dropped and counted in `dropped`.
 """
@@ -95,7 +95,7 @@ class UdpTransport:
         return f"udp {place_of(self._bind or '*', self._listen)} (listening{sender})"
 
     async def open(self, timeout_s: float) -> None:
-        """Bind the local port, and return immediately if the robot's address is known.
+        """Bind the local port; return immediately if the robot's address is known.
 
         If the robot's address is unknown, wait for the first datagram; raise `ConnectFailed` after
         `timeout_s` seconds.
@@ -238,7 +238,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the connection because of an error, and raise the error.
+        """End the connection because of an error and raise the error.
 
         Raises:
             TransportError: always.

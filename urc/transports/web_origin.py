@@ -45,7 +45,7 @@ class OptionReader:
         self._options = options
 
     def part(self, name: str) -> "OptionReader":
-        """Return a reader of the mapping option `name`; it is empty for a missing option."""
+        """Return a reader of the mapping option `name`; a missing option gives an empty reader."""
         found = self._options.get(name)
         if found is None:
             return OptionReader(self.kind, {})

@@ -143,7 +143,7 @@ class WebSocketTransport:
             await self._dialer.close()
 
     async def probe(self) -> None:
-        """Send a ping, and return as soon as any data has arrived."""
+        """Send a ping; return as soon as any data has arrived."""
         connection = self._socket
         if not isinstance(connection, _LimitedConnection):
             raise PeerClosed(CLOSED)
@@ -250,7 +250,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 async def _hang_up(connection: ClientConnection) -> None:
-    """Close the connection in an orderly way; reset it after a timeout or a cancellation."""
+    """Close the connection in an orderly way; after a timeout or a cancellation, reset it."""
     try:
         with suppress(TimeoutError):
             async with asyncio.timeout(2 * _CLOSE_S):
@@ -270,7 +270,7 @@ def _refusal(fault: Exception, where: str) -> str:
         if 300 <= response.status_code < 400 and target is not None:
             return f"the robot redirected to {one_line(target)}; redirects are not followed"
         status = one_line(f"{response.status_code} {response.reason_phrase}")
-        return f"{where} answered {status} instead of a WebSocket"
+        return f"{where} answered {status} instead of opening a WebSocket"
     if isinstance(fault, NegotiationError):
         return f"{where} requires a feature that was not offered ({one_line(str(fault))})"
     if isinstance(fault, InvalidMessage | EOFError | ConnectionError):

@@ -66,7 +66,7 @@ class AccessMiddleware:
         self._pages = pages
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward permitted requests to the application, and refuse all others."""
+        """Forward permitted requests to the application and refuse all others."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return

@@ -86,7 +86,7 @@ def api_document() -> bytes:
 
 
 def _messages(annotations: Iterable[object], found: set[type[msgspec.Struct]]) -> None:
-    """Add all message types in `annotations`, and in the fields of these types, to `found`."""
+    """Add all message types in `annotations` and in the fields of these types to `found`."""
     for one in annotations:
         if isinstance(one, type) and issubclass(one, msgspec.Struct):
             if one not in found:

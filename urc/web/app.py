@@ -109,16 +109,18 @@ class DashboardOptions:
     linger_s: float = LINGER_S
     """How long a robot stays connected after its last client has left, in seconds."""
     data: Path | None = None
-    """Folder for the latches and the audit log; None stores neither."""
+    """Folder for the latches and the audit log; with None, neither is stored."""
     audit: AuditLog | None = None
-    """Open audit log from the folder, closed when the application ends; None opens the log."""
+    """Open audit log of the folder, closed when the application ends; with None, the application
+    opens the log."""
     tiles: Path | None = None
     """Folder with map tiles, ``z/x/y.png``; None if the server has no tiles."""
     remake: Mapping[str, Remake] | None = None
     """Functions that create a robot from its saved document; None for a server without developer
     pages."""
     robot_options: RobotOptions | None = None
-    """Options of the robot factory; None if the server has neither managers nor settings."""
+    """Options of the robot factory; None if the server has neither manager pages nor settings
+    pages."""
     trusted: Collection[str] = ()
     """Names of third-party widgets that run in the page instead of a frame."""
     recordings: Path | None = None
@@ -315,7 +317,7 @@ class _Routes:
         )
 
     def stoppable(self) -> list[Stoppable]:
-        """Return all robots that can move, and that STOP can therefore stop."""
+        """Return all robots that can move and that STOP can therefore stop."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()

@@ -33,9 +33,9 @@ TICKS_PER_S = 2000
 """Maximum rate of ticks from held controls; a higher rate closes the socket. Below this rate, newer
 ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
-"""First bytes of a page's tick; decoding ticks in any other form takes longer."""
+"""First bytes of a page's tick; ticks that begin differently take longer to decode."""
 EARLY_MESSAGES = 100
-"""Maximum number of messages that wait while the robot's session opens; ticks are dropped, and STOP
+"""Maximum number of messages that wait while the robot's session opens. Ticks are dropped, and STOP
 does not wait."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
@@ -94,10 +94,10 @@ class BrowserClient:
                 await self._visit()
 
     def recheck(self) -> None:
-        """Check the visitor's rights again: stop forbidden motion, and close a page without rights.
+        """Check the visitor's rights again: stop forbidden motion and close a page without rights.
 
         If the visitor no longer has any right for the robot, the page's motion stops before this
-        method returns, and the socket closes.
+        method returns and the socket closes.
         """
         if self._operator is not None:
             self._service.controls.recheck(self._operator)
@@ -135,9 +135,9 @@ class BrowserClient:
     async def _read_early(self) -> str:
         """Read while the session opens; return why the page must close, or "" if the page left.
 
-        STOP is handled immediately, and cancels waiting requests about the lease, so that an
-        earlier reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All
-        other messages wait for the session.
+        STOP is handled immediately and cancels waiting requests about the lease, so that an earlier
+        reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All other
+        messages wait for the session.
         """
         while len(self._early) < EARLY_MESSAGES:
             message = await self._line.receive()

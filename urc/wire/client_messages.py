@@ -1,6 +1,6 @@
 """The shapes of client messages, identified by their tag ``t``.
 
-Layer 3½. Pure: `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
+Layer 3½. Pure. `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
 limit the nesting depth: the decoder refuses values nested more deeply than a map of plain
 arguments.
 """
@@ -47,11 +47,11 @@ _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as sent by the client."""
 Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-"""A request about the lease, or a reset of STOP."""
+"""A request about the lease or a reset of STOP."""
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
-    """A request for a `pong` with the same `c`, the page's time in milliseconds."""
+    """A request for a `pong` with the same `c`, which is the page's time in milliseconds."""
 
     c: float
 
@@ -73,7 +73,7 @@ class CommandRequest(
 class ImageSelection(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """The images that the page shows; the server sends no others."""
+    """The images that the page shows; the server sends no other images."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
@@ -138,8 +138,8 @@ class Drive(
     for_s: float = REQUEST_S
     """Time for the holder's answer, in seconds."""
     stops: int | None = None
-    """Number of STOPs that the operator saw in the lease. A reset is refused if STOP was pressed
-    again meanwhile; null means the current number."""
+    """Number of STOPs that the operator saw in the lease. A reset is refused if STOP has been
+    pressed again since then; null means the current number."""
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
@@ -158,7 +158,7 @@ class Release(
     """The release of a held control.
 
     Releases and ticks share one count: after a release, ticks with lower numbers have no effect. A
-    program that sends both in order may send 0 as the number.
+    program that sends ticks and releases in order may send 0 as the number.
     """
 
     command: str

@@ -1,6 +1,6 @@
 """The shapes of server messages, identified by their tag ``t``.
 
-Layer 3½. Pure: `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
+Layer 3½. Pure. `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
 milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
 Images are binary messages; see `urc.wire.picture`.
 """
@@ -169,11 +169,11 @@ class PongMessage(Outbound, tag="pong", frozen=True):
     c: float
     n: int
     u: int = 0
-    """Server time in milliseconds since 1970; omitted if unknown."""
+    """The server's time in milliseconds since 1970; omitted if unknown."""
 
 
 class ErrorMessage(Outbound, tag="error", frozen=True):
-    """Why a message was invalid, or why the server closes the socket."""
+    """Why a message was invalid or why the server closes the socket."""
 
     code: str
     message: str
@@ -187,7 +187,7 @@ class OperatorRow(msgspec.Struct, frozen=True):
 
 
 class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
-    """The robot's lease: its holder, the client that requests it, and the latch of STOP."""
+    """The robot's lease: its holder, the client that requests it and the latch of STOP."""
 
     you: str
     name: str
@@ -200,13 +200,13 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     stops: int
-    """Number of STOPs in this run of the server."""
+    """Number of STOPs since the server started."""
     confirmed: bool
     """Whether all transports of the robot have accepted the stop."""
     drives: bool
     """Whether the page may drive."""
     forces: bool
-    """Whether the page may take the lease from another page without its consent."""
+    """Whether the page may take the lease from another page without that page's consent."""
     spare: str
     """Secret key for the page's redundant socket; "" for watchers."""
     role: Role | None = None
@@ -214,20 +214,20 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):
-    """A heartbeat number for the driving client, which echoes the number in its ticks."""
+    """A heartbeat number for the client that drives; the client echoes the number in its ticks."""
 
     n: int
 
 
 class StoppedMessage(Outbound, tag="stopped", frozen=True):
-    """A control stopped before its release; it needs a new gesture."""
+    """A report that a control stopped before its release; the control needs a new gesture."""
 
     command: str
     reason: str
 
 
 class RefusedMessage(Outbound, tag="refused", frozen=True):
-    """A tick, or a request about the controls, was refused."""
+    """The refusal of a tick or of a request about the controls."""
 
     about: str
     message: str
@@ -250,7 +250,7 @@ class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
 
 
 class QuestionEndMessage(Outbound, tag="asked", frozen=True):
-    """Question `n` has ended."""
+    """The end of question `n`."""
 
     n: int
 

@@ -15,7 +15,7 @@ from urc.transports.table import TRANSPORTS
 
 pytestmark = pytest.mark.anyio
 
-SAID = "this address is the dashboard itself; it cannot be a robot"
+SAID = "this is the address of the dashboard itself, not of a robot"
 WAIT_S = 5.0
 
 

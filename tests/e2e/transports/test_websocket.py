@@ -141,7 +141,7 @@ async def test_server_that_is_no_websocket(tmp_path_factory: pytest.TempPathFact
         with pytest.raises(ConnectFailed) as told:
             async with line(web.port, url=f"ws://{place}/missing"):
                 pass
-        assert str(told.value) == f"{place} answered 404 Not Found instead of a WebSocket"
+        assert str(told.value) == f"{place} answered 404 Not Found instead of opening a WebSocket"
         with pytest.raises(ConnectFailed) as told:
             async with line(web.port, url=f"ws://{place}/moved"):
                 pass

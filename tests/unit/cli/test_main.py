@@ -87,7 +87,7 @@ CASES: list[tuple[BaseException, int, str]] = [
     (
         ValueError("two\nlines"),
         1,
-        "urc watch: this is a bug in URC, please report it: ValueError at FILE: two\\x0alines",
+        "urc watch: this is a bug in URC; please report it: ValueError at FILE: two\\x0alines",
     ),
     (BrokenPipeError(), 0, ""),
     (KeyboardInterrupt(), 130, ""),
@@ -116,7 +116,7 @@ def test_failure_of_a_verb_is_told_without_a_traceback(
 def test_mistake_without_a_place_is_told_too(capsys: Output) -> None:
     """An exception that was never raised has no traceback."""
     assert explain(KeyError("x"), "urc") == 1
-    expected = "urc: this is a bug in URC, please report it: KeyError: 'x'\n"
+    expected = "urc: this is a bug in URC; please report it: KeyError: 'x'\n"
     assert capsys.readouterr().err == expected
 
 

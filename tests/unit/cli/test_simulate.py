@@ -48,7 +48,7 @@ def test_a_flood_of_different_ones_is_told_at_a_measured_pace() -> None:
     rest = [place for place in range(5, 20) if place != 7]
     assert teller.said() == [
         *(f"wire: odd {place} (1 time)" for place in rest[:10]),
-        "4 other frames had no reply",
+        "other frames without a reply: 4",
     ]
 
 
@@ -60,4 +60,4 @@ def test_what_is_kept_does_not_grow() -> None:
     teller.complaints.finish()
     *lines, last = teller.said()
     assert len(lines) == 10
-    assert last == "985 other frames had no reply"
+    assert last == "other frames without a reply: 985"

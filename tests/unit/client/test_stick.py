@@ -77,8 +77,8 @@ async def test_input_is_repeated_until_it_is_too_old(stick: Stick) -> None:
     assert all(at - began_s < stick.valid_s for at, _ in line.ticks)
     assert {dict(arguments)["speed"] for _, arguments in line.ticks} == {0.5}
     assert len(line.releases) == 1
-    assert stick.ended.startswith("no call of the stick for 200 ms")
-    with pytest.raises(MotionEnded, match="no call of the stick"):
+    assert stick.ended.startswith("the stick was not called for 200 ms")
+    with pytest.raises(MotionEnded, match="the stick was not called"):
         stick(speed=0.5)
     with pytest.raises(MotionEnded):
         stick.release()

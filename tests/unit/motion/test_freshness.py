@@ -13,7 +13,7 @@ def test_an_input_that_echoes_a_fresh_tick_is_taken_once() -> None:
     assert fresh.refusal(ControlInput(epoch=3, number=1, echo=echo), 3, 10.1) == ""
     assert (
         fresh.refusal(ControlInput(3, 1, echo), 3, 10.1)
-        == "the input is not newer than the last one"
+        == "the input is not newer than the previous input"
     )
 
 
@@ -39,7 +39,7 @@ def test_no_input_from_before_a_release_counts_after_it() -> None:
     fresh.release(7, "drive")
     for number in (6, 7):
         refusal = fresh.refusal(ControlInput(3, number, echo), 3, 10.0, "drive")
-        assert refusal == "the input is not newer than the last one"
+        assert refusal == "the input is not newer than the previous input"
     assert fresh.refusal(ControlInput(3, 8, echo), 3, 10.0, "drive") == ""
     fresh.release(2, "drive")
     assert fresh.refusal(ControlInput(3, 8, echo), 3, 10.0, "drive") != ""
@@ -127,7 +127,7 @@ def test_control_without_a_name_is_one_control() -> None:
     assert fresh.refusal(ControlInput(1, 1, echo), 1, 1.0) == ""
     assert (
         fresh.refusal(ControlInput(1, 1, echo), 1, 1.0, "")
-        == "the input is not newer than the last one"
+        == "the input is not newer than the previous input"
     )
 
 
@@ -136,7 +136,7 @@ def test_number_below_0_is_newer_than_nothing() -> None:
     echo = fresh.issue(1.0)
     assert (
         fresh.refusal(ControlInput(1, -1, echo), 1, 1.0)
-        == "the input is not newer than the last one"
+        == "the input is not newer than the previous input"
     )
     assert fresh.refusal(ControlInput(1, 0, echo), 1, 1.0) == ""
 

@@ -127,7 +127,7 @@ def test_an_answer_is_picked_out_of_unsolicited_frames() -> None:
 @pytest.mark.parametrize(
     ("name", "arguments", "code", "words"),
     [
-        ("fly", {}, "unknown-command", "there are: go, ask"),
+        ("fly", {}, "unknown-command", "the commands are: go, ask"),
         ("go", {}, "bad-argument", "needs the argument 'speed'"),
         ("go", {"speed": 10}, "bad-argument", "above its maximum 9"),
         ("go", {"speed": -1}, "bad-argument", "below its minimum 0"),

@@ -383,7 +383,7 @@ commands:
     talk.at(0.5)
     assert any(
         one == "no answer to volts within 0.5 s; received 'A1', which is no answer to volts;"
-        " if replies arrive in a different order than requests, declare 'match'"
+        " if replies arrive in a different order from requests, declare 'match'"
         for one in talk.messages
     ), talk.messages
 

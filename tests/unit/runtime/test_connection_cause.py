@@ -44,7 +44,7 @@ def test_errors_of_sockets(fault: OSError, cause: str) -> None:
         ("the host key of 10.0.0.5:22 is unknown: found SHA256:x", "host-key"),
         ("no such file or directory", "device"),
         ("nothing received for 5 s; reconnecting", "silent"),
-        ("connected; the steps of the connection are not done yet", "login"),
+        ("connected; the on_connect steps are not complete yet", "login"),
         ("no answer from 10.0.0.5:4030", "timeout"),
         ("no such host 'login.local'", "name"),
         ("an unusual failure", ""),

@@ -39,7 +39,7 @@ def hub() -> Hub:
     ("state", "detail", "attempts", "is_opening"),
     [
         ("connecting", "", 0, True),
-        ("connecting", "connected; the steps of the connection are not done yet", 0, True),
+        ("connecting", "connected; the on_connect steps are not complete yet", 0, True),
         ("connecting", NOTHING_YET, 0, False),
         ("connecting", "refused", 1, False),
         ("live", "", 0, False),

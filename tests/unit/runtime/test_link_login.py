@@ -56,7 +56,7 @@ async def test_a_line_is_live_only_after_its_login(polls: bool) -> None:
         await clock.advance(1.5)
         state, detail = state_of(session)
         assert state == "connecting"
-        assert "steps of the connection" in detail
+        assert "on_connect steps" in detail
         line.feed(b"WELCOME\n")
         await clock.advance(0.1)
         assert state_of(session) == ("live", "")

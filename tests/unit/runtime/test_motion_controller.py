@@ -230,7 +230,7 @@ def test_the_two_controls_of_one_screen_count_for_themselves() -> None:
     assert it.controller.tick("ann", "lift", {}, ControlInput(epoch, 6, echo), it.now) == ""
     assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == ""
     assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == (
-        "the input is not newer than the last one"
+        "the input is not newer than the previous input"
     )
 
 

@@ -54,7 +54,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ),
         ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
         ({"environment": "A=b"}, "ssh: environment must contain entries of the form NAME: value"),
-        ({"environment": {"A B": "c"}}, "ssh: 'A B' is not a name of an environment variable"),
+        ({"environment": {"A B": "c"}}, "ssh: 'A B' is not the name of an environment variable"),
         (
             {"environment": {"A": 1}},
             "ssh: environment.A must be text; put the value in quotation marks",

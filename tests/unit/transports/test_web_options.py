@@ -106,7 +106,7 @@ def test_events_of_one_path_share_a_stream() -> None:
 STREAMS: list[tuple[list[TopicSubscription], str]] = [
     (
         [TopicSubscription("/cam")],
-        "http needs mjpeg, stills, sse or lines as stream of '/cam', not None",
+        "http needs mjpeg, stills, sse or lines as 'stream' of '/cam', not None",
     ),
     (
         [TopicSubscription("/cam#x", {"stream": "mjpeg"})],
@@ -114,7 +114,7 @@ STREAMS: list[tuple[list[TopicSubscription], str]] = [
     ),
     (
         [TopicSubscription("/s", {"stream": "stills", "every": 0.001})],
-        "http needs 10ms to 1h as every of '/s', not 0.001",
+        "http needs 10ms to 1h as 'every' of '/s', not 0.001",
     ),
     (
         [

@@ -245,7 +245,7 @@ async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() ->
         await it.clock.advance(1)
         it.controls.handle(ann, old)
         (told,) = [message for message in it.read(ann) if message["t"] == "refused"]
-        assert told["message"] == "the input is not newer than the last one"
+        assert told["message"] == "the input is not newer than the previous input"
         it.controls.handle(ann, wire.Tick("beep", epoch, 9, 9))
         (told,) = it.read(ann)
         assert told["message"] == "'beep' is not a held command of this robot"

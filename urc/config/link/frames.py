@@ -61,7 +61,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
         problems.error(
             inner,
             "wrong-size",
-            f"{_what(send)} {len(data)} bytes, and a frame of this transport has exactly {wanted}",
+            f"{_what(send)} {len(data)} bytes, but a frame of this transport has exactly {wanted}",
         )
 
 

@@ -267,7 +267,8 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
     """Return why a signal does not fit an input; "" if the signal fits."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
-        return f"type {' or '.join(port.types)} is expected, but the signal is {signal.type}"
+        wanted = " or ".join(port.types)
+        return f"type {wanted} is expected, but the signal has type {signal.type}"
     if signal.type == "array":
         of = (*port.items, "integer") if "number" in port.items else port.items
         if of and signal.items not in of:
@@ -280,7 +281,7 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
         return f"unit {port.unit!r} is expected, but the signal is {has}"
     measured = quantity_of(signal.unit)
     if port.quantity and measured not in ("", port.quantity):
-        return f"unit of {port.quantity} is expected, but the signal is in {signal.unit!r}"
+        return f"a unit of {port.quantity} is expected, but the signal is in {signal.unit!r}"
     return ""
 
 

@@ -170,7 +170,7 @@ def _check_read(
 
 
 def _answers(part: Node) -> list[Node]:
-    """Return the nodes for a received frame, its stages and the error replies with keys."""
+    """Return the nodes of a received frame, its stages, and its error replies that are mappings."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
     refusals = [inner for one in given for inner in one.listed("errors")]

@@ -59,7 +59,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
                 "unknown-argument",
                 f"the value of output {port.name!r} comes first, then the argument of the command",
                 key=True,
-                hint=f"swap them: {inner.data}: {source}",
+                hint=f"swap the two names: {inner.data}: {source}",
             )
         elif source not in port.arguments:
             problems.error(
@@ -98,7 +98,7 @@ def _check_hold(
         problems.error(
             part,
             "not-held",
-            f"{port.name!r} of widget {widget.name!r} is a hold-to-run control, and command"
+            f"{port.name!r} of widget {widget.name!r} is a hold-to-run control, but command"
             f" {command.name!r} has no 'hold'",
             hint="give the command 'hold: { repeat: 50ms, release: … }'",
         )
@@ -237,7 +237,7 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
     """Return why an output's value does not fit an argument; "" if the value fits."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
-        return f"the value is {given}, but the argument is {argument.type}"
+        return f"the value has type {given}, but the argument has type {argument.type}"
     if port.unit and are_apart(port.unit, argument.unit):
         return f"unit {port.unit!r} is given, but the argument is in {argument.unit!r}"
     return ""

@@ -157,7 +157,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that a transport's login defines; empty for the login's own steps."""
+        """Return the names that a transport's login defines; none for the login's own steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)

@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the expected value at `part`; None if it is empty or invalid, or `is_part` is set."""
+    """Return the expected value at `part`; None if empty or invalid, or if `is_part` is set."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)

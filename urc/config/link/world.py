@@ -1,4 +1,4 @@
-"""Checks the names in an emulated robot's world, and the ``world`` readings in its rules."""
+"""Checks the names in an emulated robot's world and the ``world`` readings in its rules."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -31,7 +31,7 @@ _NEEDED: Final = {
 
 
 class DeclaredTrailer(NamedTuple):
-    """The declared position of a checksum that follows text, or each line of text."""
+    """The declared position of a checksum after text or after each line of the text."""
 
     mark: bytes
     is_padded: bool

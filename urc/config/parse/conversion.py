@@ -67,7 +67,7 @@ def parse_states(part: Node, kind: str, problems: Problems) -> tuple[tuple[str, 
                 problems.error(
                     inner,
                     "wrong-type",
-                    f"the signal has the type {kind}, and {raw!r} is not a number",
+                    f"the signal has the type {kind}, but {raw!r} is not a number",
                     key=True,
                     hint="write 'type: string', or map numbers to words",
                 )
@@ -116,6 +116,6 @@ def _points(part: Node | None, problems: Problems) -> tuple[tuple[float, float],
                 "wrong-order",
                 f"{after.data[0]:g} is not above {before.data[0]:g}, the raw number of the"
                 " previous point",
-                hint="the first number of each pair is the raw number, and must increase",
+                hint="the first number of each pair is the raw number, which must increase",
             )
     return tuple((inner.data[0], inner.data[1]) for inner in pairs)

@@ -200,7 +200,7 @@ def _argument(part: Node, problems: Problems) -> Argument:
 
 
 def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
-    """Report a reserved name, and keys that have no effect for an argument's type."""
+    """Report a reserved name and keys that have no effect for an argument's type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
         problems.error(

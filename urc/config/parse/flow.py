@@ -41,7 +41,7 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""Empty frame of a sequence; only the sequence's steps send frames."""
+"""Frame of a sequence: empty, because only the sequence's steps send frames."""
 
 
 def line_with_flow(
@@ -283,7 +283,7 @@ def _keepalive(part: Node | None, context: FormContext, problems: Problems) -> K
         return None
     given = [key for key in ("send", "run") if key in part.data]
     if len(given) != 1:
-        text = "'send' and 'run' exclude each other" if given else "'send' or 'run' is missing"
+        text = "'send' and 'run' cannot be used together" if given else "'send' or 'run' is missing"
         where = {"at": "run"} if given else {}
         problems.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
         return None

@@ -1,4 +1,4 @@
-"""Finds the form of a frame, and defines the interface of the form parsers.
+"""Finds the form of a frame and defines the interface of the form parsers.
 
 Each form has a module in the package ``forms``. Modules for received forms implement `ReadForm`,
 and modules for sent forms implement `WriteForm`.

@@ -325,7 +325,7 @@ def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
 
 
 def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Problems) -> None:
-    """Report a length field that overlaps the start bytes, or has keys that have no effect."""
+    """Report a length field that overlaps the start bytes or has keys that have no effect."""
     if length.offset < len(start):
         problems.error(
             part,

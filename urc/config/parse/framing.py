@@ -195,7 +195,7 @@ def _check_case(
     before: list[tuple[bytes, FramingSpec]],
     problems: Problems,
 ) -> None:
-    """Report unreachable cases, and cases whose framing expects different start bytes."""
+    """Report unreachable cases and cases whose framing expects different start bytes."""
     for other, _ in before:
         if first.startswith(other):
             problems.error(
@@ -218,7 +218,7 @@ _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
 def _check_pattern(part: Node, problems: Problems) -> None:
-    """Report mistakes in a framing's pattern, such as an undefined frame end."""
+    """Report mistakes in a framing's pattern, such as an undefined end of the frame."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
     if far is not None:

@@ -14,7 +14,7 @@ _MOST: Final = 48
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
 _EMPTY = re.compile(r"\.+")
 _Cell = tuple[str, int]
-"""The slot name in a cell, and the name's offset in the grid's text."""
+"""The slot name in a cell and the name's offset in the grid's text."""
 
 
 def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
@@ -69,7 +69,7 @@ def _check_beside_tabs(part: Node, problems: Problems) -> None:
             problems.error(
                 part,
                 "misplaced-key",
-                f"'{key}' and 'tabs' exclude each other",
+                f"'{key}' and 'tabs' cannot be used together",
                 at=key,
                 key=True,
                 hint="give each tab its own grid",
@@ -103,7 +103,7 @@ def _pictures(part: Node, problems: Problems, *, is_tab: bool) -> dict[str, Layo
         problems.error(
             several,
             "misplaced-key",
-            "'grid' and 'layouts' exclude each other",
+            "'grid' and 'layouts' cannot be used together",
             key=True,
             hint="move 'grid' into 'layouts' as 'landscape'",
         )

@@ -77,7 +77,7 @@ def _numbers(part: Node, kind: str, bounds: _Bounds, problems: Problems) -> dict
                 "wrong-order",
                 f"{after} {more:g} is not above {name} {value:g}",
                 at=after,
-                hint=f"swap them: {name}: {more:g}, {after}: {value:g}"
+                hint=f"swap the two values: {name}: {more:g}, {after}: {value:g}"
                 if value > more
                 else "the order is lolo < low < high < hihi",
             )
@@ -112,7 +112,7 @@ def _words(
             hint = did_you_mean(word, known, "values")
             problems.error(inner, "unknown-word", text, key=True, hint=hint)
         elif kind == "integer" and not states and not word.removeprefix("-").isdecimal():
-            text = f"the signal has the type integer, and {word!r} is not an integer"
+            text = f"the signal has the type integer, but {word!r} is not an integer"
             problems.error(inner, "wrong-type", text, key=True)
     return given
 

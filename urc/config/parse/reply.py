@@ -133,7 +133,7 @@ def _aside(part: Node | None, problems: Problems, context: FormContext) -> ReadS
 def parse_errors(
     part: Node, problems: Problems, context: FormContext
 ) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
-    """Return the patterns under ``errors:``, and the error replies in other forms."""
+    """Return the patterns under ``errors:`` and the error replies in other forms."""
     patterns: list[Pattern] = []
     faults: list[ErrorReply] = []
     for inner in part.listed("errors"):
@@ -149,7 +149,7 @@ def parse_errors(
 
 
 def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> None:
-    """Report each key of `keys` in `part`, with the reason `why`."""
+    """Report each of `keys` that `part` contains, with the reason `why`."""
     for key in keys:
         if key in part.data:
             problems.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)

@@ -1,4 +1,4 @@
-"""Parser for emulated robots: the world, and the rules of each transport."""
+"""Parser for emulated robots: the world and the rules of each transport."""
 
 import math
 from collections.abc import Mapping

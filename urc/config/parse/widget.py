@@ -1,4 +1,4 @@
-"""Parser for widget manifests, and reader for a folder of widgets."""
+"""Parser for widget manifests and reader for a folder of widgets."""
 
 import re
 from collections.abc import Iterable

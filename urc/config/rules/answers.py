@@ -1,4 +1,4 @@
-"""Rules for transports without replies, and for silence as a reply."""
+"""Rules for transports without replies and for silence as a reply."""
 
 from typing import Final
 

@@ -79,7 +79,7 @@ def _wait_s(step: Step) -> float:
 
 
 def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Problems) -> None:
-    """Warn about polls that exceed the baud rate of a serial line."""
+    """Warn about polls whose traffic exceeds the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return

@@ -241,7 +241,7 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
             problems.warn(
                 inner,
                 "ambiguous-frame",
-                f"the reply on success also matches, such as {good.samples[0][:_SHOWN]!r}, and"
+                f"a successful reply also matches, such as {good.samples[0][:_SHOWN]!r}, and"
                 f" would count as {what}",
                 hint=f"make the pattern match {whose} only, because it is tried first",
             )
@@ -282,7 +282,7 @@ def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None
             problems.warn(
                 inner,
                 "ambiguous-frame",
-                "the reply on success also matches, and would count as an error",
+                "a successful reply also matches, and would count as an error",
                 hint="give 'when' a condition that is true only for errors, because errors are"
                 " tried first",
             )

@@ -158,7 +158,7 @@ def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
 def _check_baud(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Report held commands that exceed the baud rate of a serial line."""
+    """Report held commands whose traffic exceeds the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return

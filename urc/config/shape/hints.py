@@ -111,7 +111,10 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
 def word_hint(word: str, words: Sequence[str]) -> str:
     """Return a hint with the probable meaning of an unknown word; "" if no word is similar."""
     if word == "watch" and "drive" in words:
-        return "visitors with the role 'watch' cannot send commands; the lowest role is 'drive'"
+        return (
+            "visitors with the role 'watch' cannot send commands;"
+            " the lowest role for a command is 'drive'"
+        )
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
         return f"use the word '{other}'"

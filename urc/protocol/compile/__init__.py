@@ -1,1 +1,1 @@
-"""Generate Python source from a driver, and compile it."""
+"""Generates Python source from a driver and compiles the source."""

@@ -1,4 +1,4 @@
-"""Build functions from generated source text, with readable tracebacks.
+"""Builds functions with readable tracebacks from generated source text.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
 Text from a document enters the generated source only inside the `repr()` of a constant. `linecache`

@@ -29,7 +29,7 @@ class EqualsReader:
         self._payload = encoded(cast("str", spec.options["text"]), context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return an empty mapping for the expected frame, and None for any other frame."""
+        """Return an empty mapping for the expected frame and None for any other frame."""
         return NOTHING if frame.payload == self._payload else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:

@@ -1,4 +1,4 @@
-"""Generated types for a set of JSON paths, and a function that extracts the fields.
+"""Generated types for a set of JSON paths and a function that extracts the fields.
 
 Private to `urc.protocol.forms.json_paths`.
 """

@@ -6,7 +6,7 @@ Pure. Each framing works in both directions, so an emulated robot can use the sa
 Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call.
 Remaining bytes stay in the buffer, so another decoder can take over if a reply has a different
 framing. Memory is bounded: the buffer never exceeds the maximum frame size. Time is linear: bytes
-are scanned once, and rescanned only within a `RescanBudget`. After invalid bytes, the decoder
+are scanned once and rescanned only within a `RescanBudget`. After invalid bytes, the decoder
 reports one violation and continues at the next possible start of a frame.
 """
 
@@ -182,5 +182,5 @@ def encode_frame(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> by
     except BadFrame as error:
         raise FramingError(str(error)) from None
     if len(frame) > max_bytes:
-        raise FramingError(f"a frame of {len(frame)} bytes is longer than {max_bytes}")
+        raise FramingError(f"a frame of {len(frame)} bytes exceeds the limit of {max_bytes}")
     return frame

@@ -1,6 +1,6 @@
 """Conversion between a payload and its frame, according to the frame layout.
 
-Pure. A `FrameCodec` implements one layout. The framings find the frames in the stream, and use the
+Pure. A `FrameCodec` implements one layout. The framings find the frames in the stream and use the
 codec to convert each frame.
 """
 
@@ -216,7 +216,7 @@ class LengthField:
         """Write the size of `frame` into its length field, which must end by offset `stop`.
 
         Raises:
-            BadFrame: the length field does not fit, or cannot represent the size.
+            BadFrame: the length field does not fit or cannot represent the size.
         """
         spec = self._spec
         number, left = divmod(len(frame) - spec.adjust, spec.unit)
@@ -228,7 +228,8 @@ class LengthField:
             return  # the bytes there belong to the payload
         if left:
             raise BadFrame(
-                "wrong-size", f"the frame must be a multiple of {spec.unit} bytes; {left} left over"
+                "wrong-size",
+                f"the frame's size must be a multiple of {spec.unit} bytes; {left} left over",
             )
         if self.end > stop or number < 0:
             raise BadFrame("wrong-size", f"{len(frame)} bytes are too few for this kind of frame")

@@ -1,6 +1,6 @@
-"""The receive buffer of one connection, and the budget for rescanning bytes.
+"""The receive buffer of one connection and the budget for rescanning bytes.
 
-Pure; used by `urc.protocol.framing.table`.
+The module is pure, and `urc.protocol.framing.table` uses it.
 """
 
 from typing import Final
@@ -22,7 +22,7 @@ class ReceiveBuffer:
         return len(self.data) - self.at
 
     def push(self, data: bytes) -> None:
-        """Append received bytes, and discard consumed bytes."""
+        """Append received bytes and discard consumed bytes."""
         if self.at:
             del self.data[: self.at]
             self.at = 0

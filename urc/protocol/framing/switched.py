@@ -147,7 +147,7 @@ class _SwitchDecoder(StreamDecoder):
         return self._lost(*found[:2], closes=found.closes)
 
     def _choose(self) -> FrameFault | None:
-        """Select the case for the next frame, and advance to that frame."""
+        """Select the case for the next frame and advance to that frame."""
         stream = self._stream
         if self._other is not None:
             self._choose_here(self._other)

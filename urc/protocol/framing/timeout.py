@@ -1,4 +1,4 @@
-"""Timeouts for any framing, and removal of terminal escape sequences.
+"""Timeouts for any framing and removal of terminal escape sequences.
 
 Theory of operation. An incomplete frame blocks all later frames. For example, a corrupted length
 field may require bytes that never arrive. With a timeout, silence after the newest byte ends the
@@ -30,7 +30,7 @@ _LONGEST: Final = 300
 
 
 class TimeoutFraming(NamedTuple):
-    """A framing that adds a timeout for incomplete frames, or removes escape sequences."""
+    """A framing that adds a timeout for incomplete frames or removes escape sequences."""
 
     framing: Framing
     timeout_s: float | None

@@ -2,7 +2,7 @@
 
 Theory of operation. A stream of XML elements has no root element, so each top-level element is a
 frame. Tags, comments, declarations and CDATA determine the end of an element. Quoted attribute
-values may contain markup characters. The scan jumps from marker to marker, and reads every byte
+values may contain markup characters. The scan jumps from marker to marker and reads every byte
 once. Blanks, comments and declarations may separate frames. Data up to a mismatched closing tag is
 dropped.
 """
@@ -40,7 +40,8 @@ class XmlFraming(NamedTuple):
     def encode(self, payload: bytes) -> bytes:
         """Return `payload` as a frame in wire form; raise `FramingError` if impossible."""
         if len(payload) > self.max_bytes:
-            raise FramingError(f"a frame of {len(payload)} bytes is longer than {self.max_bytes}")
+            size = len(payload)
+            raise FramingError(f"a frame of {size} bytes exceeds the limit of {self.max_bytes}")
         found = _XmlDecoder(None, b"", self.max_bytes).feed(payload)
         element = found[0] if len(found) == 1 else None
         if not isinstance(element, bytes) or not payload.strip(_BETWEEN).endswith(element):

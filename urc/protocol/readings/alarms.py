@@ -60,7 +60,7 @@ class AlarmMonitor:
         return min((*pending, *self._ends.values()), default=None)
 
     def update(self, value: Reading, now: float) -> Alarm:
-        """Process a new value, and return its alarm."""
+        """Process a new value and return its alarm."""
         if value is None:  # not available, so no alarm can be determined
             self._due.clear()
             self._ends.clear()

@@ -97,7 +97,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values that do not come from a frame in the same way as fields."""
+        """Convert values from sources other than frames, in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -146,7 +146,7 @@ class Readings:
         return samples
 
     def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
-        """Compute all signals that depend on `samples`, and append the new samples to `samples`."""
+        """Compute all signals that depend on `samples` and append the new samples to `samples`."""
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:

@@ -1,4 +1,4 @@
-"""Limits of a command: maximum duration, and transports in use.
+"""Limits of a command: maximum duration and transports in use.
 
 Pure. Every wait in an engine has a timeout. The maximum duration of a command is the sum of all its
 timeouts.

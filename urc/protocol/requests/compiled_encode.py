@@ -100,7 +100,7 @@ def _written(checks: list[str], text: str, encoding: str) -> list[str]:
 def build_fast_check(
     arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Reading]]
 ) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
-    """Return a function that checks numeric arguments, and calls `slow` in all other cases."""
+    """Return a function that checks numeric arguments and calls `slow` in all other cases."""
     kinds = {one.type for one in arguments.values()}
     if not arguments or kinds - {"number", "integer"}:
         return slow

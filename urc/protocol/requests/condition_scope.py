@@ -12,7 +12,7 @@ __all__ = ["SignalState", "ConditionScope"]
 
 
 class SignalState:
-    """The newest samples of all signals, and the latched STOP."""
+    """The newest samples of all signals and the latched STOP."""
 
     def __init__(self, signals: Mapping[str, Signal], names: Mapping[str, object]) -> None:
         self._signals = signals
@@ -25,7 +25,7 @@ class SignalState:
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Record a stop with its reason; "" records its reset."""
+        """Record a stop with its reason, or the reset of the stop if `reason` is empty."""
         self.latched = reason
         self.stops += reason != ""
 

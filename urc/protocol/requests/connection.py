@@ -110,7 +110,7 @@ class Connection:
         return events + self._pump(now)
 
     def fail(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection for the given reason, and fail all pending requests."""
+        """Close the connection for the given reason and fail all pending requests."""
         if self.state == "closed":
             return []
         reason = self.receiver.secrets.hide(reason)
@@ -137,7 +137,7 @@ class Connection:
         return [*events, Close(self.spec.name), *self._pump(now)]
 
     def _lose(self, reason: str) -> list[LineEvent]:
-        """Discard the connection, and fail all pending requests."""
+        """Discard the connection and fail all pending requests."""
         lost = self._lost()
         for exchange in tuple(self._request_queue):
             if exchange.is_privileged:

@@ -3,13 +3,13 @@
 Theory of operation. A connection is closed, opening or open. An open connection is *ready* from the
 end of ``on_connect`` until the start of ``on_close``. A connection that is not ready sends only the
 privileged exchanges of ``on_connect`` and ``on_close``. The session opens persistent connections. A
-per-request conversation requests a connection (`Open`) for each request, and closes it afterwards
+per-request conversation requests a connection (`Open`) for each request and closes it afterwards
 (`Close`). The module is pure: callers pass the time.
 
 Requests in flight are kept in sending order. A received frame is offered to each request in flight,
 from the oldest to the newest. A request with a correlation accepts only its own reply. Among
 requests without a correlation, only the oldest accepts the frame, because replies arrive in order.
-Real-time requests have a separate reply order. After its timeout, a request is *late*, and stays in
+Real-time requests have a separate reply order. After its timeout, a request is *late* and stays in
 flight for another reply timeout. A late reply is dropped so that the next request does not accept
 it. Until the late reply arrives or times out, requests with similar replies wait. After
 `MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
@@ -289,7 +289,7 @@ class Conversation(Connection):
         return events + self._pump(now) if self._request_queue or self.is_per_request else events
 
     def _ahead(self, now: float) -> list[LineEvent]:
-        """Process messages at the front of the stream, and report their samples together.
+        """Process messages at the front of the stream and report their samples together.
 
         Processing short frames one by one takes almost twice as long as in batches (decision 27). A
         batch ends after the expected reply or a refused value, or before another kind of frame.
@@ -487,8 +487,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events for a frame whose match result for a request is `offer`.
 
-        A provisional reply may also be a message. Without `frame`, the frame has already been
-        reported as a message.
+        A provisional reply may also be a message. Without `frame`, the message has already been
+        reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []
@@ -579,7 +579,7 @@ class Conversation(Connection):
         came = self.receiver.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
         text += came
         if came and exchange.ask.match is None and len(self._pending_replies) > 1:
-            text += "; if replies arrive in a different order than requests, declare 'match'"
+            text += "; if replies arrive in a different order from requests, declare 'match'"
         events: list[LineEvent] = [Violation(self.spec.name, "reply-timeout", text)]
         pending.is_late = True
         pending.due = now + reply_s

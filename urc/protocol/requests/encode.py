@@ -1,4 +1,4 @@
-"""Validation of command arguments, and their encoding as a frame.
+"""Validation of command arguments and their encoding as a frame.
 
 Pure. This module checks the arguments from browsers, scripts and tests.
 """

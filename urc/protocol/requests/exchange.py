@@ -1,4 +1,4 @@
-"""Requests, and their execution from submission to outcome.
+"""Requests and their execution from submission to outcome.
 
 Pure. A `CompiledRequest` is a declared request in compiled form. An `Exchange` is one execution of
 a request, from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply`
@@ -136,7 +136,7 @@ class Exchange:
     """Whether the request is part of the login or the close sequence, and may be sent before the
     connection is ready."""
     is_secret = False
-    """Whether the payload is secret, and must not appear in any message."""
+    """Whether the payload is secret and must not appear in any message."""
     condition: Callable[[float], str] | None = None
     """Function that returns the reason for refusing the request, or ""; evaluated before
     sending."""
@@ -177,7 +177,7 @@ class Exchange:
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
     ) -> "Exchange":
-        """Set rarely used attributes, and return the exchange."""
+        """Set rarely used attributes and return the exchange."""
         self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret
@@ -192,12 +192,12 @@ class Exchange:
 
     @property
     def rank(self) -> int:
-        """Priority rank; lower ranks are sent first."""
+        """Priority rank; exchanges with lower ranks are sent first."""
         return self.ask.rank
 
     @property
     def latest_key(self) -> str:
-        """Label of requests that replace each other in the queue; "" if none are replaced."""
+        """Label of requests that replace each other in the queue; "" for any other request."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
@@ -223,7 +223,7 @@ LineEvent = Event | ExchangeEnded | Matched | ConnectionClosing
 
 
 class ReplySink:
-    """A sink that returns the outcome of a request as an event, and may own an exchange."""
+    """A sink that returns the outcome of a request as an event and may own an exchange."""
 
     __slots__ = ("_request",)
 

@@ -106,7 +106,7 @@ class FrameReceiver:
             self.secrets = SentSecrets()
 
     def cut_by(self, framing: Framing) -> None:
-        """Switch to `framing`, which first decodes the remaining bytes."""
+        """Switch to `framing`; its decoder begins with the bytes that remain in the buffer."""
         if framing is not self._cut_by:
             self._cut(framing)
 
@@ -180,7 +180,7 @@ class FrameReceiver:
         return self._prompt is not None
 
     def find_prompt(self) -> list[LineEvent]:
-        """Search for the expected prompt; return the events for a match."""
+        """Search for the expected prompt; return the events if the prompt is found."""
         if self._prompt is None:
             return []
         pattern, expectation = self._prompt
@@ -219,7 +219,7 @@ class FrameReceiver:
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
-        """Return the events for a reply to the step of `asker` that expects it.
+        """Return the events for a reply that a step of `asker` expects.
 
         Args:
             asker: the sequence that made the request; only this sequence receives the reply.

@@ -2,7 +2,7 @@
 
 Pure. Motion frames bypass the connection's queue and have no `PendingReply`. This module handles
 robots that reply to each frame. An acknowledgement is expected, and a refusal ends the motion. An
-unsolicited refusal, for example because of an open safety guard, also ends the motion.
+unsolicited refusal, for example because a safety door is open, also ends the motion.
 
 In half-duplex mode, motion frames wait for a pending reply, and queued requests wait for replies to
 motion frames. The wait for a reply to a motion frame is short, because a lost reply must not
@@ -75,7 +75,7 @@ class HoldReplies:
         self._all[command] = _Listening(answer, match)
 
     def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record that a frame for a command was sent with the values `names`."""
+        """Record that a frame with the values `names` was sent for a command."""
         one = self._all.get(command)
         if one is not None:
             self.owed_until_s = now + min(one.expectation.answer.timeout_s, LONGEST_WAIT_S)

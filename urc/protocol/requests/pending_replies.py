@@ -39,7 +39,7 @@ class PendingReply:
         self.stage = 0
         self._expectation: Expectation | None = None
         self.due = now + ask.answers[0].timeout_s
-        """Time at which the reply is overdue, or at which a late transmission is removed."""
+        """Time at which the reply becomes overdue, or a late transmission is removed."""
         self.size = 0
         """Size of the request in the robot's receive buffer, in bytes."""
         self.since = now
@@ -47,7 +47,7 @@ class PendingReply:
         self.is_extended = False
         """Whether the robot has requested more time for the reply."""
         self.is_late = False
-        """Whether the reply has timed out. A late reply may still arrive, and must not match
+        """Whether the reply has timed out. A late reply may still arrive and must not match
         another request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
@@ -94,7 +94,7 @@ class PendingReply:
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return the elapsed reply timeout as text, for use in messages."""
+        """Return the elapsed reply timeout as text for messages, such as ``within 2 s``."""
         answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -136,7 +136,7 @@ class PendingReply:
 class PendingReplies(list[PendingReply]):
     """Pending transmissions, in sending order.
 
-    Late transmissions stay until their deadline.
+    Late transmissions remain pending until their deadline.
     """
 
     __slots__ = ()

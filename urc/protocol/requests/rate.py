@@ -21,7 +21,7 @@ class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
     After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
-    between calls would instead delay every slightly early call, and so reduce the average rate.
+    between calls would instead delay every slightly early call and so reduce the average rate.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -74,15 +74,16 @@ class Counters:
     """The counters of one connection.
 
     Counter numbers are assigned in the order of transmission. If the engine is the only sender, the
-    order of transmission is known. If the guard also sends motion, the counters are *shared*. For
-    shared counters, the engine only proposes numbers, and receives the actual numbers later.
+    order of transmission is known. If the guard also sends motion frames, the counters are
+    *shared*. For shared counters, the engine only proposes numbers and receives the actual
+    numbers later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "is_shared")
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """Last numbers after the transmission of all pending frames, keyed by counter."""
+        """Last number of each counter after all pending frames have been transmitted."""
         self._known: Mapping[str, int] = {}
         """Last confirmed number of each counter."""
         self.ahead = 0
@@ -121,12 +122,12 @@ class Counters:
     def series(
         self, encode: Callable[[FrameCounters], Payload], length: int, made: Made
     ) -> FrameVariants:
-        """Render frames for the next numbers, and for the first numbers of a new connection.
+        """Render frames for the next numbers and for the first numbers of a new connection.
 
         Args:
             encode: function that renders a frame with the given numbers.
             length: number of frames to render.
-            made: cache of rendered frames, to which the frames of this series are added.
+            made: cache of rendered frames, which this series reuses and then replaces.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):
@@ -163,7 +164,7 @@ class Prioritized(Protocol):
 
     @property
     def rank(self) -> int:
-        """Priority rank; lower ranks are sent first."""
+        """Priority rank; items with lower ranks are sent first."""
 
     @property
     def latest_key(self) -> str:

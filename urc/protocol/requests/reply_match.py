@@ -1,4 +1,4 @@
-"""Expected replies: matching, and collection of several frames.
+"""Expected replies: the matching of frames, and the collection of several frames.
 
 Pure. A `Matcher` decodes one kind of frame. A `CompiledReply` is the reply that a request expects.
 An `Expectation` collects the frames of one reply. The conversation of the transport
@@ -76,7 +76,7 @@ class Matcher:
 
 
 class CompiledReply(NamedTuple):
-    """A compiled expected reply."""
+    """The compiled form of an expected reply."""
 
     matcher: Matcher
     timeout_s: float

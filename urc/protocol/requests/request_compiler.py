@@ -35,7 +35,7 @@ class RequestCompiler:
     """A compiler for the requests of one driver.
 
     Raises:
-        BadArgument: a constant frame contains its own delimiter, or cannot be encoded. Every method
+        BadArgument: a constant frame contains its own delimiter or cannot be encoded. Every method
             may raise `BadArgument`.
     """
 
@@ -122,7 +122,7 @@ class RequestCompiler:
         return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
 
     def plain(self, label: str, transport: str, send: WriteSpec) -> CompiledRequest:
-        """Return a compiled request without a reply."""
+        """Return a compiled request that expects no reply."""
         return self._compile(label, transport, send, None)
 
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:

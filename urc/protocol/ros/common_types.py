@@ -1,4 +1,4 @@
-"""Types from the ROS common interfaces that drivers publish most often.
+"""The types that drivers publish most often, from the ROS common interfaces.
 
 A robot sends definitions of the types that it publishes, but not of the types that it only
 receives. Messages of other types are sent as JSON (`urc.protocol.ros.topic_codec`).
@@ -109,7 +109,7 @@ _ROS1: Final[Mapping[str, tuple[MessageField, ...]]] = {
 
 @cache
 def common_types(*, is_ros1: bool = False) -> Definitions:
-    """Return the definitions of ROS 2, or of ROS 1."""
+    """Return the definitions for ROS 2, or for ROS 1 if `is_ros1` is true."""
     found: dict[str, Definition] = {}
     for line in _TYPES.replace("\n  ", " ").splitlines():
         name, _, fields = line.partition(":")

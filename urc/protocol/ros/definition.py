@@ -52,7 +52,7 @@ class MessageField(NamedTuple):
     type: str
     """Primitive type such as ``float64``, or the name of a type such as ``geometry_msgs/Point``."""
     length: int | None = None
-    """Length of a fixed array; 0 for a sequence; None for a single value."""
+    """Length of a fixed array; 0 for a sequence, None for a single value."""
     default: object = None
     """Default value; None means zero or empty."""
     bound: int | None = None
@@ -60,7 +60,7 @@ class MessageField(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """The fields of a type in order, and its constants."""
+    """The fields of a type, in order, and its constants."""
 
     name: str
     """Name in the short form ``pkg/Type``."""
@@ -84,7 +84,7 @@ SIZES: Final[Mapping[str, int]] = {
 BYTE_CODES: Final = "B"
 """Format code for numbers whose arrays are treated as bytes, as in images."""
 TIME_TYPES: Final = frozenset(("builtin_interfaces/Time", "time"))
-"""Types for a point in time; messages may contain the text ``now`` in place of such a value."""
+"""Types for a point in time; a message may contain the text ``now`` instead of the time."""
 
 
 class Primitive(NamedTuple):

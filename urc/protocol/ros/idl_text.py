@@ -110,7 +110,7 @@ class _Parser:
         return word
 
     def _skip(self, *ends: str) -> list[str]:
-        """Return the tokens before the first of the characters `ends` that is outside brackets."""
+        """Return the tokens before the first token outside brackets that is in `ends`."""
         depth, start = 0, self._at
         while depth or self._peek() not in ends:
             word = self._take()
@@ -147,7 +147,7 @@ class _Parser:
             self._take()
 
     def _annotations(self) -> object:
-        """Skip annotations, and return the value of ``@default``."""
+        """Skip annotations and return the value of ``@default``."""
         default: object = None
         while self._peek() == "@":
             self._take()

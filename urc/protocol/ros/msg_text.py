@@ -110,7 +110,7 @@ def _read_line(
 
 
 def _default(word: str, text: str, length: int | None, owner: str) -> object:
-    """Return the default value after a field name, without any comment; None if it is missing."""
+    """Return the default value after a field name, or None; any comment is ignored."""
     if not text or text.startswith("#"):
         return None
     if length is None:

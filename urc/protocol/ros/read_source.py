@@ -29,7 +29,7 @@ MAX_ELEMENTS: Final = 200_000
 """Maximum number of strings and nested messages in the arrays of one message. An element takes a
 few bytes in a message, but a hundred or more in memory."""
 MAX_NUMBERS: Final = 4_000_000
-"""Maximum number of numbers in one array."""
+"""Maximum length of an array of numbers."""
 _HEADER: Final = 4
 _FAULTS: Final = (struct.error, IndexError, OverflowError, ValueError, MemoryError)
 
@@ -64,7 +64,7 @@ def build_read(
 
 
 def read_safely(read: Read, data: bytes) -> dict[str, Any]:
-    """Read a message; raise only `BadRosMessage`."""
+    """Read a message; raise `BadRosMessage` if it does not fit its definition."""
     try:
         return read(data)
     except BadRosMessage:

@@ -109,7 +109,7 @@ class TopicCodec:
         self._services: dict[str, tuple[Writer | None, _Source | None, str]] = {}
         self._compiled: dict[tuple[object, ...], _Source | Writer] = {}
         self._known: dict[str, Definitions] = {}
-        """Definitions from the robot, keyed by the type's plain name."""
+        """Definitions from the robot, keyed by the type's short name."""
         self._writers: dict[tuple[str, bool], Writer | None] = {}
 
     def reset(self) -> None:
@@ -192,7 +192,7 @@ class TopicCodec:
     # -- calls
 
     def _encode_call(self, envelope: Envelope) -> Received:
-        """Compile the types of a service, and return the call in binary form."""
+        """Compile the types of a service and return the call in binary form."""
         said = dict(envelope.attributes)
         parts = [cast("list[str]", said.pop(part)) for part in ("request", "response")]
         request, response = (_Schema(*part) for part in parts)

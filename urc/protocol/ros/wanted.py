@@ -1,7 +1,7 @@
 """The parts of a message that a driver reads.
 
-Pure. A message reader skips all other parts. `ALL` means a whole value. A dictionary means some of
-a message's fields or, with the key `EACH`, some parts of each element.
+Pure. A message reader skips all other parts. `ALL` selects a whole value. A dictionary selects some
+of a message's fields or, with the key `EACH`, some parts of each element.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

@@ -70,8 +70,8 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
     Args:
         command: the declared command.
-        values: arguments, including defaults, keyed by name; each element of an array may need a
-            question.
+        values: arguments, including defaults, keyed by name; each element of an array may
+            require its own confirmation.
     """
     asked = [] if command.confirm is None else [command.confirm]
     for name, argument in command.arguments.items():

@@ -1,7 +1,7 @@
 """Control of a running sequence: pause, single step, resume and abort.
 
-Pure. Control requests may arrive at any time. They take effect between two steps, so no step is
-interrupted.
+Pure. Control requests may arrive at any time. The requests take effect between two steps, so no
+step is interrupted.
 """
 
 from typing import Final, Literal
@@ -72,7 +72,7 @@ class SequenceControl:
         self.count += 1
 
     def halts(self, *, is_outermost: bool) -> bool:
-        """Return whether the next step must wait, and if so, mark the sequence as paused."""
+        """Return whether the next step must wait; if so, mark the sequence as paused."""
         is_over = is_outermost and self.place == self.of
         is_wanted = self._halt == "now" or (self._halt == "outer" and is_outermost)
         if is_over or not is_wanted:
@@ -82,7 +82,7 @@ class SequenceControl:
         return True
 
     def goes_on(self) -> bool:
-        """Return whether a pause must end, and if so, mark the sequence as running."""
+        """Return whether a pause must end; if so, mark the sequence as running."""
         if not self.is_paused or self._halt not in ("", "next"):
             return False
         self.is_paused = False

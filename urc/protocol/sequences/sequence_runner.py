@@ -44,7 +44,7 @@ class SequenceHost(Protocol):
         confirmed_by: tuple[str, ...],
         unless: Unless,
     ) -> list[LineEvent]:
-        """Run a command or sequence, and report the outcome to `sink`."""
+        """Run a command or sequence and report the outcome to `sink`."""
 
 
 Action = Callable[["SequenceRunner", float], list[LineEvent]]

@@ -23,14 +23,14 @@ class StructReader:
         self._names = frozenset(names_of(self._items))
         self._encoding = context.encoding
         self.read = generate_read(self._items, context.encoding)
-        """Generated function that returns the fields, returns None if the frame does not match, or
-        raises `BadItem`."""
+        """Generated function that returns the fields, or None if the frame does not match; it may
+        raise `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
         # A reply contains the number of its request, which `match` supplies.
         self._outer = {"settings": context.settings, COUNTERS: lambda name, low, high: low}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame with `fields`, with zeros for missing fields."""
+        """Return a frame with `fields`; missing fields are zero."""
         known = {name: value for name, value in fields.items() if name in self._names}
         data = write_frame(self._steps, {**known, **self._outer})
         try:

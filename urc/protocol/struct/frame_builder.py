@@ -25,7 +25,7 @@ class Backpatch(NamedTuple):
     at: int
     item: Item
     container: Number
-    """Type of the number that contains the missing number at bit `shift`."""
+    """Type of the enclosing number, which contains the missing number at bit `shift`."""
     shift: int = 0
 
 
@@ -46,7 +46,7 @@ class FrameBuilder:
         self.bytes += data
 
     def insert(self, at: int, data: bytes, scope: Scope) -> None:
-        """Insert bytes at offset `at`, and move later gaps."""
+        """Insert bytes at offset `at` and move later gaps."""
         self.bytes[at:at] = data
         self.late = [(_moved(gap, at, len(data)), one, inner) for gap, one, inner in self.late]
         for name, value in scope.items():

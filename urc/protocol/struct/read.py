@@ -3,9 +3,9 @@
 Pure. The closures are a readable version of the code that `urc.protocol.struct.read_source`
 generates. Generated functions are faster for runs of fixed items. Tests compare the results of the
 closures and the generated functions. Theory of operation: every item becomes a step ``(data, at,
-end, out) -> after``. A step reads bytes from `at` to at most `end`, and stores the value in `out`.
+end, out) -> after``. A step reads bytes from `at` to at most `end` and stores the value in `out`.
 A step raises `OtherFrame` if the frame does not match. The first invalid value's error is stored
-with the key `FAULT`, and reading continues. The error is reported only if the whole frame matches.
+under the key `FAULT`, and reading continues. The error is reported only if the whole frame matches.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,7 +45,7 @@ __all__ = [
 Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
-"""Function that returns a size or count (-1: up to the end) and the start of the data."""
+"""Function that returns a size or count (-1 means up to the end) and the start of the data."""
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
 """A part of ``bits``: item, shift, mask, sign bit (0 if unsigned) and decoding function."""
@@ -55,7 +55,7 @@ def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | 
     """Return the fields of `data`; None if the frame does not match.
 
     Raises:
-        BadItem: the frame matches, but contains an invalid value.
+        BadItem: the frame matches but contains an invalid value.
     """
     if not isinstance(data, bytes):
         return None
@@ -332,7 +332,7 @@ def _body(steps: tuple[Step, ...]) -> Step:
 
 
 def _windowed(steps: tuple[Step, ...], item: Item) -> Step:
-    """Return the step for a struct that must fill its window, except for trimmed bytes."""
+    """Return the step for a struct that must fill its declared size, except for trimmed bytes."""
     body, amount = _body(steps), build_amount(item.size, item.id)
     trim, full = item.trim, least_size(item.items)
 

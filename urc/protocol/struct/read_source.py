@@ -61,7 +61,7 @@ def add_fixed(
         data: name of the variable that contains the frame.
 
     Returns:
-        The source lines for decoding, and an expression for each field, valid after those lines.
+        The source lines for decoding, and for each field an expression valid after those lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))
@@ -194,7 +194,7 @@ def _scaled(item: Item, raw: str) -> str:
 def _add_mixed(
     source: SourceBuilder, parts: list[FixedRun | Item], encoding: str, has_open_end: bool
 ) -> None:
-    """Add source that unpacks fixed runs directly, and calls the closures for other items."""
+    """Add source that unpacks fixed runs directly and calls the closures for other items."""
     source.scope["OtherFrame"] = OtherFrame
     source.add("if type(data) is not bytes: return None")
     source.add("end = len(data)")

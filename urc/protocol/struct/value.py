@@ -88,7 +88,7 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
 
 
 def fitting(number: Number, value: int | float, name: str) -> int | float | bool:
-    """Return `value` in the type `number`; raise `NotWritable` if it is out of range."""
+    """Return `value` converted to the type `number`; raise `NotWritable` if out of range."""
     if number.kind == "float":
         try:
             return float(value)
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function that converts a value to a raw number, and to the value of that number."""
+    """Return a function that converts a value to a raw number and the value of that number."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:

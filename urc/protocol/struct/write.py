@@ -66,7 +66,7 @@ class StructWriteScope(NamedTuple):
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps for the items in a separate scope."""
+    """Return the steps that write the items in a scope of their own."""
     rules = StructWriteScope(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 
@@ -126,7 +126,7 @@ def _given(item: Item, scope: Scope, rules: StructWriteScope, zero: object) -> A
 
 
 def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
-    """Return a function that encodes the item's number, and stores the value in the scope."""
+    """Return a function that encodes the item's number and stores the value in the scope."""
     checked, zero, name = checked_raw(item), _zero_of(item), item.id
 
     def raw_number(scope: Scope) -> Any:

@@ -1,7 +1,7 @@
 """Conversion of raw values to typed values, and the inverse conversion for emulated robots.
 
 Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
-the result of the previous function. The result None means "not available", and ends the chain.
+the result of the previous function. The result None means "not available" and ends the chain.
 """
 
 import math

@@ -19,7 +19,7 @@ def counter_in(expression: str) -> str:
 
 
 def field_text(value: object) -> str:
-    """Return a value as text: ``true``, ``3``, ``2.5``; list elements are separated by blanks."""
+    """Return a value as text: ``true``, ``3``, ``2.5``; list elements are separated by spaces."""
     if value is None:
         return ""
     if isinstance(value, (list, tuple)):

@@ -24,7 +24,7 @@ class TimeAndNonce(NamedTuple):
     """Function that returns a given number of random bytes, different for each call."""
 
     def names(self) -> dict[str, object]:
-        """Return the namespace for one frame; all uses of it get the same time and nonce."""
+        """Return the namespace for one frame; all its expressions get the same time and nonce."""
         made: dict[int, bytes] = {}
 
         def nonce(size: int) -> bytes:

@@ -100,7 +100,7 @@ class Player:
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback is running, or will run as soon as a page is open."""
+        """Whether the playback is running or will run as soon as a page is open."""
         return self._wants_to_run
 
     @property

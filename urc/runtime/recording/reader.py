@@ -63,7 +63,7 @@ class Recording(NamedTuple):
         yield from _messages(self, from_ns, math.inf)
 
     def before(self, until_ns: int) -> list[RecordedMessage]:
-        """Return the state before a time, as the last message of each signal and transport."""
+        """Return the last message of each signal and transport before a given time."""
         last: dict[str, RecordedMessage] = {}
         for message in _messages(self, 0, until_ns):
             if is_state(message.topic):

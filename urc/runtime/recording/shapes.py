@@ -217,7 +217,7 @@ class RecordingEncoder:
         return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
-        """Return the later of `time_s` and the last used time, so that times never decrease.
+        """Return the later of `time_s` and the last returned time, so that times never decrease.
 
         A reading's time is the arrival time of its first byte; traffic's time is its own arrival
         time.

@@ -106,9 +106,9 @@ async def converse(
     Args:
         context: context of the server.
         client: client with the robot's side of its connection.
-        take: function that returns the client's next payload, or None or b"" at the end of input.
+        take: function that returns the client's next payload; None or b"" at the end of input.
             Calls to `take` can be cancelled and repeated without data loss.
-        put: function that sends the robot's payloads, and waits while the client's buffer is full.
+        put: function that sends the robot's payloads and waits while the client's buffer is full.
 
     Raises:
         TimeoutError: the client does not read its data.

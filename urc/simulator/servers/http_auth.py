@@ -1,4 +1,4 @@
-"""Client authentication of a simulated web server: Basic, Bearer or Digest (RFC 7616)."""
+"""Client authentication by a simulated web server: Basic, Bearer or Digest (RFC 7616)."""
 
 import hashlib
 import hmac
@@ -22,7 +22,7 @@ class HttpAuth:
         self._nonce = secrets.token_hex(16)
 
     def challenge(self, method: str, target: str, given: str) -> str | None:
-        """Return the challenge for a request with invalid credentials; None if they are valid.
+        """Return the challenge if a request's credentials are invalid, otherwise None.
 
         Args:
             method: method of the request.

@@ -62,7 +62,7 @@ class MqttRobot:
             await self._transport.close()
 
     async def _stay(self, client: ClientConnection, transport: Transport) -> None:
-        """Exchange messages through the broker, and reconnect after each loss."""
+        """Exchange messages through the broker and reconnect after each loss."""
         while True:
             await self._talk(client, transport)
             log.info("%s: lost the connection to the broker", self._context.name)

@@ -46,7 +46,10 @@ class Bridge:
     """The state shared by all clients of one bridge."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Create the bridge; `declared` maps the robot's topics to their types; "" if unknown."""
+        """Create the bridge.
+
+        `declared` maps each of the robot's topics to its type; "" means an unknown type.
+        """
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
@@ -140,7 +143,7 @@ class BridgeClient:
             )
 
     def show(self, topic: str, message: object, now_s: float) -> None:
-        """Send a message to the client if it subscribes, limited by its throttle rate."""
+        """Send a message to the client if the client's subscription and throttle rate permit it."""
         wanted = self.wanted.get(topic)
         if wanted is None:
             return

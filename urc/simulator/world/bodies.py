@@ -35,8 +35,8 @@ class Motion:
     pitch: float = 0.0
     """Pitch in radians, positive with the nose down."""
     forward: float = 0.0
-    """Speed along the body's x axis, in m/s. `sideways` and `climb` are the speeds along y and
-    z."""
+    """Speed along the body's x axis, in m/s. `sideways` and `climb` are the speeds along the y
+    and z axes, respectively."""
     sideways: float = 0.0
     climb: float = 0.0
     turn: float = 0.0
@@ -93,7 +93,7 @@ def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def _lean(body: BodySpec, motion: Motion) -> None:
-    """Set roll and pitch: the body leans against accelerations, and rocks on rough ground."""
+    """Set roll and pitch: the body leans against accelerations and rocks on rough ground."""
     along, across, _ = motion.accelerations
     motion.pitch += (-_LEAN * along - motion.pitch) * 0.2
     motion.roll += (_LEAN * across - motion.roll) * 0.2

@@ -183,7 +183,7 @@ def gps(moment: SensorInput) -> Mapping[str, object]:
 
 
 def _ddmm(degrees: float, width: int) -> str:
-    """Return degrees and minutes in NMEA 0183 format, without the hemisphere."""
+    """Return an angle as degrees and minutes in NMEA 0183 format, without the hemisphere."""
     minutes = round(abs(degrees) * 60, 4)
     whole, rest = divmod(minutes, 60)
     return f"{int(whole):0{width}}{rest:07.4f}"

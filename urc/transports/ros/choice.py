@@ -1,8 +1,8 @@
-"""The kinds of ROS bridges, and the automatic choice between them.
+"""The kinds of ROS bridges and the automatic choice between them.
 
 A WebSocket client offers subprotocols, and the server selects one. A Foxglove protocol server
 requires one of its own subprotocols. A rosbridge server selects no subprotocol. With ``via: auto``,
-the transport therefore offers Foxglove's subprotocols, and follows the server's selection. If no
+the transport therefore offers Foxglove's subprotocols and follows the server's selection. If no
 port is given, the transport tries the usual ports for both kinds, beginning with the port that
 worked last.
 """
@@ -59,7 +59,7 @@ class Candidate:
         self._rosbridge = other
 
     async def open(self, timeout_s: float) -> _Bridge:
-        """Connect, and return the transport for the server's kind of bridge."""
+        """Connect and return the transport for the server's kind of bridge."""
         await self._wire.open(timeout_s)
         is_foxglove = self._wire.subprotocol in SUBPROTOCOLS
         bridge: _Bridge = self._foxglove if is_foxglove else self._rosbridge
@@ -122,7 +122,7 @@ class AnyBridgeTransport:
         return "" if self._bridge is None else await self._bridge.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge, and return as soon as the bridge has sent any data."""
+        """Probe the bridge; return as soon as the bridge has sent any data."""
         await self._open_bridge().probe()
 
     def unsent(self) -> int:

@@ -167,7 +167,7 @@ class FoxgloveTransport:
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
 
     async def probe(self) -> None:
-        """Probe the bridge, and return as soon as the bridge has sent any data."""
+        """Probe the bridge; return as soon as the bridge has sent any data."""
         await self._wire.probe()
 
     def unsent(self) -> int:

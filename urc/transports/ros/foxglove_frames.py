@@ -87,7 +87,7 @@ class FrameReader:
         self._operations = OperationReader()
 
     def read(self, frame: bytes) -> dict[str, Any] | MessageData | TimeTold | ServiceReply | None:
-        """Return a frame's content; None for an unknown kind.
+        """Return a frame's content; None for a frame of an unknown kind.
 
         Raises:
             BadOperation: the frame is invalid.

@@ -45,16 +45,16 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
 
 MAX_CHANNELS: Final = 4096
-"""Maximum number of known services, and of known channels; any more are ignored. Channels for the
-driver's topics are accepted up to twice this number."""
+"""Maximum number of known services and of known channels; any beyond this number are ignored.
+Channels for the driver's topics are accepted up to twice this number."""
 MAX_PENDING: Final = 256
 """Maximum number of pending calls; above the limit, the oldest call is dropped."""
 KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
-"""Maximum number of different status messages from the robot that are reported."""
+"""Maximum number of different status messages from the robot to report."""
 MAX_RETRIES: Final = 5
-"""Maximum number of retries after a subscription was refused."""
+"""Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
 _ENCODINGS: Final = ("cdr", "ros1", "json")

@@ -15,7 +15,7 @@ MAX_TOLD: Final = 256
 
 
 class TopicGraph:
-    """The topics of one ROS system, and the mistakes reported so far."""
+    """The topics of one ROS system and the mistakes reported so far."""
 
     def __init__(self, tell: Callable[[str], None], ros: int | None) -> None:
         """Initialise without topics.

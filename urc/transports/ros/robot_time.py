@@ -1,7 +1,8 @@
 """A robot's clock, estimated from the times in its messages. No I/O.
 
 A robot's clock may differ from this machine's clock, and a simulation's clock may be paused.
-Messages arrive with a delay, so the largest difference in the last seconds is the best estimate.
+Messages arrive with a delay, so the largest difference in the last two seconds is the best
+estimate.
 """
 
 import struct

@@ -13,7 +13,7 @@ reply also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
 all result in missing messages. The transport therefore requests the list of topics from rosapi at
-the start, and a topic's subscribers when the topic's first message is published.
+the start. It requests a topic's subscribers when the topic's first message is published.
 `urc.transports.ros.graph` reports mistakes. With ``version: auto``, subscriptions wait for the list
 of topics, which determines the form of the type names.
 """
@@ -118,7 +118,7 @@ class RosbridgeTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call a service, or start or cancel a goal; return after the kernel has the data.
+        """Publish, call a service, or start or cancel a goal; return once the kernel has the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -151,7 +151,7 @@ class RosbridgeTransport:
         return "" if self._session is None else await self._session.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge, and return as soon as the bridge has sent any data."""
+        """Probe the bridge; return as soon as the bridge has sent any data."""
         await self._wire.probe()
 
     def unsent(self) -> int:
@@ -187,7 +187,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
     compression = attributes.get("compression") or "none"
     if compression not in ("none", "png", "cbor"):
-        text = f"ros: compression {compression!r} of {topic} is not none, png or cbor"
+        text = f"ros: compression of {topic} must be none, png or cbor, not {compression!r}"
         raise TransportError(text)
     if compression == "cbor" and find_spec("cbor2") is None:
         raise TransportError(missing("cbor needs", "cbor2", "cbor"))
@@ -314,7 +314,7 @@ class _Session:
         return found if isinstance(found, list) else None
 
     async def end(self) -> None:
-        """Stop reading, and wake all waiting tasks."""
+        """Stop reading and wake all waiting tasks."""
         self.queue.end("the connection is closed")
         if self._reader is not None:
             self._reader.cancel()

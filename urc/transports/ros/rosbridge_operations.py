@@ -27,8 +27,8 @@ MAX_PNG_BYTES = 2 * 1024 * 1024
 """Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
 one second."""
 MAX_VALUES = 2_000_000
-"""Maximum number of commas and brackets, because an empty list takes three bytes as text but fifty
-in memory."""
+"""Maximum number of commas and brackets; the limit exists because an empty list takes three bytes
+as text but fifty in memory."""
 _MANY_VALUES = 100_000
 """Maximum number of values in CBOR data with shared references; processing this many values takes a
 tenth of a second."""

@@ -89,7 +89,7 @@ class AlarmNotifier:
     def queue(
         self, robot: str, title: str, alarms: RobotAlarms, events: Sequence[AlarmEvent]
     ) -> None:
-        """Queue the alarms that need a notification, and return immediately.
+        """Queue the alarms that need a notification and return immediately.
 
         Shelved and suppressed alarms are skipped.
         """
@@ -126,7 +126,7 @@ class AlarmNotifier:
             return self._wakes.wait_for(lambda: not (self._waiting or self._is_busy), timeout_s)
 
     def close(self) -> None:
-        """Drop the queued alarms, and end the thread."""
+        """Drop the queued alarms and end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()

@@ -153,7 +153,7 @@ class AlarmHistory(AlarmMessage, frozen=True):
 
     events: tuple[AlarmHistoryEvent, ...]
     has_more: bool
-    """Whether older events may also match."""
+    """Whether the history may contain older matching events."""
     fault: str
     """Reason why events currently cannot be stored; "" if they can be stored."""
     lost: int

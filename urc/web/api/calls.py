@@ -1,4 +1,4 @@
-"""The table of all HTTP API calls: path, right, body, answer and errors.
+"""The table of all HTTP API calls: path, right, body, reply and errors.
 
 Layer 5. Both the routes and the OpenAPI document are generated from this table, so they cannot
 differ. Only this module creates API routes, and each call states its right.
@@ -97,7 +97,7 @@ class Call(NamedTuple):
     status: int = 200
     query: tuple[Query, ...] = ()
     errors: tuple[int, ...] = ()
-    """Failure statuses in addition to those for the right, path and body."""
+    """Failure statuses in addition to those that result from the right, path and body."""
     media: tuple[str, ...] = (JSON,)
     """Media types of the answer."""
     is_body_needed: bool = True
@@ -118,7 +118,7 @@ _NO_ROBOT: Final = (409, 429)
 """Failures: URC cannot connect to the robot, or too many clients use the robot."""
 
 CALLS: Final[tuple[Call, ...]] = (
-    Call("health", "/healthz", ANYONE, "The health of the server, and its version.", HealthStatus),
+    Call("health", "/healthz", ANYONE, "The health and version of the server.", HealthStatus),
     # Robots
     Call("robots", "/api/v1/robots", SIGNED_IN, "The robots that you may watch.", RobotList),
     Call("robot", _ROBOT, WATCH, "A robot with its signals and commands.", RobotInfo),
@@ -246,7 +246,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_acknowledge",
         f"{_ROBOT}/alarms/acknowledge",
         DRIVE,
-        "Acknowledge alarms as you saw them. An alarm that was raised again since then is skipped.",
+        "Acknowledge the alarms that you saw. An alarm that was raised again since then is"
+        " skipped.",
         AlarmAction,
         AcknowledgeAsked,
         "POST",

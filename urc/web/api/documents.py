@@ -1,6 +1,6 @@
 """A robot's document as one YAML file, without this machine's paths.
 
-Layer 5. A document contains no setting values, and therefore no secrets from settings. Reading the
+Layer 5. A document contains no setting values and therefore no secrets from settings. Reading the
 source files blocks, so call `document_of` in a thread.
 """
 

@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class EventStream:
-    """A response that ends when the reader disconnects, its right ends or the session ends."""
+    """A response that ends when the reader disconnects or loses its right, or the session ends."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class EventStream:
         self._seen = 0
         """Hub revision of the last sent event."""
         self._links = -1
-        """Number of the newest connection states that were sent."""
+        """Number of link state changes so far when the newest connection states were sent."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send events until the stream ends."""

@@ -18,7 +18,8 @@ REQUESTS_PER_S: Final = 200
 AT_ONCE: Final = 16
 """Maximum number of one visitor's running commands."""
 MOST_VISITORS: Final = 1024
-"""Maximum number of stored visitor rates; above it, the least recently used rate is dropped."""
+"""Maximum number of stored visitor rates; above this number, the least recently used rate is
+dropped."""
 
 
 class RequestLimits:

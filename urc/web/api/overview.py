@@ -1,4 +1,4 @@
-"""A robot's state for the menu and for lists: battery, alarms, and sort order.
+"""A robot's state for the menu and for lists: battery, alarms and sort order.
 
 Layer 5. Pure. The functions never connect to a robot, so the battery level is unknown without a
 session.
@@ -25,9 +25,8 @@ _NUMBERS: Final = ("integer", "number")
 def battery_signal(profile: Profile) -> str:
     """Return the signal with the robot's state of charge; "" if there is no such signal.
 
-    The function returns the signal that a battery widget shows as its level. If no battery widget
-    shows a level, it returns a numeric signal in percent or volts with a usual name, such as
-    ``battery``.
+    If a battery widget shows a signal as its level, the function returns this signal. Otherwise, it
+    returns a numeric signal in percent or volts with a usual name, such as ``battery``.
     """
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
@@ -62,8 +61,8 @@ def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
 def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
     """Return the number and the highest priority of a robot's annunciated alarms.
 
-    Alarms that returned to normal count until they are acknowledged. Shelved and suppressed alarms
-    are not counted. The function needs no session.
+    Alarms that have returned to normal count until they are acknowledged. Shelved and suppressed
+    alarms are not counted. The function needs no session.
 
     Args:
         name: the robot's name in paths.

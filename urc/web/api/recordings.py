@@ -1,4 +1,4 @@
-"""Recordings over HTTP: files in the server's folder, and recordings started by programs.
+"""Recordings over HTTP: files in the server's folder and recordings started by programs.
 
 Layer 5. Programs specify a file name in the folder, never a path. Reading the folder blocks, so the
 module reads it in a thread. A recording ends on request, when the robot's session ends, or after
@@ -38,7 +38,7 @@ MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
 _FROM_START: Final = "bytes=0-"
-"""Beginning of a Range header that starts at the first byte; other ranges do not count as new
+"""Beginning of a Range header for a range from the first byte; other ranges do not count as new
 downloads."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII
@@ -99,7 +99,7 @@ class RecordingCalls:
         }
 
     async def close(self) -> None:
-        """End all recordings, and finish their files."""
+        """End all recordings and finish their files."""
         running = list(self._running.values())
         for one in running:
             one.stop.set()
@@ -194,7 +194,7 @@ class RecordingCalls:
 
     @answers_errors
     async def stop(self, request: Request) -> Response:
-        """End a robot's recording, and finish the file."""
+        """End a robot's recording and finish the file."""
         name, _ = service_of(self._services(), request)
         running = self._running.get(name)
         if running is None or running.task is None or not running.state.active:

@@ -59,7 +59,7 @@ _STATUS: Final = {
     "not-allowed": 409,
     "stopped": 409,
 }
-"""HTTP status for each failure code of a command; failures with other codes come from the robot."""
+"""HTTP status for each failure code of a command; all other failure codes come from the robot."""
 _BY_ROBOT: Final = 424
 _NO_STORE: Final = {"cache-control": "no-store"}
 _T = TypeVar("_T")
@@ -193,7 +193,7 @@ class RobotCalls:
 
     @answers_errors
     async def command(self, request: Request) -> Response:
-        """Run a command, and return its reply."""
+        """Run a command and return its reply."""
         name, service = service_of(self._services(), request)
         asked = await _optional_body(request, CommandAsked, CommandAsked())
         peer = self._moving_peer(request, name, service)
@@ -273,7 +273,7 @@ class RobotCalls:
         return peer_of(request, name)
 
     def _moving_peer(self, request: Request, name: str, service: RobotService) -> SocketPeer:
-        """Return the visitor; raise `ApiError` for a playback, or above the maximum rate."""
+        """Return the visitor; raise `ApiError` for a playback or above the maximum rate."""
         peer = self._peer(request, name)
         self._limits.count(peer.who, service.clock.now())
         if service.robot.playback is not None:

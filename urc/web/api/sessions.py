@@ -125,7 +125,7 @@ class ProgramSession:
             if notice.kind == "refused":
                 return notice.message
         lease = self.service.controls.controller.lease
-        late = "the input is too old, or not newer than the last input; send the newest beat"
+        late = "the input is too old, or not newer than the previous input; send the newest beat"
         return lease.refusal(self.operator.client.id, asked.epoch) or late
 
     def notices(self) -> tuple[MotionNotice, ...]:
@@ -179,7 +179,7 @@ class ProgramSessions:
         return session
 
     def find(self, secret: str, service: RobotService, who: Identity) -> ProgramSession:
-        """Return an open session, and extend it by another `IDLE_S` seconds.
+        """Return an open session and extend it by another `IDLE_S` seconds.
 
         Raises:
             ApiError: the session is not open, or it belongs to another visitor or robot.
@@ -208,7 +208,7 @@ class ProgramSessions:
         return kept.session
 
     def end(self, session: ProgramSession) -> None:
-        """End a session: stop its held commands, and release its lease."""
+        """End a session: stop its held commands and release its lease."""
         kept = self._open.pop(session.secret, None)
         if kept is not None:
             if kept.alarm is not None:
@@ -240,7 +240,7 @@ class _OpenSession:
 
 
 async def opened(service: RobotService, peer: SocketPeer, stack: ExitStack) -> LiveSession:
-    """Keep a robot connected until `stack` closes, and return its open session.
+    """Keep a robot connected until `stack` closes; return its open session.
 
     Raises:
         ApiError: URC cannot connect to the robot, or too many clients use it.

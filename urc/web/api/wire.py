@@ -49,11 +49,11 @@ class ApiMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ConnectionInfo(ApiMessage, frozen=True):
-    """One connection of a robot."""
+    """One of a robot's connections."""
 
     transport: str
     state: Literal["idle", "connecting", "live", "silent", "lost"]
-    """``idle`` means that no client needs the robot, so URC is not connected."""
+    """``idle`` means that URC is not connected, because no client needs the robot."""
     address: str = ""
     """Display text for the target, such as ``tcp 192.168.1.5:6789``."""
     detail: str = ""
@@ -283,12 +283,12 @@ class LeaseAsked(ApiMessage, frozen=True):
     verb: Verb | Literal["keep"]
     """Requested action; ``keep`` only keeps the session open."""
     for_s: Annotated[float, msgspec.Meta(ge=0, le=600)] = 10.0
-    """Time limit for the holder's answer to ``ask``, in seconds, clamped to 3 to 60 s."""
+    """Time limit for the holder's answer to ``ask``, in seconds, clamped to the range 3 to 60."""
     session: _Word = ""
     """Secret of an open session; "" opens a new session."""
     stops: int | None = None
-    """Number of STOP presses in the last answer. A reset is refused if STOP was pressed again
-    meanwhile; null means the current number."""
+    """Number of STOP presses, as stated in the last answer. A reset is refused if STOP has been
+    pressed again since then; null means the current number."""
 
 
 class MotionNotice(ApiMessage, frozen=True):
@@ -338,7 +338,7 @@ class MotionAsked(ApiMessage, frozen=True):
     epoch: _Count
     """Number of the lease, from the lease answer."""
     number: _Count
-    """Number of this input; each new input for the command needs a higher number."""
+    """Number of this input; each new input for the command needs a higher number than the last."""
     beat: _Count
     """Newest received heartbeat number, at most 0.4 s old."""
     arguments: Arguments = {}
@@ -355,7 +355,7 @@ class MotionAnswer(ApiMessage, frozen=True):
     beat: int | None
     """Newest heartbeat number, for the next motion request."""
     queued: bool
-    """Whether the input is delayed by a few milliseconds, because inputs arrive too fast."""
+    """Whether the input is delayed by a few milliseconds because inputs arrive too fast."""
     notices: tuple[MotionNotice, ...] = ()
     """Notices since the last answer."""
 

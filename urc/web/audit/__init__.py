@@ -1,1 +1,1 @@
-"""The audit log on pages and in the API: search, export, and the timeline of a robot."""
+"""The audit log on pages and in the API: search, export and the timeline of a robot."""

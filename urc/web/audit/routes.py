@@ -1,4 +1,4 @@
-"""Routes for the audit log: the page, the search, the export, and the timeline of a robot.
+"""Routes for the audit log: the page, the search, the export and the timeline of a robot.
 
 Layer 5. Visitors with the role ``maintain`` for all robots see all entries. Other visitors see the
 entries about robots that they may maintain. The log is read in threads.

@@ -1,4 +1,4 @@
-"""Rows of the traffic log: frames shortened for display, and notes.
+"""Rows of the traffic log: notes, and frames shortened for display.
 
 Layer 5, pure.
 """
@@ -49,7 +49,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
     text: str = ""
     level: str = ""
     picture: str = ""
-    """Media type if `data` is a complete image, else ""."""
+    """Media type if `data` is a complete image; otherwise ""."""
 
     @property
     def weight(self) -> int:

@@ -1,6 +1,6 @@
-"""The developer start page: one robot with fixed values, and a button to reload its documents.
+"""The developer start page: one robot with fixed values and a button to reload its documents.
 
-Layer 5. These routes exist only with ``--dev``, and require the start key. The developer page loads
+Layer 5. These routes exist only with ``--dev`` and require the start key. The developer page loads
 a document as soon as it is saved. The start page's button reloads all documents, even if the server
 has not noticed a change.
 """
@@ -46,7 +46,7 @@ class PinnedRobot:
 
 @dataclass(frozen=True, slots=True)
 class DevStartPage:
-    """Context for ``dev_start.html.j2``: the fixed values, and the start button."""
+    """Context for ``dev_start.html.j2``: the fixed values and the start button."""
 
     head: PageHead
     nav: Nav
@@ -54,7 +54,7 @@ class DevStartPage:
 
 
 class DevStart:
-    """The developer start page, and the action of its start button."""
+    """The developer start page and the action of its start button."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class DevStart:
         return HTMLResponse(render("dev_start.html.j2", page), headers=_NO_STORE)
 
     async def start(self, request: Request) -> Response:
-        """Reload all documents, and return the URL of the robot."""
+        """Reload all documents and return the URL of the robot."""
         name = request.path_params["name"]
         if name not in self._remake or name not in self._fleet.robots:
             return told(404, "no robot of that name is served here")

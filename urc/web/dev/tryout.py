@@ -1,4 +1,4 @@
-"""Try-out of the parser: the frames in pasted bytes, and each frame's consumers.
+"""Try-out of the parser: the frames in pasted bytes and each frame's consumers.
 
 Layer 5, pure. The module builds separate readers and never uses a live robot. As in the engine, the
 first matching message consumes an unsolicited frame. The try-out has no pending request, so the
@@ -57,7 +57,7 @@ class ParsedPiece(NamedTuple):
     data: bytes
     """Payload of the frame, excluding the delimiter, length field and checksum."""
     fault: str
-    """Reason why the bytes are not a frame; "" for a frame."""
+    """Reason why the bytes are not a frame; "" if they are a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
     """Reason why each candidate does not match; empty if any candidate matches."""

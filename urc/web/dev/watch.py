@@ -40,7 +40,7 @@ class CheckedProfile(NamedTuple):
 
 
 def examine(file: str) -> CheckedProfile:
-    """Check a document, and run its tests."""
+    """Check a document and run its tests."""
     checked = check(file, built_in_catalog(), widget_folder_of(file))
     problems = checked.problems
     if checked.profile is not None:
@@ -125,7 +125,7 @@ class ProfileWatch:
                 self._report("waiting", text)
 
     def _try_switch(self) -> bool:
-        """Try to switch to a pending version if the robot is at rest; return whether it tried."""
+        """Try to switch a robot at rest to a pending version; return whether a switch was tried."""
         if self._next is None or not self.service.is_at_rest:
             return False
         profile, self._next = self._next, None

@@ -79,7 +79,7 @@ class CommandRunner:
             asked: the command with its arguments.
             target: the open session of the robot.
             timeout_s: longest wait for the reply, in seconds. None means `COMMAND_TIMEOUT_S` for a
-                command, and no limit for a sequence.
+                command and no limit for a sequence.
         """
         sent: deque[Payload] = deque(maxlen=1)  # the last sent frame
         people: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""The controls of one robot: one motion controller, and one operator session for each page.
+"""The controls of one robot: one motion controller and one operator session for each page.
 
 Layer 5. No call blocks. When a page's socket is free, the page receives the newest lease, the
 newest heartbeat and one notice per control. Above the rate limit, each new tick replaces the
@@ -37,7 +37,7 @@ the numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between a control's applied ticks, in seconds."""
 PATIENCE_S = 0.25
-"""How long refused late ticks go unreported after a control's motion ends, in seconds."""
+"""How long refusals of late ticks go unreported after a control's motion ends, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
@@ -45,7 +45,7 @@ Offered = Literal["in time", "one more", "no tick"]
 
 
 class ControlService:
-    """The motion controller of one robot, and the sessions of its pages."""
+    """The motion controller of one robot and the sessions of its pages."""
 
     def __init__(
         self,
@@ -180,7 +180,7 @@ class ControlService:
         return operator
 
     def remove_page(self, operator: OperatorSession) -> None:
-        """Remove a page, and stop its held controls."""
+        """Remove a page and stop its held controls."""
         for command in list(operator.alarms):
             operator.forget(command)
         self._operators.pop(operator.client.id, None)
@@ -207,7 +207,7 @@ class ControlService:
         operator.wake()
 
     def recheck(self, operator: OperatorSession) -> None:
-        """Check an operator's rights again, and stop held commands that are no longer permitted."""
+        """Check an operator's rights again and stop held commands that are no longer permitted."""
         role = operator.rights.role()
         if role == operator.client.role:
             return
@@ -231,7 +231,7 @@ class ControlService:
         )
 
     def changes(self, operator: OperatorSession) -> list[str]:
-        """Return the page's pending messages, and clear them."""
+        """Return the page's pending messages and clear them."""
         texts: list[str] = []
         # The lease message contains the page's role, on which its buttons depend.
         is_told = self.controller.can_move or self._has_roles
@@ -251,12 +251,12 @@ class ControlService:
     # -- messages from pages
 
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
-        """Accept a message that may be a tick, as raw bytes, and return the message's kind.
+        """Accept the raw bytes of a message that may be a tick; return the message's kind.
 
         Rights are checked when a tick is applied, in `_tick`.
 
-        A new tick replaces a pending tick without being decoded. Too many ticks pause the socket,
-        to save processor time.
+        A new tick replaces a pending tick without being decoded. Too many ticks pause the socket to
+        save processor time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
@@ -306,7 +306,7 @@ class ControlService:
                 self._drive(operator, said)
 
     def stop(self, by: str, who: Operator | None = None) -> None:
-        """Stop the robot and latch STOP. The call is never refused.
+        """Stop the robot and latch STOP. A stop is never refused.
 
         Args:
             by: name of the person or page, shown on all pages.
@@ -372,7 +372,7 @@ class ControlService:
             self._wait(operator, tick.command, tick)
 
     def _wait(self, operator: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
-        """Hold a tick until the rate limit permits it, or a newer tick replaces it."""
+        """Hold a tick until the rate limit permits it or a newer tick replaces it."""
         operator.dropped += command in operator.pending
         operator.pending[command] = tick
 
@@ -442,7 +442,7 @@ class ControlService:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Report that the latched STOP cannot be stored, or can be stored again."""
+        """Report that the latched STOP cannot be stored or that it can be stored again."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
@@ -481,7 +481,7 @@ class ControlService:
             self._heartbeat()
 
     def _heartbeat(self) -> None:
-        """Send a heartbeat number to the page in control, and schedule the next heartbeat."""
+        """Send a heartbeat number to the page in control and schedule the next heartbeat."""
         self._beating = None
         holder = self.controller.lease.state.holder
         operator = self._operators.get(holder.id) if holder is not None else None

@@ -48,7 +48,7 @@ class OperatorSession:
         self.wake = wake
         self.heartbeat: int | None = None
         self.on_role: set[Callable[[], None]] = set()
-        """Callbacks to call after each change of the role in `client`."""
+        """Callbacks for changes of the role in `client`."""
         self.notices: dict[str, str] = {}
         """Newest notice about each control or verb, by name."""
         self.seen = -1
@@ -62,7 +62,7 @@ class OperatorSession:
         self.moved_at_s = float("-inf")
         """Time at which the last tick of any control was applied, in seconds."""
         self.key = secrets.token_urlsafe(16)
-        """Secret key that a redundant socket needs to join the page."""
+        """Secret key that a redundant socket needs in order to join the page."""
         self.spare: RedundantLine | None = None
         self.doubled: DuplicateElimination | None = None
         """Filter for duplicate messages, set once the page has opened a redundant socket."""

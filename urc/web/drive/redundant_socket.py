@@ -3,11 +3,11 @@
 Layer 5. A lost packet delays all later data on its TCP connection by at least one round trip. If
 the retransmitted packet is lost too, the delay doubles and exceeds the duration of a lease. Packet
 losses rarely affect two connections at the same time. A page on a link with packet loss sends each
-message about held controls over both sockets, and receives heartbeats over both. Each message has a
+message about held controls over both sockets and receives heartbeats over both. Each message has a
 number. Only the first copy takes effect.
 
 A redundant socket has no rights without a page. The socket joins a page with a key that only this
-page knows, and closes together with the page.
+page knows and closes together with the page.
 """
 
 import msgspec
@@ -66,7 +66,7 @@ class RedundantSocket:
             pass
 
     def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number; skip it while an earlier number is unsent."""
+        """Send a heartbeat number, unless an earlier number is still unsent."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 

@@ -1,12 +1,12 @@
 """The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. One person's pages and devices count as one person, and cannot approve that person's
+Layer 5. All pages and devices of one person count as one person and cannot approve that person's
 commands. Programs are not people, so a token cannot approve a command. The local user counts as one
-person. On a server without sign-in, each page of an unknown visitor counts as one person. The
-number of pending questions and the time for an answer are limited.
+person. On a server without sign-in, each page of an unknown visitor counts as a separate person.
+The number of pending questions and the time for an answer are limited.
 
 The server represents each confirmation by a token. A token is valid once, for a few seconds, on one
-page, and for one command with unchanged arguments. The server therefore rejects replayed, changed
+page and for one command with unchanged arguments. The server therefore rejects replayed, changed
 and delayed confirmations.
 """
 
@@ -36,7 +36,7 @@ WAIT_S: Final = 30.0
 TOKEN_S: Final = 5.0
 """How long a token is valid, in seconds."""
 _MOST: Final = 8
-"""Maximum number of one robot's pending questions, and of one page's tokens."""
+"""Maximum number of pending questions per robot and of tokens per page."""
 
 
 @dataclass(slots=True)
@@ -123,7 +123,7 @@ class TwoPersonRule:
         `run` is the asking page's number for this run of the command.
 
         Raises:
-            CommandFailed: approval was refused, withdrawn or too late, STOP was pressed, or too
+            CommandFailed: the approval was refused, withdrawn or too late, STOP was pressed, or too
                 many questions are pending.
         """
         if len(self._questions) >= _MOST:

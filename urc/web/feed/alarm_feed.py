@@ -1,8 +1,8 @@
 """Distribution of one robot's alarms to all its pages.
 
-Layer 5. A page gets all alarms once, then only changes, at most five times a second. For example,
-200 alarms in 10 s result in 50 messages per page. Each message is encoded once for all pages with
-the same position.
+Layer 5. A page gets all alarms once, and afterwards only changes, at most five times a second. For
+example, 200 alarms in 10 s result in 50 messages per page. Each message is encoded once for all
+pages with the same position.
 """
 
 import time
@@ -33,7 +33,7 @@ class AlarmPlace:
 
 
 class AlarmFeed:
-    """The encoded alarm messages of one robot, and the callbacks of its pages."""
+    """The encoded alarm messages of one robot and the callbacks of its pages."""
 
     def __init__(self, alarms: RobotAlarms, clock: Clock) -> None:
         self._alarms = alarms
@@ -48,7 +48,7 @@ class AlarmFeed:
         alarms.on_change = self._changed
 
     def join(self, wake: Callable[[], None]) -> AlarmPlace:
-        """Add a callback for changes, and return the position of a new page."""
+        """Add a callback for changes and return the position of a new page."""
         self._wakes.add(wake)
         return AlarmPlace()
 

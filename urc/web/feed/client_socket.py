@@ -1,4 +1,4 @@
-"""The socket of a browser client, and the rate limit of its messages.
+"""The socket of a browser client and the rate limit for its messages.
 
 Layer 5.
 """
@@ -63,7 +63,7 @@ class FlowControl(Protocol):
 
 
 class SocketFlow:
-    """The flow control of a socket: writing frames, waiting for an empty buffer, and aborting."""
+    """The flow control of a socket: writing frames, waiting for an empty buffer and aborting."""
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
@@ -76,7 +76,7 @@ class SocketFlow:
     # Called by the protocol
 
     def connected(self, transport: asyncio.Transport) -> None:
-        """Store the transport, and request a callback when the kernel accepts no more bytes."""
+        """Store the transport; request a callback for when the kernel accepts no more bytes."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 
@@ -148,7 +148,7 @@ class TokenBucket:
 
 
 class PeerRights(Protocol):
-    """The current rights of a socket's peer for the socket's robot."""
+    """The current rights of a socket's peer with regard to the socket's robot."""
 
     def role(self) -> Role | None:
         """Return the current role; None if the peer no longer has any right."""

@@ -24,8 +24,8 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time limit for reusing an encoded frame, in seconds. Ages in a frame are those at the time of
-encoding."""
+"""Time limit for reusing an encoded frame, in seconds. The ages in a frame are the ages at the time
+of encoding."""
 
 
 class FanoutPosition(NamedTuple):
@@ -34,9 +34,9 @@ class FanoutPosition(NamedTuple):
     revision: int = 0
     """Hub revision of the client's newest values."""
     links: int = 0
-    """Number of the client's newest link states."""
+    """Number of link state changes up to the client's newest link states."""
     progress: int = 0
-    """Number of the client's newest sequence states."""
+    """Number of sequence progress changes up to the client's newest sequence states."""
     notes: int = 0
     """Number of log lines sent to the client or dropped."""
     joined: int = 0
@@ -61,7 +61,7 @@ class _Update(NamedTuple):
 
 
 class Pacer:
-    """A rate limiter that passes a burst's first event immediately, and later events steadily.
+    """A rate limiter that passes the first event of a burst immediately and later events steadily.
 
     The limiter tolerates jitter of one period, so it never delays a source that sends at exactly
     the permitted rate. In any second, it passes at most one event above the permitted number.
@@ -142,14 +142,14 @@ class Fanout:
                 self._broken.set_exception(fault)
 
     def flush(self) -> None:
-        """Make the newest values available, and wake every client."""
+        """Make the newest values available and wake every client."""
         self._head = self.hub.revision
         self._updates.clear()
         for wake in tuple(self._wakes):
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake` at each flush, and return the client's position; `wake` must not block."""
+        """Call `wake`, which must not block, at each flush; return the client's position."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
@@ -159,7 +159,7 @@ class Fanout:
         self._wakes.discard(wake)
 
     def frames_for(self, place: Place) -> bytes:
-        """Return the missing frames for the client at `place`, and advance `place`."""
+        """Return the frames that the client at `place` lacks, and advance `place`."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision
             self._updates.clear()

@@ -17,8 +17,8 @@ __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
 """Time limit for reusing an encoded image, in seconds. The message contains the image's age at the
-time of encoding. In a reused message, the age is off by a few milliseconds, which does not justify
-another copy of several kilobytes."""
+time of encoding. In a reused message, the age is wrong by a few milliseconds, but this does not
+justify another copy of several kilobytes."""
 
 
 class EncodedImage(NamedTuple):
@@ -34,7 +34,7 @@ class EncodedImage(NamedTuple):
 
 @dataclass(slots=True)
 class ImageSubscription:
-    """The images shown by one client, and the newest images sent to it."""
+    """The images that one client shows and the newest images sent to this client."""
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from urc.web.fleet.robots import RobotService
 __all__ = ["ContactWatch"]
 
 _LOOK_S: Final = 2.0
-"""Interval between two checks, and accuracy of the times, in seconds."""
+"""Interval between two checks and accuracy of the times, in seconds."""
 _SAVE_S: Final = 60.0
 """Interval between two saves of the file, in seconds."""
 

@@ -108,8 +108,8 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver it. Without a session, it does
-        not count, so that a wrong robot address can still be corrected.
+        A pending stop counts as driving while a session can deliver it. Without a session, a
+        pending stop does not count, so that a wrong robot address can still be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:

@@ -63,7 +63,7 @@ class ResolvedSettings(NamedTuple):
     destination: str
     """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
-    """Names of secrets entered for another destination."""
+    """Names of the secrets that were entered for another destination."""
 
 
 class InstalledInterface(NamedTuple):
@@ -86,8 +86,8 @@ class RobotFactory:
         """First destination of each robot, by package or robot name. Settings given when the server
         started are valid only for that destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """Cache of manifests, by digest and state of the archive. Pages often need all
-        manifests."""
+        """Cache of manifests, by the digest and the state of the archive. The cache exists because
+        pages often need all manifests."""
 
     def _roots(self) -> frozenset[str]:
         try:
@@ -135,7 +135,7 @@ class RobotFactory:
 
         A value given when the server started overrides a stored value, and a stored value overrides
         the default. A stored value that has become invalid, for example after an update, counts as
-        missing. A secret is used only for the destination that it was entered for.
+        missing. A secret is used only for the destination for which it was entered.
         """
         defaults: dict[str, Value] = {
             name: setting.default
@@ -172,14 +172,14 @@ class RobotFactory:
         return ResolvedSettings(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-        """Return the robot's destination when the server started; "" if it was installed later."""
+        """Return the robot's destination at the server's start; "" for a robot installed later."""
         if package and package not in self._there:
             return ""
         place = destination_of(profile, package, values)
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return a robot's installed package, such as ``drivers/puppet``; "" if it has none."""
+        """Return a robot's installed package, such as ``drivers/puppet``; "" for other robots."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts

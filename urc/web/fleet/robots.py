@@ -1,8 +1,8 @@
-"""The dashboard's robots, and the code that opens and closes their sessions.
+"""The dashboard's robots and the code that opens and closes their sessions.
 
-Layer 5. The session opens when the first client connects, and closes shortly after the last client
-disconnects. Reloading the page therefore keeps the robot connected. Leaving the page disconnects
-the robot.
+Layer 5. A robot's session opens when the first client connects and closes shortly after the last
+client disconnects. Reloading a page therefore keeps the robot connected. Leaving the last page
+disconnects the robot.
 """
 
 import asyncio
@@ -90,7 +90,8 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum number of a robot's clients from one unknown address, and from one signed-in visitor."""
+"""Maximum numbers of a robot's clients: from one unknown address, and from one signed-in
+visitor."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
@@ -129,7 +130,7 @@ class SessionLike(MotionSession, Protocol):
         """Pause, step, resume or end a running sequence."""
 
     def latch(self, reason: str) -> None:
-        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
+        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
@@ -316,7 +317,7 @@ class RobotService:
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
 
     async def deliver_stop(self) -> bool:
-        """Connect if necessary, and wait briefly; return whether the robot received the stop."""
+        """Connect if necessary and wait briefly; return whether the robot received the stop."""
         controller = self.controls.controller
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():
@@ -333,7 +334,7 @@ class RobotService:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether no operator drives the robot, and the robot has received every stop."""
+        """Whether no operator drives the robot and the robot has received every stop."""
         controller = self.controls.controller
         return controller.lease.state.holder is None and not controller.is_stop_due
 
@@ -346,8 +347,9 @@ class RobotService:
     async def held_off(self) -> AsyncIterator[None]:
         """Keep the robot disconnected while the context is open.
 
-        Callers need the context because many robots accept only one connection. No operator may be
-        driving the robot. An open session ends first, and clients wait for the next session.
+        Callers that connect to the robot themselves need the context, because many robots accept
+        only one connection. No operator may be driving the robot. An open session ends first, and
+        clients wait for the next session.
         """
         self._held_off += 1
         self._changed.set()
@@ -474,7 +476,7 @@ class RobotService:
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until a session is needed; with `present` false, wait until no session is needed."""
+        """Wait until a session is needed or, if `present` is false, until no session is needed."""
         while not (self._is_wanted if present else not self._has_clients or self._is_unwanted):
             self._changed.clear()
             await self._changed.wait()

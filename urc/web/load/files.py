@@ -1,4 +1,4 @@
-"""Map tiles, and the files that a robot's documents list in widget options.
+"""Map tiles and the files that a robot's documents list in widget options.
 
 Layer 5. A URL contains either a key of a table in the loaded profile, or the three numbers of a
 tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
@@ -79,7 +79,7 @@ def page_key(url: str) -> str:
 
 
 def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield the widget use of every filled slot in the profile and its interfaces."""
+    """Yield the use of a widget in every filled slot of the profile and its interfaces."""
     yield from profile.slots.values()
     for interface in profile.interfaces.values():
         yield from interface.widgets.values()

@@ -1,1 +1,1 @@
-"""The manager pages: packages from repositories, and the settings of robots."""
+"""The manager pages: packages from repositories and the settings of robots."""

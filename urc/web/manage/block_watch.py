@@ -1,6 +1,6 @@
-"""A watch over the block lists, which stops and disables robots with blocked packages.
+"""A watch over the block lists that stops and disables robots with blocked packages.
 
-Layer 5. The lists change through imports on the command line and this watch's hourly requests.
+Layer 5. Imports on the command line and this watch's hourly requests change the lists.
 """
 
 import asyncio
@@ -43,9 +43,9 @@ class BlockWatch:
             store: the installed packages.
             fleet: the served robots.
             remade: function that recreates a robot from its documents. The function is called in a
-                thread, and raises `UrcError`, for example for a blocked package.
+                thread and may raise `UrcError`, for example for a blocked package.
             own_interfaces: function that returns the names of the interfaces in a robot's own
-                document. The function is called in a thread, and may raise `UrcError`.
+                document. The function is called in a thread and may raise `UrcError`.
             ask: function that starts a request to all repositories.
         """
         self._store = store
@@ -80,10 +80,10 @@ class BlockWatch:
             seen = stamp
 
     async def enforce(self) -> None:
-        """Stop and disable robots with a blocked package; enable disabled robots that have none.
+        """Stop and disable robots with a blocked package; enable disabled robots without one.
 
         Raises:
-            UrcError: the lists cannot be read. No robot has changed.
+            UrcError: the lists cannot be read. No robot was changed.
         """
         for name, robot in list(self._fleet.robots.items()):
             lines = await asyncio.to_thread(self._lines, name, robot)
@@ -114,7 +114,7 @@ class BlockWatch:
         return lines
 
     async def _disable(self, name: str, robot: Robot, line: str) -> None:
-        """Stop a robot, latch STOP with the reason, and end its session."""
+        """Stop a robot, latch STOP with the reason and end the robot's session."""
         service = self._fleet.services[name]
         if service.controls.controller.can_move:
             service.controls.stop(f"URC: {line}")

@@ -1,6 +1,6 @@
 """The package lists of the repositories, kept in memory and refreshed in the background.
 
-Layer 5. Pages start a refresh and show the last known lists immediately, so they never wait for an
+Layer 5. Pages start a refresh but show the last known lists immediately, so they never wait for an
 unreachable server.
 """
 
@@ -41,7 +41,7 @@ class PackageCatalog:
         self._asking: asyncio.Task[None] | None = None
         self.places: tuple[RepositoryInfo, ...] = ()
         self.found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
-        """Every version of every package, with the URL of its repository."""
+        """Every version of every package, with the URL of the repository that offers it."""
         self.fault = ""
         """Reason why the list of repositories cannot be read; "" if it can."""
 
@@ -72,7 +72,7 @@ class PackageCatalog:
         return [entry for some in self.found.values() for entry, _ in some]
 
     def hits(self, words: str, kinds: tuple[str, ...]) -> list[IndexEntry]:
-        """Return the newest version of each package with a given kind that matches all words."""
+        """Return the newest version of each package that has a given kind and matches all words."""
         entries = [entry for entry in self.entries() if entry.kind in kinds]
         return search(entries, words.split())
 
@@ -82,7 +82,7 @@ class PackageCatalog:
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
     def withdrawn(self, lock: Lock) -> list[str]:
-        """Return a line for each withdrawn package in an installed package's lock file."""
+        """Return one line for each withdrawn package in an installed package's lock file."""
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 

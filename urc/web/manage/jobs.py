@@ -1,4 +1,4 @@
-"""Installation jobs, each with planning, review, approval and installation.
+"""Installation jobs; each consists of planning, review, approval and installation.
 
 Layer 5. A job can be cancelled until the installation starts. No function in this module blocks the
 event loop. Downloads run in a thread, which is abandoned if the job is cancelled. The package store
@@ -33,7 +33,7 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Maximum number of reported changes to the frames sent to the robot."""
+"""Maximum number of changes to the frames sent to the robot that are reported."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
 """Maximum number of abandoned threads that are still waiting for a server."""
@@ -53,13 +53,14 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without a setting."""
+    """The package's uses of this machine's resources without a setting."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
     """Version replaced by the update; None for a new installation."""
     stays: Lock | None = None
-    """Version that stays in use after another version is installed, if any."""
+    """Version that stays in use after another version is installed; None if no version stays in
+    use."""
     changes: UpdateDiff | None = None
 
 
@@ -106,7 +107,7 @@ class Job:
 
 
 class _ReportingSource:
-    """A package source that reports progress to a job, and fails once the job is cancelled."""
+    """A package source that reports progress to a job and fails once the job is cancelled."""
 
     def __init__(self, source: Source, job: Job) -> None:
         self._source = source
@@ -154,8 +155,8 @@ class Jobs:
         Args:
             store: the store of installed packages.
             sources: function that returns the repositories and reports warnings to its argument.
-            used: function that returns a package's version in use, or that of a package with the
-                same name.
+            used: function that returns the version in use of a package, or of another package with
+                the same name.
         """
         self._store = store
         self._used = used
@@ -178,7 +179,7 @@ class Jobs:
         return job
 
     def touched(self, number: int) -> tuple[PackageId | None, Lock | None]:
-        """Return the package that a job installs, and the version that must stay in use."""
+        """Return the package that a job installs and the version that must stay in use."""
         planned = self._asked(number).planned
         if planned is None:
             return None, None
@@ -223,7 +224,7 @@ class Jobs:
         return job
 
     async def planned(self) -> Job | None:
-        """Wait until the newest job needs approval or has ended, and return the job."""
+        """Wait until the newest job needs approval or has ended; return the job."""
         if self._task is not None:
             await asyncio.wait((self._task,))
         return self.newest

@@ -69,7 +69,7 @@ class Manager:
         self._seen: object = None
         """State of the package store when the menu was last updated."""
         self._is_behind = False
-        """Whether a change is pending because a robot is being driven."""
+        """Whether any change is pending because a robot is being driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -268,7 +268,7 @@ class Manager:
     ) -> Job:
         """Install the planned package; raise `Busy` while its robot is being driven.
 
-        The current version stays in use, unless the job is an update.
+        The current version stays in use unless the job is an update.
         """
         key, used = await asyncio.to_thread(self.jobs.touched, number)
         if key is not None:
@@ -317,10 +317,10 @@ class Manager:
         return self.factory.robot_options.data / "robots"
 
     def check_idle(self, name: str, *, is_correction: bool = False) -> None:
-        """Raise `Busy` while an operator drives the robot, or a stop is pending.
+        """Raise `Busy` while an operator drives the robot or a stop is pending.
 
         With `is_correction`, a pending stop for an unreachable robot does not count, because wrong
-        settings may be the reason.
+        settings may be why the robot is unreachable.
         """
         driver = self.fleet.driven_by(name)
         if driver and not (is_correction and self.fleet.is_out_of_reach(name)):

@@ -32,7 +32,7 @@ def playback_state(playback: Playback | None) -> Response:
 
 
 async def move_playback(request: Request, playback: Playback | None) -> Response:
-    """Play, pause or seek the playback, and return its state as a response."""
+    """Play, pause or seek the playback; return its state as a response."""
     if playback is None:
         return told(404, "this robot is not a recording")
     try:

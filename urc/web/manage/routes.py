@@ -1,4 +1,4 @@
-"""Routes for the manager pages, and for the pages' requests under ``/api/v1``.
+"""Routes for the manager pages and for the pages' requests under ``/api/v1``.
 
 Layer 5. Changes are POST requests with a JSON body, sent by the server's own pages;
 `urc.web.serve.policy` checks their origin. Each change requires the role `maintain` and a recent
@@ -311,7 +311,7 @@ class ManageRoutes:
         return answer(news, 202)
 
     def _meant(self, path: str, request: Request) -> PackageRequirement | Path:
-        """Resolve a path: ``/interfaces/wide/`` in a repository, or a path on this machine."""
+        """Resolve a path in a repository (``/interfaces/wide/``) or a path on this machine."""
         inside = path.strip("/")
         if inside.partition("/")[0] in FOLDERS:
             try:

@@ -1,6 +1,6 @@
-"""The groups of a robot's settings, and the setting that probably caused a failed connection.
+"""The groups of a robot's settings and the setting that probably caused a failed connection.
 
-Layer 5. Pure. Both depend on how transport options use the settings.
+Layer 5. Pure. Both the groups and this setting depend on how transport options use the settings.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ from urc.runtime.connection_cause import Cause
 __all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of"]
 
 CONNECTION: Final = ""
-"""Group of the settings for the connection to the robot."""
+"""Group of settings for the connection to the robot."""
 FURTHER: Final = "*"
 """Group of all other settings without a declared group."""
 _PLACE: Final = ("host", "url", "address", "path")

@@ -1,4 +1,4 @@
-"""Data for a robot's settings page, with one form field per setting, chosen by the setting's type.
+"""Data for a robot's settings page; each setting has one form field, chosen by its type.
 
 Layer 5. This module fills the fields, and `urc.web.manage.settings_routes` reads their values.
 """
@@ -79,7 +79,7 @@ class FieldGroup:
 
 @dataclass(frozen=True, slots=True)
 class SettingsPage:
-    """Context for ``settings.html.j2``: the driver's settings, the driver, and the interface."""
+    """Context for ``settings.html.j2``: the driver's settings, the driver and the interface."""
 
     head: PageHead
     nav: Nav
@@ -93,7 +93,8 @@ class SettingsPage:
     """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
     monitoring: tuple[Option, ...]
-    """Choices for staying connected for alarms; empty for a robot without alarms."""
+    """Choices for whether the robot stays connected for its alarms; empty for a robot without
+    alarms."""
     groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
     """Names of the tested transports."""

@@ -1,6 +1,6 @@
-"""Sources of uploaded packages: bundles, archives, and interface documents without a package.
+"""Sources of uploaded packages: bundles, archives and interface documents without a package.
 
-Layer 5. A document without a package is wrapped in a package, and then stored, listed and removed
+Layer 5. A document without a package is wrapped in a package and is then stored, listed and removed
 like any other package.
 """
 

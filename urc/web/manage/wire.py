@@ -1,6 +1,6 @@
-"""JSON messages between the manager pages and the server, in camel case.
+"""JSON messages between the manager pages and the server, with field names in camel case.
 
-Layer 5. Pure. The server decodes requests into these types, and refuses an invalid request with one
+Layer 5. Pure. The server decodes requests into these types and refuses an invalid request with one
 line of text.
 """
 
@@ -106,7 +106,8 @@ class JobNews(ManageMessage, frozen=True):
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """Access to this machine that needs no setting; for an update, only additional access."""
+    """The package's access to this machine without a setting; for an update, only additional
+    access."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""
@@ -116,7 +117,7 @@ class JobNews(ManageMessage, frozen=True):
     wire: tuple[str, ...] = ()
     """Changes to the frames sent to the robot."""
     stays: str = ""
-    """Version that stays in use until the user chooses another version. "" if the new version is
+    """Version that stays in use until the user chooses another version; "" if the new version is
     used."""
     notes: tuple[str, ...] = ()
     """Further notes, for example about a repository that does not respond."""
@@ -154,7 +155,7 @@ class Installed(ManageMessage, frozen=True):
     newer: str
     """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Earlier version that can be restored; "" if no version can be restored."""
+    """Earlier version that can be restored; "" without one."""
     url: str
     """URL of the package's page; "" if it has no page."""
     settings_url: str
@@ -231,7 +232,7 @@ class StopResult(ManageMessage, frozen=True):
 
 
 class ControlState(ManageMessage, frozen=True):
-    """Holder of the lease, and state of the STOP latch."""
+    """Holder of the lease and state of the STOP latch."""
 
     holder: str
     """Name of the operator in control; "" if no operator is in control."""
@@ -304,9 +305,9 @@ class ProbedTransport(ManageMessage, frozen=True):
     text: str
     advice: str
     cause: str = ""
-    """Name of the failure's cause; "" if it is unknown."""
+    """Name of the failure's cause; "" if the cause is unknown."""
     field: str = ""
-    """Setting that most likely caused the failure; "" if unknown."""
+    """Setting that most likely caused the failure; "" if this setting is unknown."""
 
 
 class SettingsAnswer(ManageMessage, frozen=True):

@@ -1,1 +1,1 @@
-"""Sign-in over HTTP: the sign-in methods, and requests from people to manage their own accounts."""
+"""Sign-in over HTTP: the sign-in methods and people's requests to manage their own accounts."""

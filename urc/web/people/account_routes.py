@@ -1,4 +1,4 @@
-"""Routes for visitors' own accounts (passphrase, devices and sign-ins), and for admitting guests.
+"""Routes for visitors' own accounts (passphrase, devices and sign-ins) and for admitting guests.
 
 Layer 5. Visitors can change only their own devices and sign-ins.
 """

@@ -181,7 +181,7 @@ class AdminRoutes:
 
     @answers_changes
     async def revoke(self, request: Request) -> Response:
-        """End all sign-ins of a person, device, program or guest, and of the person's devices."""
+        """End all sign-ins of a person and their devices, or of a device, program or guest."""
         one = self._chosen(await body_of(request, PrincipalChoice))
         store = self._sign_ins.store
         ended = await asyncio.to_thread(
@@ -214,7 +214,7 @@ class AdminRoutes:
 
     @answers_changes
     async def token(self, request: Request) -> Response:
-        """Add a program, and return its token, which is shown only once."""
+        """Add a program and return its token, which is shown only once."""
         said = await body_of(request, TokenRequest)
         store, now = self._sign_ins.store, self._control.now()
         ends_at = None if said.days is None else now + said.days * _DAY_S
@@ -265,7 +265,7 @@ class AdminRoutes:
         return one
 
     async def _changed(self, request: Request, command: str, **about: object) -> None:
-        """Apply a change immediately, and record it."""
+        """Apply a change immediately and record it."""
         actor = actor_of(request)  # read before the change, which may affect the administrator
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, command, **about)

@@ -1,4 +1,4 @@
-"""The common part of all browser sign-in methods: limits, audit entries, and the sign-in itself.
+"""The common part of all browser sign-in methods: limits, audit entries and the sign-in itself.
 
 Layer 5. Failed attempts from an address or for a name delay later attempts. STOP is never delayed.
 """
@@ -43,7 +43,7 @@ answers_refusals: Final = answers_errors_with(403)
 HASHES: Final = 2
 """Limit on concurrent passphrase hashes, each of which needs 64 MiB."""
 MOST_WAITING: Final = 32
-"""Limit on attempts that wait for a hash."""
+"""Limit on attempts that wait for their turn to be hashed."""
 _LONGEST_AGENT: Final = 200
 
 
@@ -62,7 +62,8 @@ class BrowserSignIns:
         Args:
             access: identities and rights.
             recorder: recorder that writes sign-ins to the audit log.
-            throttle: failed attempts with all sign-in methods; None to create a separate count.
+            throttle: count of failed attempts with all sign-in methods; None to create a separate
+                count.
             clock: function that returns the monotonic time, in seconds.
         """
         self.access = access
@@ -100,7 +101,7 @@ class BrowserSignIns:
     def failed(
         self, request: Request, way: Way, error: AccessError, *names: str, person: str = ""
     ) -> None:
-        """Count a failed attempt, and record it.
+        """Count a failed attempt and record it.
 
         Args:
             request: the attempt.
@@ -141,7 +142,7 @@ class BrowserSignIns:
         *,
         ends_at: float | None = None,
     ) -> Identity:
-        """Open a sign-in for a person, and store it in the browser.
+        """Open a sign-in for a person and store it in the browser.
 
         Args:
             request: the request that proved the person's identity.
@@ -171,7 +172,7 @@ class BrowserSignIns:
     def admit(
         self, request: Request, response: Response, secret: str, *, is_device: bool = False
     ) -> Identity:
-        """Store an open sign-in in the browser, and record it.
+        """Store an open sign-in in the browser and record it.
 
         Args:
             request: the request.
@@ -195,7 +196,7 @@ class BrowserSignIns:
         self.recorder.signed_in(actor, agent)
 
     async def _end_previous(self, request: Request) -> None:
-        """End the browser's previous sign-in as a person, and load the new sign-in."""
+        """End the browser's previous sign-in as a person and load the new sign-in."""
         before = visitor_of(request).identity
         if before.kind == "person" and before.way != "token":
             # The previous sign-in may already have ended.

@@ -1,6 +1,6 @@
-"""Requests and responses about people, devices, tokens and sign-ins, in camel case.
+"""Requests and responses about people, devices, tokens and sign-ins.
 
-Layer 5. Pure. Times are UTC, in seconds since 1970.
+Layer 5. Pure. The field names are in camel case. Times are UTC, in seconds since 1970.
 """
 
 from typing import Annotated, Literal
@@ -173,7 +173,8 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     sign_ins: int
     """Number of open sign-ins."""
     used_at: float | None
-    """Time of the last request with an open sign-in, in seconds since 1970 (UTC), or null."""
+    """Time of the last request with an open sign-in, in seconds since 1970 (UTC); null if
+    unused."""
     created_at: float
     """Time of creation, in seconds since 1970 (UTC)."""
     ends_at: float | None

@@ -1,4 +1,4 @@
-"""The pages for people and devices: administration, the visitor's own account, and codes.
+"""The pages for people and devices: administration, the visitor's own account and codes.
 
 Layer 5. The pages' modules fetch all data; the HTML contains no data. Pages for codes are identical
 for all visitors; their modules read the code from the fragment.

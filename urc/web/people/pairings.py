@@ -33,7 +33,7 @@ class Pairings:
         self._known: OrderedDict[str, _Pairing] = OrderedDict()
 
     def add(self, code: str, ends_at: float) -> str:
-        """Add a pairing for the device with `code`, and return the pairing's identifier.
+        """Add a pairing for the device with `code` and return the pairing's identifier.
 
         Args:
             code: the code.

@@ -1,4 +1,4 @@
-"""Routes for signing in with a passkey, and for adding, renaming and removing one's own passkeys.
+"""Routes for signing in with a passkey and for adding, renaming and removing one's own passkeys.
 
 Layer 5. Only people have passkeys. Adding a passkey requires a recent sign-in, so a passer-by
 cannot add a passkey to the operator's account on a shared tablet.

@@ -65,7 +65,7 @@ class ProxyMiddleware:
         self._told_at = float("-inf")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward the request without proxy headers, and with the person's sign-in."""
+        """Forward the request without proxy headers but with the person's sign-in."""
         if scope["type"] not in ("http", "websocket") or not self._proxies:
             await self._app(scope, receive, send)
             return

@@ -45,7 +45,7 @@ class FurtherWays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """Context for ``door.html.j2``: the sign-in methods or a link to the page, and STOP buttons."""
+    """Context for ``door.html.j2``: STOP buttons, and the sign-in methods or a link to the page."""
 
     head: PageHead
     url: str
@@ -58,7 +58,7 @@ class AccessPage:
     this path."""
     robots: tuple[Stoppable, ...]
     has_people: bool
-    """Whether the server has people, who can sign in with a name and a passphrase."""
+    """Whether the server has people who can sign in with a name and a passphrase."""
     keeps_people: bool
     """Whether the server can pair devices."""
     ways: FurtherWays

@@ -1,4 +1,4 @@
-"""Routes for signing in with a name and a passphrase, and for signing out.
+"""Routes for signing in with a name and a passphrase and for signing out.
 
 Layer 5. Attempts are limited per address and per name. At most two passphrases are hashed at a
 time.

@@ -1,4 +1,4 @@
-"""The sign-in methods of one server, and their routes.
+"""The sign-in methods of one server and their routes.
 
 Layer 5. The start key, pairing and passphrases need no options. A provider and proxies need
 options.

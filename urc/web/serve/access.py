@@ -1,6 +1,6 @@
-"""Access over HTTP: each request's identity, from its cookie or token, never from its address.
+"""Access over HTTP: a request's identity comes from its cookie or token, never from its address.
 
-Layer 5. The address printed by URC contains the start key. A browser sends the key once, and
+Layer 5. The address printed by URC contains the start key. A browser sends the key once and
 receives a sign-in in a cookie that scripts cannot read. Signed-in people and guests have a second
 cookie, which stays valid after a restart. A paired device has a third cookie, which remains when
 its operator signs out. A program sends its token with each request.
@@ -42,7 +42,7 @@ _Headers = Iterable[tuple[bytes, bytes]]
 
 
 class Access:
-    """The identities of one server's requests, and the sockets that depend on these identities."""
+    """The identities of one server's requests and the sockets that depend on these identities."""
 
     def __init__(
         self,
@@ -208,7 +208,7 @@ class Access:
         return self.control.best_role(who) or self.anonymous
 
     def may_give(self, who: Identity, command: str) -> bool:
-        """Return whether a token permits a command, and record the use of the token."""
+        """Return whether a token permits a command; record the use of the token."""
         return self.control.directory.may_give(self._seen(who), command)
 
     def signed_in_s(self, who: Identity) -> float:
@@ -272,7 +272,7 @@ def _unheard(place: str) -> None:
 
 
 def _right_clock() -> str:
-    """Return "", because no clock check is configured."""
+    """Return "" because no clock check is configured."""
     return ""
 
 

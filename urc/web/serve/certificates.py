@@ -1,7 +1,7 @@
 """The server's certificate, from the local authority or from the operator's files.
 
 Layer 5. `Certificates` loads a certificate in a thread and replaces it while the server runs. New
-connections use the new certificate; open connections keep the old one.
+connections use the new certificate, while open connections keep the old one.
 """
 
 import asyncio
@@ -35,7 +35,7 @@ class LoadedCertificate(NamedTuple):
     fingerprint: str
     """SHA-256 of the certificate to trust: the authority's certificate or the given certificate."""
     file: Path
-    """PEM file with which local programs verify the server."""
+    """PEM file that local programs use to verify the server."""
     name: str
     """A host name or address from the certificate."""
     authority: bytes
@@ -232,7 +232,7 @@ def _context(chain: Path, key: Path) -> ssl.SSLContext:
 
 
 class _PassphraseError(Exception):
-    """The key has a passphrase."""
+    """The private key has a passphrase."""
 
 
 def _refused() -> str:

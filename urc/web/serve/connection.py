@@ -1,8 +1,8 @@
-"""One HTTP connection, with turns and a time limit for requests, and headers in every refusal.
+"""One HTTP connection, with turns and a time limit for requests and with headers in every refusal.
 
-Layer 5. A thin layer over uvicorn's protocol, used only by `server`. The library uvicorn refuses
-invalid HTTP, and connections above its limit. Without this layer, uvicorn's refusals would lack the
-page policy's headers.
+Layer 5. The module is a thin layer over uvicorn's protocol, used only by `server`. The library
+uvicorn refuses invalid HTTP and connections above its limit. Without this layer, uvicorn's refusals
+would lack the page policy's headers.
 """
 
 import asyncio
@@ -24,10 +24,11 @@ CONNECTIONS = 1024
 """Maximum number of open connections, including WebSockets. At the limit, a new connection closes
 the oldest idle connection from the address with the most idle connections."""
 RESERVE = 64
-"""Number of additional connections that accept only STOP, used while no connection is idle."""
+"""Number of additional connections that accept only STOP; they are used while no connection is
+idle."""
 REQUEST_S = 5.0
 """Time limit for receiving a complete request with its body, in seconds. For the first request, the
-time starts when the connection opens; for later requests, at the first byte."""
+time starts when the connection opens; for later requests, with the first byte."""
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
@@ -57,11 +58,10 @@ class HttpConnection(H11Protocol):
     server ends. The function ``abort`` closes the connection.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments, and the methods `handle_events`,
-        `send_400_response` and `shutdown`. It also uses the attributes `conn`, `connections`,
-        `flow`, `loop` and `transport`. The tests in
-        tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail if one of these parts
-        changes.
+        class uses the constructor's arguments and the methods `handle_events`, `send_400_response`
+        and `shutdown`. It also uses the attributes `conn`, `connections`, `flow`, `loop` and
+        `transport`. The tests in tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail
+        if one of these parts changes.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class HttpConnection(H11Protocol):
         """Time at which the connection opened, on the event loop's clock."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Store the transport, and wait for a request."""
+        """Store the transport and wait for a request."""
         super().connection_made(transport)
         self.made_s = self.loop.time()
         if len(self.connections) > self._most and not self._make_room():
@@ -101,7 +101,7 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """Process received bytes, and check whether the request is complete."""
+        """Process received bytes and check whether the request is complete."""
         self._has_spoken = True
         self._is_urgent = _stops(data)
         if self._is_one_too_many and not self._is_urgent:
@@ -112,7 +112,7 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def handle_events(self) -> None:
-        """Read the requests in the received bytes: STOP immediately, and all others in turn."""
+        """Read the requests in the received bytes: STOP immediately, all others in turn."""
         if self._is_urgent:
             super().handle_events()
         elif not self._turns.take(self, self._handle_events):
@@ -126,7 +126,7 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave the queue, and cancel the request's time limit."""
+        """Leave the queue and cancel the request's time limit."""
         self._turns.remove(self)
         self._unwatch()
         super().connection_lost(exc)
@@ -136,7 +136,7 @@ class HttpConnection(H11Protocol):
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def shutdown(self) -> None:
-        """Allow the response in progress to end; called when the server ends."""
+        """Allow the response in progress to finish; called when the server ends."""
         super().shutdown()
         self._closing.set()
 

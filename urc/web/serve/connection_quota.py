@@ -1,7 +1,7 @@
 """Limits on each visitor's concurrent requests, so that other visitors can still connect.
 
 Layer 5. Pure. Each person, device and program has a separate count; unknown visitors are
-counted by address. STOP requests are not counted, because they are always accepted.
+counted by address. STOP requests are not counted because they are always accepted.
 """
 
 import re
@@ -15,8 +15,7 @@ __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
 """Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
-sockets and six requests, so the limit permits several pages, and a few people behind one
-address."""
+sockets and six requests, so the limit permits several pages and a few people behind one address."""
 KNOWN_PLACES = 256
 """Maximum number of concurrent requests and sockets from one known person, device or program. A
 known visitor may watch many robots."""

@@ -121,9 +121,8 @@ def is_host_allowed(
 ) -> bool:
     """Return whether the server accepts requests for a host.
 
-    DNS rebinding by a foreign name server affects neither literal addresses nor ``localhost``. Any
-    other name must be in `names`, because every device on the network can claim a name under
-    ``.local``.
+    A foreign name server cannot use literal addresses or ``localhost`` for DNS rebinding. Any other
+    name must be in `names`, because every device on the network can claim a name under ``.local``.
 
     Args:
         authority: the host.
@@ -342,7 +341,7 @@ def _authority(match: re.Match[str]) -> Authority | None:
 
 
 def _is_loopback(scope: Scope) -> bool:
-    """Return whether a request comes over loopback, and therefore from this machine."""
+    """Return whether a request comes over loopback and therefore from this machine."""
     client = scope.get("client")
     try:
         return client is not None and unmapped(ipaddress.ip_address(client[0])).is_loopback

@@ -1,4 +1,4 @@
-"""JSON responses of the HTTP API, and the bodies of its requests.
+"""JSON responses of the HTTP API and the bodies of its requests.
 
 Layer 5. Failures from routes, access control and the page policy all have the same form.
 """
@@ -79,7 +79,7 @@ async def body_of(request: Request, kind: type[_T]) -> _T:
     """Return a request's JSON body, decoded as `kind`.
 
     Raises:
-        ApiError: the body has another type.
+        ApiError: the body does not have this type.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip() != _JSON:
         raise ApiError(415, f"expected a body of type {_JSON}")
@@ -121,4 +121,4 @@ def answers_errors_with(
 
 
 answers_errors: Final = answers_errors_with(409)
-"""Decorator for handlers that refuse requests because of a robot's or the server's state."""
+"""Decorator for handlers that refuse requests because of the state of a robot or the server."""

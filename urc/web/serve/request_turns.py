@@ -31,7 +31,7 @@ class RequestTurns:
         self._is_scheduled = False
 
     def take(self, connection: object, read: Callable[[], None]) -> bool:
-        """Call `read` now or later, in the order of calls; a waiting connection keeps its place.
+        """Call `read` now or in its turn; a waiting connection keeps its place.
 
         Return whether `read` was called.
 

@@ -1,7 +1,7 @@
-"""The right required by each route, and route classes that check it before calling the endpoint.
+"""The right that each route requires, and route classes that check it before calling the endpoint.
 
-Layer 5. Every route of the application is a `ProtectedRoute` or `ProtectedSocket`, so no route
-lacks a right. A contract test checks this rule.
+Layer 5. Every route of the application is a `ProtectedRoute` or `ProtectedSocket`, so every route
+has a right. A contract test checks this rule.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,7 +64,7 @@ class Right(NamedTuple):
 
 FRESH_S: Final = 300.0
 """Time after a sign-in, in seconds, during which people can change packages, settings and rights. A
-tablet that was left signed in is therefore not enough."""
+tablet that was left signed in is therefore not enough for such changes."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)

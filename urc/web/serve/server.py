@@ -63,7 +63,8 @@ async def serve(
         on_ready: callback that is called once, with the first of `reachable_urls`, such as
             ``http://127.0.0.1:8080/``.
         request_s: time limit for receiving a complete request, in seconds.
-        connections: maximum number of open connections; above it, new connections get status 503.
+        connections: maximum number of open connections; above this number, new connections get
+            status 503.
         certificates: certificates for HTTPS; None for plain HTTP.
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
         handshakes: limits on unfinished handshakes; None for the default limits.
@@ -157,7 +158,7 @@ class _UvicornServer(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave signals to `_ending`; uvicorn's handler would raise each signal again."""
+        """Leave signals to `_ending`, because uvicorn's handler would raise each signal again."""
         yield
 
 
@@ -182,7 +183,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Store the transport, and request a pause as soon as the kernel's buffer is full."""
+        """Store the transport and request a pause as soon as the kernel's buffer is full."""
         super().connection_made(transport)
         self._urc_flow.connected(cast("asyncio.Transport", transport))
 
@@ -261,9 +262,9 @@ def _listen(host: str, port: int) -> socket.socket:
 def reachable_urls(host: str, port: int, scheme: str = "http") -> tuple[str, ...]:
     """Return the URLs of a dashboard that listens on `host`.
 
-    For ``0.0.0.0`` and ``::``, the URLs contain the addresses of all network interfaces of this
-    machine, or else the loopback address. For any other host, the only URL contains `host`. Network
-    addresses precede the loopback address. The function sends no packets.
+    For ``0.0.0.0`` and ``::``, the URLs contain the network addresses of this machine, or the
+    loopback address if it has none. For any other host, the only URL contains `host`. The function
+    sends no packets.
 
     Args:
         host: the address or name on which the server listens.

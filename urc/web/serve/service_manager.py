@@ -1,11 +1,11 @@
 """Messages that report to systemd whether the server is ready, alive or ending (sd_notify(3)).
 
-Without systemd, or under another service manager, `NOTIFY_SOCKET` is not set, and no messages are
+Without systemd or under another service manager, `NOTIFY_SOCKET` is not set and no messages are
 sent.
 
 Before each heartbeat to the watchdog, the server requests its own `/healthz` over a real
-connection. If the event loop is blocked, or the port no longer accepts connections, the heartbeat
-is not sent, and systemd restarts the server. By then, the guard has already stopped the robots
+connection. If the event loop is blocked or the port no longer accepts connections, the heartbeat is
+not sent and systemd restarts the server. By then, the guard has already stopped the robots
 (docs/motion.md).
 """
 

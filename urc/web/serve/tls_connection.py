@@ -1,9 +1,9 @@
 """One TLS connection over an asyncio transport, without its own buffer.
 
 Layer 5. The standard library's `ssl.SSLObject` encrypts the data. An event loop's own TLS layer has
-a buffer above the TCP transport, and reports a full buffer one write too late. The dashboard would
+a buffer above the TCP transport and reports a full buffer one write too late. The dashboard would
 then write one more frame, which becomes outdated in the buffer. This class passes each write to TCP
-immediately, so TCP's callbacks arrive at the right time, and paused data stays in the kernel.
+immediately, so TCP's callbacks arrive at the right time and paused data stays in the kernel.
 """
 
 import asyncio
@@ -21,7 +21,7 @@ HANDSHAKE_BYTES = 64 * 1024
 
 
 class TlsConnection(asyncio.Transport, asyncio.Protocol):
-    """A protocol above a TCP transport, and a transport below the upper protocol."""
+    """A protocol above a TCP transport and a transport below the upper protocol."""
 
     def __init__(
         self,
@@ -38,8 +38,8 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             context: certificate and options of the server.
             make: function that creates the upper protocol after the handshake.
             on_data: callback for received handshake data, which `continue_handshake` processes.
-            on_end: callback that is called when the handshake has succeeded, failed or lost its
-                connection.
+            on_end: callback that is called when the handshake has succeeded, has failed or has lost
+                its connection.
         """
         super().__init__()
         self._tcp = tcp
@@ -136,7 +136,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._flush()  # replies of the TLS protocol itself, such as a key update
 
     def _fail(self) -> None:
-        """Send the TLS alert about the failure, and close the connection."""
+        """Send the TLS alert about the failure and close the connection."""
         self._flush()
         self._is_closing = True
         self._tcp.close()

@@ -1,7 +1,7 @@
 """The first bytes of a connection to a TLS port, which are a handshake or plain HTTP.
 
 Layer 5. A client can open many connections without finishing a handshake. `Handshakes` limits the
-number and duration of handshakes, and their share of the event loop's time.
+number and duration of handshakes and their share of the event loop's time.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
 """Maximum number of unfinished handshakes. Above the limit, the address with the most handshakes
-loses one: its oldest handshake without a whole message, or else its oldest handshake."""
+loses its oldest handshake without a whole message, or else its oldest handshake."""
 HANDSHAKE_S = 5.0
 """Time limit from opening a connection to the end of its handshake, in seconds."""
 SHARE = 0.25
@@ -69,7 +69,7 @@ class Handshakes:
             min(crowd, key=lambda each: each.has_replied).abort()
 
     def remove(self, one: "FirstBytes") -> None:
-        """Remove a connection whose handshake has ended or that was lost."""
+        """Remove a connection that was lost or whose handshake has ended."""
         self._waiting.pop(one, None)
         timer = self._open.pop(one, None)
         if timer is not None:
@@ -88,7 +88,7 @@ class Handshakes:
             self._next()
 
     def _next(self) -> None:
-        """Continue one waiting handshake; its duration determines when the next one continues."""
+        """Continue one waiting handshake; its duration determines when another may continue."""
         self._is_timed = False
         loop = asyncio.get_running_loop()
         if loop.time() < self._free_s:
@@ -110,7 +110,7 @@ class Handshakes:
 
 
 class FirstBytes(asyncio.Protocol):
-    """The protocol of a new connection until its first bytes show TLS or plain HTTP."""
+    """The protocol of a new connection until its first bytes reveal TLS or plain HTTP."""
 
     def __init__(self, handshakes: Handshakes, make: Callable[[], asyncio.Protocol]) -> None:
         """Create the protocol.

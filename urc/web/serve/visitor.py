@@ -1,4 +1,4 @@
-"""Visitors: the identity of each request, and its current rights.
+"""Visitors: the identity of each request and its current rights.
 
 Layer 5. Pure.
 """

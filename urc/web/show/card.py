@@ -1,8 +1,9 @@
 """The content of a robot's menu card: a camera image, its picture, its world, or the main values.
 
-Layer 5. A card never connects to a robot. A robot with a picture shows the picture, or its camera
-while it is connected. An emulated robot without a picture shows its simulated world. A real robot
-without a picture shows data while it is connected, and the last image afterwards.
+Layer 5. A card never connects to a robot. The card of a robot with a picture shows the picture or,
+while the robot is connected, its camera image. The card of an emulated robot without a picture
+shows its simulated world. The card of a real robot without a picture shows data while the robot is
+connected, and the last image afterwards.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,10 +44,10 @@ class Cards:
         return [ProtectedRoute("/robots/{name}/card", self.card, WATCH)]
 
     async def card(self, request: Request) -> Response:
-        """Return an image, or values as JSON ``[[title, text], …]``; without data, status 204.
+        """Return an image, values as JSON ``[[title, text], …]``, or status 204 without data.
 
-        The header ``x-urc-old`` marks the last image of a session that has ended, and
-        ``x-urc-picture`` the robot's picture, which seldom changes.
+        The header ``x-urc-old`` marks the last image of a session that has ended. The header
+        ``x-urc-picture`` marks the robot's picture, which seldom changes.
         """
         name = request.path_params["name"]
         service = self._services().get(name)

@@ -1,4 +1,4 @@
-"""One cell of a page: the widget's markup, and the configuration for the widget's module.
+"""One cell of a page: the widget's markup and the configuration for the widget's module.
 
 Layer 5. Packages provide the widget templates. The templates run in a sandbox, and a failed
 template affects only its own cell.
@@ -65,7 +65,7 @@ class WidgetContext:
     """
 
     title: str
-    """Title of the slot. Without a slot title, this is the title of the first required signal, the
+    """Title of the slot. A slot without a title gets the title of the first required signal, the
     first command, the first signal or the widget, in this order."""
     options: Mapping[str, object]
     """Checked options. Every declared option has a key; None means that the option has no value."""

@@ -93,7 +93,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
 def _signals(
     declared: Mapping[str, Any],
 ) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the signals, and the bindings of single inputs and multiple inputs."""
+    """Return the signals and the bindings of single inputs and of multiple inputs."""
     signals: dict[str, Signal] = {}
     inputs: dict[str, str] = {}
     lists: dict[str, tuple[str, ...]] = {}
@@ -163,7 +163,7 @@ def _readings(
     inputs: Mapping[str, str],
     lists: Mapping[str, tuple[str, ...]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield one reading per signal: its value or image, its age in seconds, and its alarm."""
+    """Yield one reading per signal: its value or image, its age in seconds and its alarm."""
     ages, alarms = shown.get("age_s", 0.0), shown.get("alarms") or {}
     for name, value in (shown.get("values") or {}).items():
         many = name in lists

@@ -83,7 +83,7 @@ class ExternalPages:
 
 
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
-    """Return the document around a page from a widget option; respond with 404 for other pages.
+    """Return the document around a page from a widget option; raise status 404 for other pages.
 
     Pages from this server are refused, because they could access the dashboard from the frame.
     """

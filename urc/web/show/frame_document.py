@@ -1,7 +1,7 @@
 """The document in the frame of a third-party widget: an empty cell and an import map.
 
 Layer 5. The document contains no robot data; the page passes in the markup and values
-(``frame_host.js``). The document's policy permits code from a few paths, and blocks all other
+(``frame_host.js``). The document's policy permits code from a few paths and blocks all other
 network access.
 """
 

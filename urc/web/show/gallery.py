@@ -51,7 +51,7 @@ class WidgetLookup:
 
     Args:
         profiles: function that returns the profiles of the served robots.
-        is_fresh: whether each look-up reads the manifest again; if false, look-ups return the
+        is_fresh: whether each look-up reads the manifest again; otherwise, look-ups return the
             robots' loaded widgets.
     """
 

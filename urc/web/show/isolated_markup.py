@@ -1,7 +1,7 @@
 """Rendering of third-party widget templates in a separate process, with memory and time limits.
 
-``python -m urc.web.show.isolated_markup`` reads templates and variables as JSON from standard
-input, and writes the markup to standard output. Layer 5.
+``python -m urc.web.show.isolated_markup`` reads templates and variables as JSON from standard input
+and writes the markup to standard output. Layer 5.
 
 The template sandbox blocks access to Python objects but cannot stop endless loops. Markup is
 cached, because it depends only on the template, variables and language.

@@ -4,19 +4,19 @@ Layer 5. Pure. The rules contain only numbers, so no text from a document can cl
 element.
 
 A row or column without a slot is a margin. The margin keeps its position, at an eighth of the
-normal size. Phones show no margins. A phone in portrait shows the first grid that is available out
-of ``phone_portrait``, ``portrait`` and ``landscape``. It stacks the slots of ``portrait`` or
-``landscape`` in reading order if the grid has more than two columns. A phone in landscape shows
-``phone_landscape``, or else ``landscape``.
+normal size. Phones show no margins. A phone in portrait shows the first available grid of
+``phone_portrait``, ``portrait`` and ``landscape``. If this grid is ``portrait`` or ``landscape``
+and has more than two columns, the phone stacks the slots in reading order. A phone in landscape
+shows ``phone_landscape``, or else ``landscape``.
 
-Over a background, each widget has the size of its footprint, and is placed on its slot's side of
-the screen. Empty rows and columns fill the remaining space, where the background is visible. On a
-phone in portrait, the background fills the space above the widgets; values in the first two
-rows are over its lower edge.
+Over a background, each widget has the size of its footprint and is placed on its slot's side of the
+screen. Empty rows and columns fill the remaining space, where the background is visible. On a phone
+in portrait, the background fills the space above the widgets; values in the first two rows cover
+its lower edge.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
-extend down next to it. Over a background, columns of buttons and values in the corners also extend
-down, but rows of buttons and values do not.
+extend down next to STOP. Over a background, columns of buttons and values in the corners also
+extend down, but rows of buttons and values do not.
 
 A screen's grid can lack slots of the base grid, which is ``landscape`` or else the first grid. A
 button then switches to a second page with these slots.
@@ -46,16 +46,17 @@ LEFT_HAND = ':root[data-hand="left"]'
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
 """Row height on a phone in landscape, where two such rows fit on the screen. A phone in portrait
-uses it for rows of values and buttons, so that a stick next to two such rows is above STOP."""
+uses this height for rows of values and buttons, so that a stick next to two such rows is above
+STOP."""
 _OVER, _WINDOW = "auto", "minmax(0,1fr)"
-"""Sizes of rows and columns over a background: with a widget, and without."""
+"""Sizes of a row or column over a background: with a widget and without a widget."""
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _GAP = "var(--urc-space-3)"
 """Space between the rows of a grid."""
 _MOST_COVERED = 2
 """Maximum number of rows of values over the background on a phone in portrait. More rows would hide
-its middle, for example the robot on a map."""
+the middle of the background, for example the robot on a map."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
 do."""
@@ -137,7 +138,7 @@ def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
 
 
 def _button(place: str, grids: Mapping[str, Layout], hand: str = "") -> Iterator[str]:
-    """Yield the rules that show the button for the missing slots; `hand` as for `_screens`."""
+    """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
         count = len(_missing(grids, screen))
         shown = f'display:inline-flex;--urc-rest:"+{count}"' if count else "display:none"
@@ -166,7 +167,7 @@ def mirrored(grid: Layout) -> Layout:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone in portrait shows a layout other than the designed layout."""
+    """Return whether a phone in portrait shows a layout that differs from the designed layout."""
     base = _placed(page.layouts, _Canvas(slots)).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
@@ -267,7 +268,8 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
     """Return the row sizes over a background.
 
     Next to a slot with several rows, such as a stick, only the first row grows. The widgets next to
-    it are therefore close together. On a low screen, rows of views shrink.
+    the tall slot are therefore close together. On a low screen, rows that contain only shrinking
+    footprints, such as views, shrink.
     """
     firm = _used((slot.row, slot.row_span) for slot in grid.slots if _is_firm(slot, canvas))
     lower = _used((slot.row + 1, slot.row_span - 1) for slot in grid.slots)
@@ -365,7 +367,7 @@ def _third(first: int, span: int, count: int) -> int:
 
 
 def _place(slot: Slot | None, grid: Layout, canvas: _Canvas, is_below: bool) -> str:
-    """Return the rules for one cell; with `is_below`, the background fills the first row."""
+    """Return the rules for one cell; if `is_below` is true, the background fills the first row."""
     if slot is None:
         return "display:none"
     row, column = slot.row + 1 + is_below, slot.column + 1

@@ -1,4 +1,4 @@
-"""The menu with all served robots and their settings, and the navigation between pages.
+"""The menu with all served robots and their settings, as well as the navigation between pages.
 
 Layer 5. Pure. The template `menu.html.j2` receives a `MenuPage`; all other pages except robot pages
 have a `Nav`.

@@ -21,7 +21,7 @@ _NOTHING_GIVEN = OutputBinding()
 
 
 def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return the inputs' signals, and their conversions to the widget's units."""
+    """Return the inputs' signals and their conversions to the widget's units."""
     bound: dict[str, str | list[str]] = {**use.inputs}
     bound |= {name: list(many) for name, many in use.lists.items()}
     found: dict[str, list[dict[str, object] | None]] = {}
@@ -125,15 +125,16 @@ def motion_lines(driver: Driver) -> list[str]:
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport whose loss disables the command; "" if there is no such transport."""
+    """Return the transport whose loss disables the command; "" if no transport does so."""
     line = command.transport if command else ""
     return "" if opens_on_demand(line, driver) else line
 
 
 def opens_on_demand(transport: str, driver: Driver) -> bool:
-    """Return whether only a command opens the transport.
+    """Return whether the transport is opened only by commands.
 
-    Losing a transport of this kind disables no controls, because the next command reopens it.
+    The loss of such a transport disables no controls, because the next command reopens the
+    transport.
     """
     spec = driver.transports.get(transport)
     is_polled = any(poll.transport == transport for poll in driver.polls)
@@ -188,7 +189,7 @@ def mark(text: str) -> str:
 
 
 def _step_words(step: sequence.Step) -> dict[str, str]:
-    """Return a step's name as a catalogue key, and the value for its ``{what}``."""
+    """Return a step's name as a catalogue key and the value for its ``{what}``."""
     match step:
         case sequence.RunStep(command):
             return {"text": mark("run {what}"), "what": command}

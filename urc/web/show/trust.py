@@ -1,4 +1,4 @@
-"""The connection page: the browser's features at this address, and trust in the authority.
+"""The connection page: the browser's features at this address and trust in the authority.
 
 Layer 5. The page and the certificate contain no data about robots. Everyone may load both, even
 over plain HTTP, because a device needs them before it trusts the certificate.
@@ -57,9 +57,12 @@ _GUIDES: Final = (
         "ios",
         "iPhone, iPad",
         (
-            phrase("Download it in Safari, and allow the profile."),
+            phrase("Download the certificate in Safari, and allow the profile."),
             phrase("Open Settings, General, VPN & Device Management: install the profile."),
-            phrase("Open Settings, General, About, Certificate Trust Settings: turn it on."),
+            phrase(
+                "Open Settings, General, About, Certificate Trust Settings: turn on trust for the"
+                " certificate."
+            ),
         ),
         phrase("Open Settings, General, VPN & Device Management: remove the profile."),
     ),
@@ -68,17 +71,28 @@ _GUIDES: Final = (
         "Windows (Chrome, Edge)",
         (
             phrase("Open the file, and choose “Install Certificate”, then “Current User”."),
-            phrase("Place it in the store “Trusted Root Certification Authorities”, and confirm."),
+            phrase(
+                "Place the certificate in the store “Trusted Root Certification Authorities”, and"
+                " confirm."
+            ),
             phrase("Close all windows of the browser, and open it again."),
         ),
-        phrase("Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete it."),
+        phrase(
+            "Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete the"
+            " certificate."
+        ),
     ),
     DeviceGuide(
         "macos",
         "macOS (Safari, Chrome)",
         (
-            phrase("Open the file: Keychain Access adds it to the login keychain."),
-            phrase("Open it there, open “Trust”, and choose “Always Trust” for SSL."),
+            phrase(
+                "Open the file. Keychain Access then adds the certificate to the login keychain."
+            ),
+            phrase(
+                "In Keychain Access, open the certificate and its section “Trust”. Choose “Always"
+                " Trust” for SSL."
+            ),
         ),
         phrase("Delete the certificate in Keychain Access."),
     ),

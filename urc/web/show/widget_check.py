@@ -172,7 +172,7 @@ class _TemplateCheck:
 
 
 def _asked(tree: nodes.Template) -> set[int]:
-    """Return the template nodes in existence tests."""
+    """Return the template nodes whose existence the template tests."""
     tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
     filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
     return {id(node) for node in (*tests, *filters)}

@@ -1,4 +1,4 @@
-"""Encoders for the messages about the controls, and the decoder for ticks.
+"""Encoders for the messages about the controls and the decoder for ticks.
 
 Layer 5. `urc.web.wire.messages` documents the direction of each message.
 """
@@ -50,11 +50,11 @@ decode_tick = msgspec.json.Decoder(Tick).decode
 """Decoder for probable ticks; raises one of the exceptions in `NO_TICK` for any other text."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
-"""First bytes of a page's tick; decoding ticks in any other form takes longer."""
+"""First bytes of a page's tick; ticks that begin differently take longer to decode."""
 
 
 def command_of(data: bytes) -> str:
-    """Return a tick's command from its first bytes; "" if they do not contain the command."""
+    """Return the command in a tick's first bytes; "" if they do not contain the command."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 

@@ -29,8 +29,9 @@ Messages from the server to the page, listed by their tag ``t``::
 Images are sent as binary messages; see `urc.web.wire.picture`.
 
 Messages from the page to the server are ``ping``, ``run``, ``show``, ``agree``, ``prepare`` and
-``steer``, and for the controls ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases and
-stops may also use a redundant socket, which starts with ``spare`` and receives heartbeats.
+``steer``. For the controls, they are ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases
+and stops may also use a redundant socket, which begins with the message ``spare`` and receives
+heartbeats.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -108,7 +109,7 @@ def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Mess
     """Return the decoded message from a page.
 
     Raises:
-        BadMessage: the message is too long, or matches none of the decoder's types.
+        BadMessage: the message is too long or matches none of the decoder's types.
     """
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"the message is longer than {INBOUND_BYTES} bytes")
@@ -148,7 +149,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Indexes of signal names, with a cache for the last look-up."""
+    """Indexes of signal names, with a cache of the last look-up."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
@@ -238,7 +239,7 @@ def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
 
 
 def encode_error(code: str, message: str) -> str:
-    """Return the message with the reason why a message was invalid, or why the socket closes."""
+    """Return the message that says why a message was invalid or why the socket closes."""
     return encoded(ErrorMessage(code, cut(message)))
 
 

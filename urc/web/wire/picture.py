@@ -23,7 +23,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     """Return the binary message with an image.
 
     Args:
-        index: index of the signal in the names in `HelloMessage`.
+        index: index of the signal in the `names` of `HelloMessage`.
         data: the robot's image.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.

@@ -1,4 +1,4 @@
-"""Encoding of messages to pages: the base type, and the repair of invalid text.
+"""Encoding of messages to pages: the base type and the repair of invalid text.
 
 Layer 5.
 """

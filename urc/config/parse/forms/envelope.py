@@ -35,7 +35,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         return None
     if part.name == "request" and ("url" in part.data) == ("path" in part.data):
         both = "url" in part.data
-        text = "'path' and 'url' exclude each other" if both else "'path' is missing"
+        text = "'path' and 'url' cannot be used together" if both else "'path' is missing"
         hint = "write 'path', or 'url' for an address from the robot itself"
         problems.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None

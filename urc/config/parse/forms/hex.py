@@ -1,4 +1,4 @@
-"""The ``hex`` form: pairs of hex digits, and expressions with a given width."""
+"""The ``hex`` form: pairs of hex digits and expressions with a given width."""
 
 import re
 from collections.abc import Iterable

@@ -58,7 +58,7 @@ def _our_type(found: re.Match[str]) -> str:
 def unknown_type(
     part: Node, word: str, types: Iterable[str], problems: Problems, *, only_types: bool = False
 ) -> None:
-    """Report an unknown type, and suggest a known type."""
+    """Report an unknown type and suggest a known type."""
     plain = _NUMBER_WORD.fullmatch(word.lower())
     if plain and number_of(other := _our_type(plain)) is not None:
         hint = f"use the type '{other}'"
