@@ -13,6 +13,8 @@ from urc.shipped import shipped
 
 PARAMS = "params: { ros: 1, speed: 0.5, back: -0.5, turn: 1.0, right: -1.0, watchdog: none }"
 
+NAMES = sorted(file.stem for file in shipped("robots").glob("*.yaml"))
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Folder:
@@ -46,6 +48,13 @@ def test_a_robot_is_extended_by_its_name(folder: Folder) -> None:
     """With the driver and the interfaces that it names, relative to where it stands."""
     folder.write(mine=head("robot", "mine") + "extends: generic-ros1\ntitle: Mine\n")
     assert found(folder, "mine") == ()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_shipped_robot_is_extended_by_its_name(name: str, folder: Folder) -> None:
+    """The files of its widgets, such as a model, are in the folder of the shipped robot."""
+    folder.write(mine=head("robot", "mine") + f"extends: {name}\ntitle: Mine\n")
+    assert [problem for problem in found(folder, "mine") if problem.severity == "error"] == []
 
 
 def test_a_robot_that_extends_one_changes_its_driver(folder: Folder) -> None:

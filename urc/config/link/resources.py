@@ -1,7 +1,8 @@
 """Checks files and web pages in a widget's options.
 
 The dashboard serves only the files that a document names for its widgets. Served files must be in
-the document's folder, so packages cannot publish other files on the server.
+the folder of the document that names them, so packages cannot publish other files on the server. In
+a document that extends another, inherited names refer to the folder of the extended document.
 
 A page's content security policy contains the host of every embedded web page. The URLs of embedded
 web pages must therefore be unambiguous to all browsers.
@@ -58,13 +59,14 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
         fault = _file_fault(part.data)
-        place = FilePath(part.document.file).absolute().parent / part.data
+        home = FilePath(part.document.source_of(part.path).file).absolute().parent
+        place = home / part.data
         if fault:
             hint = "name a file in this document's folder or a subfolder"
             problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
         elif not place.is_file():
             problems.error(part, "no-such-file", f"there is no file {part.data!r}")
-        elif not _is_below(place, FilePath(part.document.file).absolute().parent):
+        elif not _is_below(place, home):
             problems.error(part, "file-not-served", f"{part.data!r} is outside this folder")
         elif place.stat().st_size > MOST_BYTES:
             text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
