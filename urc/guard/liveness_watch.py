@@ -1,4 +1,4 @@
-"""Detection of programs that freeze at the other end of a connection during motion."""
+"""Detection of remote programs that freeze during motion."""
 
 import asyncio
 from collections.abc import Callable

@@ -249,7 +249,7 @@ class _ReadGenerator:
         return "{" + ", ".join(found) + "}" if found or wanted else ""
 
     def _counter(self) -> str:
-        """Read the count before a text or a sequence."""
+        """Read the count that precedes a string or a sequence."""
         name = self._number("I", True)
         self._flush()
         return name

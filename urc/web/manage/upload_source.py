@@ -24,7 +24,7 @@ __all__ = ["given_source", "source_at"]
 
 _DOCUMENTS: Final = (".yaml", ".yml")
 _BYTES: Final = 262_144
-"""Maximum size of a document without a package, in bytes."""
+"""Maximum size of a document uploaded outside a package, in bytes."""
 
 
 def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:

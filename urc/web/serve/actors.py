@@ -1,4 +1,4 @@
-"""The sender of a request, with the name that other people and the audit log show.
+"""The sender of a request, with the name shown to other people and in the audit log.
 
 Layer 5. Pure.
 """
