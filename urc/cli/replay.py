@@ -67,17 +67,19 @@ def run(arguments: argparse.Namespace) -> int:
         complain(f"urc replay: {recording.file} is damaged or truncated: {lost}")
     elif recording.unread_bytes:
         complain(f"urc replay: {recording.file} is incomplete; the last second may be missing")
-    profile = load(arguments.profile) if arguments.profile else _profile_in(recording)
-    player = Player(
-        recording,
-        profile,
-        sample_settings(profile.settings),
-        speed=arguments.speed,
-        start_s=start_s,
-        is_looped=arguments.loop,
-    )
-    serving = _serve(player, arguments.host, arguments.port, tls_of(arguments))
-    return run_loop(serving, code_when_ended=0)
+    with TemporaryDirectory(prefix="urc-replay-") as folder:
+        given = arguments.profile
+        profile = load(given) if given else _profile_in(recording, Path(folder))
+        player = Player(
+            recording,
+            profile,
+            sample_settings(profile.settings),
+            speed=arguments.speed,
+            start_s=start_s,
+            is_looped=arguments.loop,
+        )
+        serving = _serve(player, arguments.host, arguments.port, tls_of(arguments))
+        return run_loop(serving, code_when_ended=0)
 
 
 async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int:
@@ -99,16 +101,18 @@ async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int
     return 0
 
 
-def _profile_in(recording: "Recording") -> "Profile":
-    """Return the profile stored in a recording."""
-    with TemporaryDirectory(prefix="urc-replay-") as folder:
-        file = Path(folder, "profile.yaml")
-        file.write_text(recording.document, encoding="utf-8")
-        try:
-            return load(str(file))
-        except ProblemsError as error:
-            line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
-            raise UrcError(f"{line}; select another profile with --profile") from None
+def _profile_in(recording: "Recording", folder: Path) -> "Profile":
+    """Unpack the profile stored in a recording into a folder, with the files of its widgets."""
+    from urc.runtime.recording.widget_files import unpack_files
+
+    unpack_files(recording.files, folder)
+    file = folder / "profile.yaml"
+    file.write_text(recording.document, encoding="utf-8")
+    try:
+        return load(str(file))
+    except ProblemsError as error:
+        line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
+        raise UrcError(f"{line}; select another profile with --profile") from None
 
 
 def _speed(text: str) -> float:

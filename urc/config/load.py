@@ -114,8 +114,7 @@ def check(
     else:
         profile = _profile(sources, catalog, registry, problems)
     if profile is not None:
-        uses += profile.slots.values()
-        uses += [use for each in profile.interfaces.values() for use in each.widgets.values()]
+        uses += profile.uses()
     reported += sorted(problems, key=lambda one: (one.file != path, one.file, one.line, one.column))
     reported += registry.problems
     reported = _told_once(reported)

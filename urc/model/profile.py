@@ -1,6 +1,6 @@
 """A robot profile: settings, driver, interfaces and tests of one robot."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from urc.expressions import Template
@@ -221,3 +221,9 @@ class Profile(NamedTuple):
     different."""
     picture: str = ""
     """Path of the robot's picture; "" without a picture."""
+
+    def uses(self) -> Iterator[WidgetUse]:
+        """Yield the use of a widget in every filled slot of the profile and its interfaces."""
+        yield from self.slots.values()
+        for interface in self.interfaces.values():
+            yield from interface.widgets.values()

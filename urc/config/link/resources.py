@@ -20,7 +20,7 @@ from urc.model.widget import Widget
 
 __all__ = [
     *("FILE_TYPES", "LONGEST_URL", "MOST_BYTES", "MOST_PICTURE_BYTES", "PICTURE_TYPES"),
-    *("find_picture", "link_files", "link_pages", "named_texts"),
+    *("file_fault", "find_picture", "link_files", "link_pages", "named_texts"),
 ]
 
 FILE_TYPES: Final = (
@@ -58,7 +58,7 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
     """
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
-        fault = _file_fault(part.data)
+        fault = file_fault(part.data)
         home = FilePath(part.document.source_of(part.path).file).absolute().parent
         place = home / part.data
         if fault:
@@ -110,7 +110,8 @@ def named_texts(
             yield from ((name, each) for each in part.items() if isinstance(each.data, str))
 
 
-def _file_fault(name: str) -> str:
+def file_fault(name: str) -> str:
+    """Return the reason why a name cannot be that of a widget's file; "" for a possible name."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
         return "is not a path inside this folder"

@@ -17,7 +17,8 @@ from urc.model.values import NOTHING
 from urc.problems import UrcError
 from urc.runtime.recording.events import is_state
 from urc.runtime.recording.recorder import check_installed
-from urc.runtime.recording.shapes import LOG, PROFILE
+from urc.runtime.recording.shapes import FILES, LOG, PROFILE
+from urc.runtime.recording.widget_files import MOST_FILE_BYTES
 
 __all__ = ["RecordedMessage", "Recording", "open_recording"]
 
@@ -49,6 +50,8 @@ class Recording(NamedTuple):
     unread_bytes: int = 0
     """Number of unreadable bytes at the end; -1 if the file is readable but lacks its end
     records."""
+    files: Mapping[str, bytes] = NOTHING
+    """Files of the robot's widgets, by their name in the document."""
 
     @property
     def length_s(self) -> float:
@@ -87,10 +90,14 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
 
     document, times, is_whole, size = "", [], False, 0
     topics: dict[int, str] = {}
+    files: dict[str, bytes] = {}
     with _opened(file) as stream:
         for record in _records(file, stream):
             if isinstance(record, Attachment) and record.name == PROFILE:
                 document = record.data.decode("utf-8", "replace")
+            elif isinstance(record, Attachment) and record.name.startswith(FILES):
+                if len(record.data) + sum(map(len, files.values())) <= MOST_FILE_BYTES:
+                    files[record.name.removeprefix(FILES)] = record.data
             elif isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Chunk):
@@ -106,7 +113,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
         why = f"{left} bytes cannot be read" if left > 0 else "the recording has only just begun"
         raise UrcError(f"{file} contains nothing to play: {why}")
     unread = 0 if is_whole else left or -1
-    return Recording(file, document, min(times), max(times), topics, unread)
+    return Recording(file, document, min(times), max(times), topics, unread, files)
 
 
 def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[RecordedMessage]:

@@ -29,6 +29,7 @@ from urc.model.values import Sample
 from urc.problems import UrcError
 from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, RecordingEncoder, channels
+from urc.runtime.recording.widget_files import attach_files
 from urc.runtime.widget_registry import widget_folder_of
 
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
@@ -188,6 +189,9 @@ class Recorder:
         if document:
             data, now_ns = document.encode(), time.time_ns()
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
+            for name in attach_files(writer, profile):
+                text = f"the recording lacks {name}; replay the recording with --profile"
+                self.record([LogEntry(time.monotonic(), "warning", "recording", text)])
         else:
             text = f"{profile.file}: the document is missing; replay the recording with --profile"
             self.record([LogEntry(time.monotonic(), "warning", "recording", text)])

@@ -32,6 +32,7 @@ __all__ = [
     "COMMANDS",
     "DRIVING",
     "LEVELS",
+    "FILES",
     "LINK",
     "LOG",
     "PROFILE",
@@ -44,6 +45,8 @@ __all__ = [
 
 PROFILE: Final = "profile.yaml"
 """Name of the attachment that contains the robot's complete document."""
+FILES: Final = "files/"
+"""Start of the names of attachments that contain the files of widgets."""
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"

@@ -6,7 +6,7 @@ way; ``external_pages.py`` builds the documents around them.
 """
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import quote
@@ -18,7 +18,7 @@ from starlette.responses import FileResponse, Response
 from urc.model.interface import WidgetUse
 from urc.model.profile import Profile
 
-__all__ = ["TILE_TYPES", "linked_options", "page_key", "picture", "robot_file", "tile", "uses_of"]
+__all__ = ["TILE_TYPES", "linked_options", "page_key", "picture", "robot_file", "tile"]
 
 MEDIA_TYPES = {
     ".urdf": "application/xml",
@@ -78,13 +78,6 @@ def page_key(url: str) -> str:
     return hashlib.blake2b(url.encode(), digest_size=8).hexdigest()
 
 
-def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield the use of a widget in every filled slot of the profile and its interfaces."""
-    yield from profile.slots.values()
-    for interface in profile.interfaces.values():
-        yield from interface.widgets.values()
-
-
 def _key(name: str, place: str) -> str:
     # The digest distinguishes files with the same name. The path follows the digest, because models
     # refer to their parts by path.
@@ -93,7 +86,7 @@ def _key(name: str, place: str) -> str:
 
 def robot_file(profile: Profile, key: str, request: Request) -> Response:
     """Return a file that the profile lists for a widget; raise status 404 for any other key."""
-    uses = uses_of(profile)
+    uses = profile.uses()
     table = {_key(name, place): place for use in uses for name, place in use.files.items()}
     if key not in table:
         raise HTTPException(404)

@@ -20,7 +20,7 @@ from starlette.responses import HTMLResponse, Response
 from urc.model.profile import Profile
 from urc.web import words
 from urc.web.fleet.robots import Robot
-from urc.web.load.files import page_key, robot_file, uses_of
+from urc.web.load.files import page_key, robot_file
 from urc.web.serve.policy import is_origin_ours, parse_host
 from urc.web.serve.rights import WATCH, ProtectedRoute
 from urc.web.show.pages import render
@@ -87,7 +87,7 @@ def framed_page(profile: Profile, key: str, request: Request) -> Response:
 
     Pages from this server are refused, because they could access the dashboard from the frame.
     """
-    pages = (many for use in uses_of(profile) for many in use.pages.values())
+    pages = (many for use in profile.uses() for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}
     url = urls.get(key)
     if url is None:
