@@ -133,8 +133,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """How many times frames of the engine were refused because their counters were already
-        used."""
+        """How often frames of the engine were refused because their counters were already used."""
 
     # -- requests from the engine
 
