@@ -176,6 +176,14 @@ async def test_guard_that_must_stop_its_robot_waits_for_no_turn(
     ]
 
 
+async def test_stop_without_a_guard_is_no_fault(house: House) -> None:
+    """The session has not started its guard yet; nothing can move."""
+    house.guard.arm("drive", TERMS)
+    house.guard.stop({"drive": STOP})
+    house.channel.post(MAKE, is_urgent=True)
+    assert house.started == []
+
+
 async def test_guard_that_is_not_needed_any_more_is_never_started(
     house: House, turns: StartTurns
 ) -> None:

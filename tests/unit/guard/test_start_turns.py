@@ -89,5 +89,19 @@ async def test_guards_of_one_event_loop_share_its_turns(monkeypatch: pytest.Monk
         assert it.names == [*"abcdefghi"[:most]]
 
 
+@pytest.mark.parametrize(("processors", "most"), [(None, 1), (1, 1), (3, 2), (64, 4)])
+async def test_a_system_that_hides_what_a_process_may_use_counts_all_processors(
+    monkeypatch: pytest.MonkeyPatch, processors: int | None, most: int
+) -> None:
+    """Or none: then one guard starts at a time."""
+    monkeypatch.setattr(module, "_turns", {})
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: processors)
+    it = Launches(0)
+    it.turns = start_turns()
+    it.take(*"abcdefghi")
+    assert it.names == [*"abcdefghi"[:most]]
+
+
 async def _own() -> StartTurns:
     return start_turns()
