@@ -1,11 +1,13 @@
-"""What a cell says of a template that fails."""
+"""What a cell says of a template that fails, and of a hazardous command."""
 
 import shutil
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from urc.config.parse.widget import WidgetFolder
+from urc.model.exchange import Confirm
 from urc.shipped import shipped
 from urc.web.show.cells import widget_cell
 from urc.web.show.demos import demo_states
@@ -29,3 +31,18 @@ def test_it_says_in_which_line(tmp_path: Path, template: str, error: str) -> Non
     cell = widget_cell(0, state.use, state.profile)
     assert cell.html == ""
     assert cell.error.startswith(error)
+
+
+@pytest.mark.parametrize("level", ["normal", "hazardous"])
+def test_a_button_warns_of_a_slide(level: Literal["normal", "hazardous"]) -> None:
+    """Before the first tap. A question of the normal level is no hazard."""
+    widget = WidgetFolder(shipped("widgets")).get("button")
+    assert widget is not None
+    state = next(one for one in demo_states(widget) if one.name == "normal")
+    (command,) = state.use.outputs.values()
+    commands = state.profile.driver.commands
+    asked = commands[command]._replace(confirm=Confirm(level, "The drone will fall."))
+    driver = state.profile.driver._replace(commands=commands | {command: asked})
+    cell = widget_cell(0, state.use, state.profile._replace(driver=driver))
+    assert ("then slide to agree" in cell.html) == (level == "hazardous")
+    assert ("data-hazardous" in cell.html) == (level == "hazardous")

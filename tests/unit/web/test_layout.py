@@ -329,7 +329,7 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
         part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
-    assert '[data-rest]{display:inline-flex;--urc-rest:"+1"}' in text
+    assert '[data-rest]{display:inline-flex;--urc-rest:"1"}' in text
     assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
 
 

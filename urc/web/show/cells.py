@@ -79,6 +79,8 @@ class WidgetContext:
     outputs: Mapping[str, str] = field(default_factory=dict)
     """Readable name of each output's command, by output name. Unbound outputs are omitted, so that
     a widget can omit their controls."""
+    hazardous: tuple[str, ...] = ()
+    """Outputs whose command always asks a question that is answered with a slide."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
@@ -124,7 +126,8 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
     first = single | {name: many[0] for name, many in several.items() if many}
     title = use.title or _heading(widget, first, outputs)
     options = {**declared, **linked_options(use, profile.name)}
-    return WidgetContext(title, options, {**single, **several}, widget.name, uid, outputs)
+    hazards = tuple(name for name, one in use.outputs.items() if _is_hazardous(one, profile))
+    return WidgetContext(title, options, {**single, **several}, widget.name, uid, outputs, hazards)
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
@@ -141,6 +144,11 @@ def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str,
         given = [called for name, called in outputs.items() if name not in aside]
         about = [*given, *about, *(outputs[name] for name in aside)]
     return next(iter(about), widget.title)
+
+
+def _is_hazardous(command: str, profile: Profile) -> bool:
+    known = profile.driver.commands.get(command)
+    return known is not None and known.confirm is not None and known.confirm.level == "hazardous"
 
 
 def _called(command: str, driver: Driver) -> str:

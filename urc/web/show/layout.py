@@ -141,7 +141,7 @@ def _button(place: str, grids: Mapping[str, Layout], hand: str = "") -> Iterator
     """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
         count = len(_missing(grids, screen))
-        shown = f'display:inline-flex;--urc-rest:"+{count}"' if count else "display:none"
+        shown = f'display:inline-flex;--urc-rest:"{count}"' if count else "display:none"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
 
