@@ -72,7 +72,7 @@ def test_a_grid_of_another_document_gives_way_to_tabs(folder: Folder) -> None:
         (
             "x: { tabs: { one: { grid: a } }, grid: b }",
             "misplaced-key",
-            "'grid' and 'tabs' exclude",
+            "'grid' and 'tabs' cannot be used",
         ),
         (
             "x: { tabs: { one: { title: O } } }",
