@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 
-from urc.config.link.outputs import link_output, takes
+from urc.config.link.outputs import Misfit, link_output, takes
 from urc.config.link.required_together import link_together
 from urc.config.link.resources import link_files, link_pages
 from urc.config.node import Node, Problems
@@ -255,32 +255,40 @@ def _check_signal(
         return
     wrong = misfit(port, signal)
     if wrong:
-        code = "wrong-unit" if wrong.startswith("unit") else "wrong-type"
-        problems.error(
-            part,
-            code,
-            f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}: {wrong}",
-        )
+        text = f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}"
+        problems.error(part, wrong.code, f"{text}: {wrong.text}")
 
 
-def misfit(port: WidgetPort, signal: Signal) -> str:
-    """Return why a signal does not fit an input; "" if the signal fits."""
+def misfit(port: WidgetPort, signal: Signal) -> Misfit | None:
+    """Return why a signal does not fit an input; None if the signal fits."""
+    text = _wrong_type(port, signal)
+    if text:
+        return Misfit("wrong-type", text)
+    text = _wrong_unit(port, signal)
+    return Misfit("wrong-unit", text) if text else None
+
+
+def _wrong_type(port: WidgetPort, signal: Signal) -> str:
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
         wanted = " or ".join(port.types)
         return f"type {wanted} is expected, but the signal has type {signal.type}"
-    if signal.type == "array":
-        of = (*port.items, "integer") if "number" in port.items else port.items
-        if of and signal.items not in of:
-            wanted = " or ".join(port.items)
-            return f"an array of {wanted} is expected, but the signal is an array of {signal.items}"
-        if None not in (port.size, signal.size) and port.size != signal.size:
-            return f"an array of {port.size} elements is expected, but the signal has {signal.size}"
+    if signal.type != "array":
+        return ""
+    of = (*port.items, "integer") if "number" in port.items else port.items
+    if of and signal.items not in of:
+        wanted = " or ".join(port.items)
+        return f"an array of {wanted} is expected, but the signal is an array of {signal.items}"
+    if None not in (port.size, signal.size) and port.size != signal.size:
+        return f"an array of {port.size} elements is expected, but the signal has {signal.size}"
+    return ""
+
+
+def _wrong_unit(port: WidgetPort, signal: Signal) -> str:
     if port.unit and conversion(signal.unit, port.unit) is None:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
         return f"unit {port.unit!r} is expected, but the signal is {has}"
-    measured = quantity_of(signal.unit)
-    if port.quantity and measured not in ("", port.quantity):
+    if port.quantity and quantity_of(signal.unit) not in ("", port.quantity):
         return f"a unit of {port.quantity} is expected, but the signal is in {signal.unit!r}"
     return ""
 

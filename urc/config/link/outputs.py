@@ -1,7 +1,7 @@
 """Links a widget's outputs to the driver's commands."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 from urc.config.link.flow import check_value
 from urc.config.node import Node, Problems
@@ -13,7 +13,7 @@ from urc.model.interface import OutputBinding
 from urc.model.units import are_apart
 from urc.model.widget import Widget, WidgetPort
 
-__all__ = ["link_output", "takes"]
+__all__ = ["Misfit", "link_output", "takes"]
 
 _GIVERS: Final = {
     "integer": "slider, knob, number",
@@ -22,6 +22,13 @@ _GIVERS: Final = {
     "string": "text",
 }
 """Names of the shipped widgets that provide a value, by value type."""
+
+
+class Misfit(NamedTuple):
+    """The reason why a signal or an argument does not fit a widget's input or output."""
+
+    code: Literal["wrong-type", "wrong-unit"]
+    text: str
 
 
 def link_output(
@@ -159,10 +166,10 @@ def _check_values(
         if wrong and source in port.arguments:
             problems.error(
                 _place(part, source),
-                "wrong-unit" if wrong.startswith("unit") else "wrong-type",
+                wrong.code,
                 f"{source!r} of widget {widget.name!r} does not fit argument {target!r} of command"
-                f" {command.name!r}: {wrong}",
-                hint="" if wrong.startswith("unit") else _giver(command.arguments[target]),
+                f" {command.name!r}: {wrong.text}",
+                hint="" if wrong.code == "wrong-unit" else _giver(command.arguments[target]),
             )
 
 
@@ -233,14 +240,16 @@ def _is_of_type(port: WidgetPort, argument: Argument) -> bool:
     return not types or argument.type in fitting
 
 
-def _misfit(port: WidgetPort, argument: Argument) -> str:
-    """Return why an output's value does not fit an argument; "" if the value fits."""
+def _misfit(port: WidgetPort, argument: Argument) -> Misfit | None:
+    """Return why an output's value does not fit an argument; None if the value fits."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
-        return f"the value has type {given}, but the argument has type {argument.type}"
+        text = f"the value has type {given}, but the argument has type {argument.type}"
+        return Misfit("wrong-type", text)
     if port.unit and are_apart(port.unit, argument.unit):
-        return f"unit {port.unit!r} is given, but the argument is in {argument.unit!r}"
-    return ""
+        text = f"unit {port.unit!r} is given, but the argument is in {argument.unit!r}"
+        return Misfit("wrong-unit", text)
+    return None
 
 
 def _place(part: Node, source: str) -> Node:
