@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
@@ -57,6 +57,8 @@ class Outcome:
     fault: str
     """Reason for the failure; "" if the step passed."""
     seconds: float
+    failed_tests: tuple[str, ...] = ()
+    """A line of pytest for each failed test: its name and its error."""
 
 
 STATIC = (
@@ -67,6 +69,8 @@ STATIC = (
     Step("docs", (PYTHON, "-m", "scripts.docs", "--links")),
 )
 PYTEST = (PYTHON, "-m", "pytest")
+PYTEST_COLUMNS = "250"
+"""Width of pytest's output, in characters; pytest shortens the error of a failed test to it."""
 
 
 _HALF_OF_UNIT = (
@@ -195,18 +199,22 @@ async def _run_all(
 
 
 async def _shown(step: Step, environment: Mapping[str, str]) -> Outcome:
-    """Run a step, then show its output."""
+    """Run a step, then show its output; collect the names of its failed tests."""
     # pytest also removes the folders of earlier runs. Two processes at once would disturb each
     # other, so each step has a root of its own.
     with (
         TemporaryDirectory(prefix="urc-", ignore_cleanup_errors=True) as root,
         TemporaryFile() as output,
     ):
-        outcome = await _run(step, {**environment, "PYTEST_DEBUG_TEMPROOT": root}, output)
+        of_pytest = {"PYTEST_DEBUG_TEMPROOT": root, "COLUMNS": PYTEST_COLUMNS}
+        outcome = await _run(step, {**environment, **of_pytest}, output)
         output.seek(0)
         said = output.read().decode("utf-8", "replace")
     print(f"\n== {step.name}\n{said}", end="", flush=True)
-    return outcome
+    if not outcome.fault:
+        return outcome
+    failed = [line for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    return replace(outcome, failed_tests=tuple(failed))
 
 
 async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) -> Outcome:
@@ -257,7 +265,11 @@ async def _end_group(process: asyncio.subprocess.Process) -> None:
 
 
 def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, seconds: float) -> int:
-    """Print a line for each step, then the skipped tests and the result; return the exit code."""
+    """Print a line for each step, the skipped and failed tests, and the result.
+
+    The failed tests are at the end, because many records of a run keep only its last lines.
+    Return the exit code.
+    """
     print(f"\n== summary, after {seconds:.0f} s", flush=True)
     for outcome in outcomes:
         word = "FAILED" if outcome.fault else "ok"
@@ -269,6 +281,9 @@ def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, secon
     if brought.left_out:
         print(f"          to install: {brought.remedy}")
     failed = [outcome.name for outcome in outcomes if outcome.fault]
+    for outcome in outcomes:
+        for line in outcome.failed_tests:
+            print(line)
     if failed:
         print(f"{len(failed)} of {len(outcomes)} steps failed: {', '.join(failed)}")
         return 1

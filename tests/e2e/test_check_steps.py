@@ -77,6 +77,23 @@ def test_steps_in_parallel_have_their_own_faults_and_outputs(
     ]
 
 
+def test_a_failed_step_lists_its_failed_tests(tmp_path: Path) -> None:
+    """The names come from the output of pytest; a step that passes lists none."""
+    module = tmp_path / "test_sums.py"
+    module.write_text(
+        "def test_wrong(): assert 1 + 1 == 3\n"
+        "def test_right(): print('FAILED to fail'); assert 1 + 1 == 2\n"
+    )
+    command = (sys.executable, "-m", "pytest", "-rA", "-p", "no:cacheprovider", str(module))
+    wrong, right = run(
+        [[Step(name, (*command, "-k", name))] for name in ("wrong", "right")], os.environ
+    )
+    assert [line.split("::")[1] for line in wrong.failed_tests] == [
+        "test_wrong - assert (1 + 1) == 3"
+    ]
+    assert right.failed_tests == ()
+
+
 def test_steps_in_parallel_share_no_temporary_folder_of_pytest(
     capfd: pytest.CaptureFixture[str],
 ) -> None:

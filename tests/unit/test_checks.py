@@ -64,6 +64,16 @@ def test_the_verdict(
     assert ("LEFT OUT" in shown) == bool(brought.left_out or not_checked)
 
 
+def test_the_summary_ends_with_the_names_of_the_failed_tests(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A record that keeps only the last lines still says which test failed, and why."""
+    line = "FAILED tests/unit/test_lease.py::test_a_lease_ends - assert 1 == 2"
+    assert check.summarise([replace(BAD, failed_tests=(line,)), OK], COMPLETE, "", 1.0) == 1
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[-2:] == [line, "1 of 2 steps failed: tests"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "groups", "needs_browser"),
     [
