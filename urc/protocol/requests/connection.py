@@ -3,7 +3,7 @@
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload, traffic_of
@@ -23,7 +23,9 @@ from urc.protocol.requests.pending_replies import PendingReplies
 from urc.protocol.requests.rate import Counters
 from urc.protocol.requests.reply_match import Matcher
 from urc.protocol.requests.request_queue import RequestQueue, rendered_size
-from urc.protocol.ros.topic_codec import TopicCodec
+
+if TYPE_CHECKING:
+    from urc.protocol.ros.topic_codec import TopicCodec
 
 __all__ = ["Connection"]
 

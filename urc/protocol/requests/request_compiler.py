@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import partial
+from typing import TYPE_CHECKING
 
 from urc.expressions import COUNTERS, NONCE, NOW
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
@@ -23,10 +24,11 @@ from urc.protocol.requests.exchange import CompiledRequest
 from urc.protocol.requests.message_effects import Acknowledgements, Collector, answering, collecting
 from urc.protocol.requests.rate import RANKS, GcraLimiter
 from urc.protocol.requests.reply_match import Aside, CompiledReply, Matcher
-from urc.protocol.ros.topic_codec import TopicCodec
-from urc.protocol.ros.write_source import Unwritable
 from urc.protocol.values.payload import CodecContext
 from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
+
+if TYPE_CHECKING:
+    from urc.protocol.ros.topic_codec import TopicCodec
 
 __all__ = ["RequestCompiler"]
 
@@ -64,10 +66,12 @@ class RequestCompiler:
                 self.lines[name] = Conversation(spec, matchers)
             self.lines[name].codec = self._codec(spec)
 
-    def _codec(self, spec: TransportSpec) -> TopicCodec | None:
+    def _codec(self, spec: TransportSpec) -> "TopicCodec | None":
         """Return the codec for a connection that may carry binary ROS messages."""
         if spec.type != "ros" or spec.options.get("via", "rosbridge") == "rosbridge":
             return None
+        from urc.protocol.ros.topic_codec import TopicCodec  # takes 4 ms, so only for these
+
         paths = paths_by_topic(self._driver, spec.name, self._readings.settings)
         return TopicCodec(paths, is_ros1=spec.options.get("version") == 1)
 
@@ -229,8 +233,9 @@ class RequestCompiler:
         return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
 
 
-def _converting(encode: Encode, codec: TopicCodec) -> Encode:
+def _converting(encode: Encode, codec: "TopicCodec") -> Encode:
     """Return a function that adds the bytes of a ROS message to an envelope."""
+    from urc.protocol.ros.write_source import Unwritable  # loaded with the codec
 
     def converted(namespace: Mapping[str, object]) -> Payload:
         try:
