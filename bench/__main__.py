@@ -7,10 +7,13 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from bench.figures import PAGES, told, write_docs
 from bench.harness import report
+from hatch_build import VendorError
+from scripts.check import install_checkers
 from scripts.needs import NEEDS, bring
 
 NAMES = (
@@ -50,8 +53,8 @@ NAMES = (
 PROGRAMS = {
     "browser_peers": ("chromium",),
     "browser_widgets": ("chromium",),
-    "browser_roslibjs": ("chromium",),
-    "browser_turtlebot": ("chromium",),
+    "browser_roslibjs": ("chromium", "roslib"),
+    "browser_turtlebot": ("chromium", "roslib"),
     "browser_frames": ("webkit-driver", "xvfb"),
     "browser_firefox": ("firefox", "node", "puppeteer"),
     "browser_webkit": ("webkit-driver", "xvfb"),
@@ -90,6 +93,10 @@ def bring_programs(names: Sequence[str]) -> set[str]:
     """Install the programs for these benchmarks; return the benchmarks that still lack one."""
     wanted = {program for name in names for program in PROGRAMS.get(name, ())}
     brought = bring([need for need in NEEDS if need.name in wanted])
+    if any(need.is_of_npm for need in brought.left_out):
+        with suppress(VendorError):  # the remedy below names npm
+            install_checkers()
+        brought.look_again()
     os.environ.update(brought.environment)
     missing = {need.name for need in brought.left_out}
     left_out = {name for name in names if missing.intersection(PROGRAMS.get(name, ()))}

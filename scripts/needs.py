@@ -51,6 +51,11 @@ class Need:
     is_of_root: bool = False
     """Whether only root can use the program; if so, installing it does not help other users."""
 
+    @property
+    def is_of_npm(self) -> bool:
+        """Whether `npm ci` installs the program."""
+        return not self.package and not self.is_of_root
+
     def find(self) -> str | None:
         """Return the program's path, from the environment variable or the search path, or None."""
         named = os.environ.get(self.variable) if self.variable else None
@@ -295,7 +300,7 @@ class Brought:
         sudo = "" if _is_root() else "sudo "
         packages = [need.package for need in self.left_out if need.package]
         commands = [f"{sudo}apt-get install -y {' '.join(packages)}"] if packages else []
-        if any(not need.package and not need.is_of_root for need in self.left_out):
+        if any(need.is_of_npm for need in self.left_out):
             commands.append("npm ci --ignore-scripts")
         if not commands and self.left_out:
             return "sudo ./dev test"

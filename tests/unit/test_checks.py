@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench import __main__ as bench
+from hatch_build import VendorError
 from scripts import check, docs, needs
 from scripts.chromium.bring import BringError
 from scripts.needs import NEEDS, Brought, Need
@@ -156,6 +157,32 @@ def test_a_benchmark_without_its_program_is_left_out_by_name(
     remedy = Brought(left_out=browser).remedy
     line = f"bench: browser_peers skipped: no chromium; to install it: {remedy}"
     assert said.err.splitlines() == [line]
+
+
+def test_a_benchmark_brings_the_packages_of_npm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A benchmark with roslib's page works in a new clone, like the tests."""
+    roslib = next(need for need in NEEDS if need.name == "roslib")
+    there: list[str] = []
+    found = replace(roslib, other=lambda: there[0] if there else None)
+    monkeypatch.setattr(bench, "bring", lambda _: Brought(left_out=[found]))
+    monkeypatch.setattr(bench, "install_checkers", lambda: there.append("node_modules/roslib"))
+    assert bench.bring_programs(["browser_roslibjs"]) == set()
+
+
+def test_a_benchmark_without_npm_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The line names the command that would have installed the package."""
+    roslib = next(need for need in NEEDS if need.name == "roslib")
+    missing = replace(roslib, other=lambda: None)
+
+    def fail() -> None:
+        raise VendorError("npm not found")
+
+    monkeypatch.setattr(bench, "bring", lambda _: Brought(left_out=[missing]))
+    monkeypatch.setattr(bench, "install_checkers", fail)
+    assert bench.bring_programs(["browser_roslibjs"]) == {"browser_roslibjs"}
+    assert "no roslib; to install it: npm ci --ignore-scripts" in capsys.readouterr().err
 
 
 def browsers(*, is_whole_there: bool) -> list[Need]:
