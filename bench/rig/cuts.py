@@ -136,6 +136,11 @@ class CutRig:
         self.server = enter(Server(files, folder / "data", inside=here))
         self.operators = enter(Operators(inside=here))
         self._witness = enter(Robots([]))
+        path = [self.server, self.operators, self.relay]
+        self._path = [one.pid for one in path]
+        self._counterparts = [other.pid if other else 0 for other in others]
+        watched = (*self._path, *filter(None, self._counterparts))
+        self._watcher = enter(Robots([f"pid:{pid}" for pid in watched]))
 
     def __enter__(self) -> Self:
         """Return self; all programs end when the `with` block ends."""
@@ -183,6 +188,14 @@ class CutRig:
             except NotDrivenError:
                 continue
         return self._trial((index,), seconds, f"cut {self.port(index)}", share)[0]
+
+    def warm_up(self) -> None:
+        """Drive each robot once, so that every guard has started and has loaded its transport."""
+        for index in self.indexes:
+            began_ns = time.monotonic_ns()
+            number = self._drive(index)
+            self._await_motion(index, began_ns)
+            self.operators.kill(number)
 
     def drive_once(self, index: int, life_s: float) -> None:
         """Make a page drive and release a robot.
@@ -296,8 +309,11 @@ class CutRig:
         lasted_s = (healed_ns - cut_ns) / 1e9
         is_noticed = lasted_s >= bounds_of(kind).unnoticed_s
         now_ns = time.monotonic_ns()
-        witness = self._witness.latest_ms(cut_ns, now_ns)
-        late_ms = self.robots.latest_ms(cut_ns, now_ns) + witness
+        witness_ms = self._witness.latest_ms(cut_ns, now_ns)
+        stop_ns = heard[stops[0]].time_ns if stops else now_ns
+        path = (*self._path, self._counterparts[index])
+        waited_ms = self._watcher.waited_ms(healed_ns, stop_ns, path)
+        late_ms = self.robots.latest_ms(cut_ns, now_ns) + max(witness_ms, waited_ms)
         fault = _fault(
             bounds_of(kind), heard, [age - late_ms for age in ages_ms],
             is_noticed=is_noticed, was_held=was_held, burst_ms=BURST_MS + late_ms,

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple, Self, cast
@@ -186,8 +186,11 @@ class Robots(Program):
         """Received lines of each robot."""
         self.late: list[tuple[int, float]] = []
         """Times at which the robots' process woke up late, with delays in milliseconds."""
-        self.waits: dict[int, list[tuple[int, float]]] = {}
-        """Each process's waits for a processor, by process id: end times, and durations in ms."""
+        self.waits: dict[tuple[int, int], list[tuple[int, float]]] = {}
+        """Waits for a processor: end times, and durations in ms.
+
+        The key is the process that waited, and the watched process: itself or its parent.
+        """
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
         is_foxglove = any(place.startswith("foxglove:") for place in places)
@@ -201,8 +204,9 @@ class Robots(Program):
         if words[0] == "line":
             self.heard[int(words[1])].append(Heard(int(words[2]), words[3]))
         elif words[0] == "waited":
-            waits = self.waits.setdefault(int(words[2]), [])
-            waits.append((int(words[1]), int(words[3]) / 1000))
+            of, microseconds = words[3].split()
+            waits = self.waits.setdefault((int(words[2]), int(of)), [])
+            waits.append((int(words[1]), int(microseconds) / 1000))
         elif words[0] == "late":
             self.late.append((int(words[1]), int(words[2]) / 1000))
         elif words[0] in ("open", "gone"):
@@ -214,19 +218,39 @@ class Robots(Program):
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay in the robots' process between two times, in milliseconds."""
+        """Return the largest delay in the robots' process between two times, in milliseconds.
+
+        A delay counts if it overlaps the span, wherever it ends.
+        """
         with self.changed:
-            found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
+            found = [late for at, late in self.late if _overlaps(at, late, from_ns, until_ns)]
         return max(found, default=0.0)
 
-    def waited_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the longest wait of a watched process between two times, in milliseconds."""
+    def waited_ms(self, from_ns: int, until_ns: int, path: Collection[int] | None = None) -> float:
+        """Return how long a tick may have waited for watched processes, in milliseconds.
+
+        The path of a tick leads through several watched processes, and through one child of each.
+        So the result is the sum of their waits that overlap the span.
+
+        Args:
+            from_ns: start of the span.
+            until_ns: end of the span.
+            path: ids of the watched processes on the path; None for all.
+        """
+        own: dict[int, float] = {}
+        of_child: dict[int, float] = {}
         with self.changed:
-            sums = [
-                sum(ms for at, ms in waits if from_ns <= at <= until_ns)
-                for waits in self.waits.values()
-            ]
-        return max(sums, default=0.0)
+            for (process, of), waits in self.waits.items():
+                if path is not None and of not in path:
+                    continue
+                ms = sum(ms for at, ms in waits if _overlaps(at, ms, from_ns, until_ns))
+                found = own if process == of else of_child
+                found[of] = max(ms, found.get(of, 0.0))
+        return sum(own.values()) + sum(of_child.values())
+
+
+def _overlaps(end_ns: int, ms: float, from_ns: int, until_ns: int) -> bool:
+    return end_ns >= from_ns and end_ns - ms * 1e6 <= until_ns
 
 
 class Operators(Program):

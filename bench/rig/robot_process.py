@@ -12,8 +12,8 @@ from the monotonic clock, in nanoseconds::
     line ROBOT TIME TEXT    a line was received; TIME is that of its first byte
     gone ROBOT TIME         a connection ended
     late TIME MICROSECONDS  this program itself was woken late: the machine is busy
-    waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
-                            ``pid:NUMBER`` watches a process and its children
+    waited TIME PID OF MICROSECONDS  another runnable process had to wait: the argument
+                            ``pid:NUMBER`` watches the process OF and its children
 
 The program ends when its standard input closes, so it ends with its parent.
 """
@@ -225,22 +225,31 @@ class Others:
     """A process and its children, with the time that each process waits for a processor."""
 
     def __init__(self, process: str) -> None:
-        self._process = process
+        self.process = process
+        self._everybody = [process]
+        """The process and its children, also after their parent has ended."""
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
         """Return the processes that waited since the last check, with the times in nanoseconds."""
         found: list[tuple[str, int]] = []
-        with contextlib.suppress(OSError):  # the process has ended
-            with open(f"/proc/{self._process}/task/{self._process}/children") as children:
-                everybody = [self._process, *children.read().split()]
-            for one in everybody:
-                with contextlib.suppress(OSError), open(f"/proc/{one}/schedstat") as counts:
+        with (
+            contextlib.suppress(OSError),  # the process has ended
+            open(f"/proc/{self.process}/task/{self.process}/children") as children,
+        ):
+            new = (one for one in children.read().split() if one not in self._everybody)
+            self._everybody.extend(new)
+        for one in tuple(self._everybody):
+            try:
+                with open(f"/proc/{one}/schedstat") as counts:
                     waited = int(counts.read().split()[1])
-                    more = waited - self._waited.get(one, waited)
-                    self._waited[one] = waited
-                    if more > WAITED_NS:
-                        found.append((one, more))
+            except OSError:  # it has ended
+                self._everybody.remove(one)
+                continue
+            more = waited - self._waited.get(one, waited)
+            self._waited[one] = waited
+            if more > WAITED_NS:
+                found.append((one, more))
         return found
 
 
@@ -274,7 +283,7 @@ class Robots:
                 look_ns = now_ns + LOOK_NS
                 for other in self._others:
                     for process, waited_ns in other.look():
-                        self._tell("waited", now_ns, process, waited_ns // 1000)
+                        self._tell("waited", now_ns, process, other.process, waited_ns // 1000)
             for key, _ in ready:
                 if key.fd == 0:
                     if not os.read(0, 4096):

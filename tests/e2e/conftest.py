@@ -23,7 +23,7 @@ from tests.e2e.keys import entering, known_here
 from tests.e2e.processes import UrcProcess
 from tests.e2e.together import Together
 from tests.e2e.transports.packets import sweep
-from tests.e2e.unhurried import unhurried
+from tests.e2e.unhurried import LONGEST_S, unhurried
 
 LOG = logging.getLogger(__name__)
 
@@ -31,6 +31,15 @@ expect.set_options(timeout=PAGE_TIMEOUT_MS)
 
 
 @pytest.hookimpl(optionalhook=True)
+@pytest.fixture
+def calm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no pause of a busy machine end the motion of a program in this process.
+
+    For tests that are about something else; a program that is silent for a second still stops.
+    """
+    monkeypatch.setattr("urc.client.stick.HELD_UP_S", LONGEST_S)
+
+
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together | None:
     """Keep what belongs together in one process."""
     return Together(config, log) if config.getvalue("dist") == "loadgroup" else None

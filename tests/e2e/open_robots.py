@@ -51,7 +51,7 @@ commands:
   drive:
     send: "V {{ speed | round(2) }} {{ turn | round(2) }}"
     args: { speed: { min: -1, max: 1, default: 0 }, turn: { min: -1, max: 1, default: 0 } }
-    hold: { repeat: 50ms, release: {}, watchdog: none }
+    hold: { repeat: 50ms, lease: 1s, release: {}, watchdog: none }
 MORE
 widgets:
   level: { use: bar, bind: { value: level } }
@@ -62,7 +62,7 @@ LIFT = """\
   lift:
     send: "L {{ rate | round(2) }}"
     args: { rate: { min: -1, max: 1, default: 0 } }
-    hold: { repeat: 50ms, release: {}, watchdog: none }
+    hold: { repeat: 50ms, lease: 1s, release: {}, watchdog: none }
 """
 STOPPED = "V 0 0"
 

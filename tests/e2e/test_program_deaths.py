@@ -110,6 +110,7 @@ async def test_ctrl_c_stops_the_robot(opening: str, tmp_path: Path) -> None:
 # -- the server
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
     """The values come back by themselves; the stick stays without effect."""
     async with carted(tmp_path) as (cart, file), AsyncExitStack() as outer:
@@ -120,7 +121,7 @@ async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
         lines = robot.log()
 
         async def drive() -> None:
-            async with robot.drive() as stick:
+            async with robot.drive(valid_s=1.0) as stick:
                 await stick.hold(30, speed=0.5)
 
         task = asyncio.create_task(drive())
@@ -146,7 +147,7 @@ async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
         await until(lambda: cart.has_line)
         cart.say("level 77")
         await robot.wait_for("level", lambda value: value == 77, timeout=10)
-        async with robot.drive() as stick:
+        async with robot.drive(valid_s=1.0) as stick:
             stick(speed=0.25)
             await until(lambda: cart.newest("V") == "V 0.25 0")
         async with asyncio.timeout(5):
@@ -154,6 +155,7 @@ async def test_a_server_that_restarts_resumes_no_motion(tmp_path: Path) -> None:
         assert any("connection was lost" in text for text in texts)
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_robot_that_has_said_nothing_is_driven_without_a_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -164,7 +166,7 @@ async def test_a_robot_that_has_said_nothing_is_driven_without_a_wait(
         served_robot(file) as address,
         urc.client.open(address, token=KEY) as robot,
         asyncio.timeout(30),
-        robot.drive() as stick,
+        robot.drive(valid_s=1.0) as stick,
     ):
         await stick.hold(0.5, speed=0.5)
         assert cart.newest("V") == "V 0.5 0"
@@ -208,6 +210,7 @@ REVOKED_S = 0.3
 """Time within which a revocation must stop the robot."""
 
 
+@pytest.mark.usefixtures("calm")
 @pytest.mark.parametrize("ended", ["token", "program", "role"])
 async def test_a_right_that_ends_stops_the_robot(ended: str, tmp_path: Path) -> None:
     """A program that lost its role may still watch; without its token it is shut out."""
@@ -224,7 +227,7 @@ async def test_a_right_that_ends_stops_the_robot(ended: str, tmp_path: Path) -> 
         ):
 
             async def drive() -> None:
-                async with robot.drive() as stick:
+                async with robot.drive(valid_s=1.0) as stick:
                     await stick.hold(30, speed=0.5)
 
             driving = asyncio.create_task(drive())
@@ -286,6 +289,7 @@ async def test_stop_reaches_a_server_whose_socket_is_silent(tmp_path: Path) -> N
         assert STOPPED in cart.lines
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_program_that_has_the_controls_keeps_them(tmp_path: Path) -> None:
     """The second program is told who drives; its STOP ends the motion of the first."""
     async with (
@@ -296,7 +300,7 @@ async def test_a_program_that_has_the_controls_keeps_them(tmp_path: Path) -> Non
     ):
 
         async def drive() -> None:
-            async with first.drive() as stick:
+            async with first.drive(valid_s=1.0) as stick:
                 await stick.hold(30, speed=0.5)
 
         driving = asyncio.create_task(drive())

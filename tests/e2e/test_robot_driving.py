@@ -41,10 +41,11 @@ async def pair(
 Pair = tuple[Cart, RobotInterface]
 
 
+@pytest.mark.usefixtures("calm")
 async def test_the_stick_moves_the_robot_and_leaving_stops_it(pair: Pair) -> None:
     """At once, and the controls are free again."""
     cart, robot = pair
-    async with robot.drive() as stick:
+    async with robot.drive(valid_s=1.0) as stick:
         assert robot.operator
         stick(speed=0.5)
         await until(lambda: cart.newest("V") == "V 0.5 0")
@@ -56,11 +57,12 @@ async def test_the_stick_moves_the_robot_and_leaving_stops_it(pair: Pair) -> Non
     await until(lambda: robot.operator == "")
 
 
+@pytest.mark.usefixtures("calm")
 async def test_new_input_is_not_held_back(pair: Pair) -> None:
     """A change leaves at once, not with the next tick of unchanged input."""
     cart, robot = pair
     late_s = []
-    async with robot.drive() as stick:
+    async with robot.drive(valid_s=1.0) as stick:
         for number in range(1, 11):
             stick(speed=number / 20)
             set_s = time.monotonic()
@@ -70,10 +72,11 @@ async def test_new_input_is_not_held_back(pair: Pair) -> None:
     assert sorted(late_s)[len(late_s) // 2] < 0.075
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_hold_renews_the_input_while_it_is_awaited(pair: Pair) -> None:
     """No gap, and no stop before the time is over."""
     cart, robot = pair
-    async with robot.drive() as stick:
+    async with robot.drive(valid_s=1.0) as stick:
         await stick.hold(0.8, speed=0.5)
     frames = [(at, line) for at, line in cart.heard if line.startswith("V")]
     moves = [at for at, line in frames if line == "V 0.5 0"]
@@ -107,11 +110,12 @@ async def test_an_early_end_that_nobody_noticed_is_raised_at_the_end(pair: Pair)
             await asyncio.sleep(0.3)
 
 
+@pytest.mark.usefixtures("calm")
 async def test_an_error_in_the_block_stops_the_robot(pair: Pair) -> None:
     """The error passes unchanged."""
     cart, robot = pair
     with pytest.raises(ZeroDivisionError):  # noqa: PT012 - the end of the context raises
-        async with robot.drive() as stick:
+        async with robot.drive(valid_s=1.0) as stick:
             stick(speed=0.5)
             await until(lambda: cart.is_moving)
             raised_s = time.monotonic()
@@ -120,12 +124,13 @@ async def test_an_error_in_the_block_stops_the_robot(pair: Pair) -> None:
     assert cart.stopped_s() - raised_s < LATE_S
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_cancelled_task_stops_the_robot(pair: Pair) -> None:
     """However long it wanted to drive."""
     cart, robot = pair
 
     async def drive() -> None:
-        async with robot.drive() as stick:
+        async with robot.drive(valid_s=1.0) as stick:
             await stick.hold(60, speed=0.5)
 
     driving = asyncio.create_task(drive())
@@ -148,10 +153,11 @@ async def test_a_blocked_loop_stops_the_robot_and_ends_the_motion(pair: Pair) ->
             await stick.hold(0.5, speed=0.5)
 
 
+@pytest.mark.usefixtures("calm")
 async def test_a_released_stick_moves_again(pair: Pair) -> None:
     """Its own release is no fault; the controls stay with the program."""
     cart, robot = pair
-    async with robot.drive() as stick:
+    async with robot.drive(valid_s=1.0) as stick:
         stick(speed=0.5)
         await until(lambda: cart.is_moving)
         stick.release()
@@ -205,6 +211,7 @@ async def test_a_second_stick_of_the_same_command_is_refused(pair: Pair) -> None
                 pytest.fail("it opened")
 
 
+@pytest.mark.usefixtures("calm")
 @pytest.mark.parametrize("opening", get_args(Opening))
 async def test_two_sticks_share_the_controls(opening: Opening, tmp_path: Path) -> None:
     """One of them may end without the other; the name is needed."""
@@ -212,9 +219,9 @@ async def test_two_sticks_share_the_controls(opening: Opening, tmp_path: Path) -
         with pytest.raises(UrcError, match="several held commands; name one of: drive, lift"):
             async with robot.drive():
                 pytest.fail("it opened")
-        async with robot.drive("drive") as stick:
+        async with robot.drive("drive", valid_s=1.0) as stick:
             stick(speed=0.5)
-            async with robot.drive("lift") as lever:
+            async with robot.drive("lift", valid_s=1.0) as lever:
                 for _ in range(6):
                     stick(speed=0.5)
                     lever(rate=1)
@@ -231,11 +238,12 @@ async def test_two_sticks_share_the_controls(opening: Opening, tmp_path: Path) -
 # -- STOP
 
 
+@pytest.mark.usefixtures("calm")
 async def test_stop_ends_the_motion_and_latches(pair: Pair) -> None:
     """Whoever holds the stick; nothing moves before a reset."""
     cart, robot = pair
     with pytest.raises(MotionEnded, match="stopped by"):  # noqa: PT012 - the end of the context raises
-        async with robot.drive() as stick:
+        async with robot.drive(valid_s=1.0) as stick:
             stick(speed=0.5)
             await until(lambda: cart.is_moving)
             pressed_s = time.monotonic()
@@ -252,7 +260,7 @@ async def test_stop_ends_the_motion_and_latches(pair: Pair) -> None:
     await robot.reset()
     assert robot.latched_by == ""
     await robot.command("fold")
-    async with robot.drive() as stick:
+    async with robot.drive(valid_s=1.0) as stick:
         stick(speed=0.5)
         await until(lambda: cart.is_moving)
 

@@ -122,10 +122,11 @@ def test_a_failed_expectation_leaves_no_stream_behind(pair: Pair) -> None:
     del watching
 
 
+@pytest.mark.usefixtures("calm")
 def test_the_stick_moves_the_robot_and_leaving_stops_it(pair: Pair) -> None:
     """As in the asynchronous face."""
     cart, robot = pair
-    with robot.drive() as stick:
+    with robot.drive(valid_s=1.0) as stick:
         stick.hold(0.4, speed=0.5)
         assert cart.newest("V") == "V 0.5 0"
         left_s = time.monotonic()
@@ -148,12 +149,13 @@ def test_a_script_that_hangs_stops_the_robot(pair: Pair) -> None:
         stick(speed=0.5)
 
 
+@pytest.mark.usefixtures("calm")
 def test_an_error_in_the_block_stops_the_robot(pair: Pair) -> None:
     """It passes unchanged."""
     cart, robot = pair
     with (  # noqa: PT012 - the block raises
         pytest.raises(ZeroDivisionError),
-        robot.drive() as stick,
+        robot.drive(valid_s=1.0) as stick,
     ):
         stick.hold(0.2, speed=0.5)
         raised_s = time.monotonic()
@@ -162,10 +164,11 @@ def test_an_error_in_the_block_stops_the_robot(pair: Pair) -> None:
     assert cart.stopped_s() - raised_s < LATE_S
 
 
+@pytest.mark.usefixtures("calm")
 def test_a_released_stick_moves_again(pair: Pair) -> None:
     """From any thread."""
     cart, robot = pair
-    with robot.drive() as stick:
+    with robot.drive(valid_s=1.0) as stick:
         stick.hold(0.1, speed=0.5)
         stick.release()
         until(lambda: not cart.is_moving)
@@ -175,6 +178,7 @@ def test_a_released_stick_moves_again(pair: Pair) -> None:
         driving.join()
 
 
+@pytest.mark.usefixtures("calm")
 def test_stop_and_reset(pair: Pair) -> None:
     """Nothing moves in between."""
     _, robot = pair
@@ -184,7 +188,7 @@ def test_stop_and_reset(pair: Pair) -> None:
         pytest.fail("it opened")
     robot.reset()
     assert robot.latched_by == ""
-    with robot.drive() as stick:
+    with robot.drive(valid_s=1.0) as stick:
         stick.hold(0.2, speed=0.5)
 
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-__all__ = ["unhurried"]
+__all__ = ["LONGEST_S", "unhurried"]
 
 LONGEST_S = 120.0
 """As long as a test may take."""
@@ -25,6 +25,7 @@ def unhurried() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("urc.motion.hold_to_run.LONGEST_LEASE_S", LONGEST_S)
         patched.setattr("urc.motion.freshness.OLDEST_S", LONGEST_S)
+        patched.setattr("urc.client.remote_motion.OLDEST_S", LONGEST_S)
         patched.setattr("urc.motion.freshness._KEPT", BEATS)
         patched.setattr("urc.web.drive.control_service.TOO_LATE_S", LONGEST_S)
         yield

@@ -25,6 +25,7 @@ ONE_WAY_S = 0.8
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CutRig]:
     """Two robots on every kind of line, behind a relay."""
     with CutRig(tmp_path_factory.mktemp("cuts"), (*KINDS, *KINDS)) as made:
+        made.warm_up()
         yield made
 
 

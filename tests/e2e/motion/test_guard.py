@@ -30,6 +30,10 @@ pytestmark = [
 LEASE_MS = 250
 LATE_MS = 50
 """Required: the first byte of the stop comes within the lease and this."""
+OLD_MS = 300
+"""Age from which no motion may reach the robot."""
+FOLLOWS_S = 0.3
+"""How long nothing may follow the stop."""
 RESTART_MS = 500
 OPEN_MS = 200
 """What connecting over loopback may take on a busy machine, beside the restart."""
@@ -78,12 +82,22 @@ class Rig:
         return int(found[-1].split()[1])
 
     def drive(self) -> None:
-        """Drive until the robot has heard some."""
-        before = time.monotonic_ns()
-        self.engine.order("drive")
-        self.robots.wait_until(
-            lambda: len(self.robots.since(0, before)) >= 3, WAIT_S, "a robot that is driven"
-        )
+        """Drive until the robot moves; again if a busy machine has ended the motion."""
+        until = time.monotonic() + WAIT_S
+        while time.monotonic() < until:
+            before, told = time.monotonic_ns(), len(self.engine.lines)
+            self.engine.order("drive")
+            while time.monotonic() < until and not self._has_stopped(told):
+                heard = [one.text for one in self.robots.since(0, before)]
+                if len(heard) >= 3 and STOP not in heard[-3:]:
+                    return
+                time.sleep(0.005)
+        raise AssertionError(f"the robot did not move within {WAIT_S:g} s")
+
+    def _has_stopped(self, told: int) -> bool:
+        """Return whether the guard has ended the motion since the line number `told`."""
+        ends = ("stopped expired", "stopped revoked")
+        return any(line.startswith(ends) for line in self.engine.lines[told:])
 
     def stop_after(self, time_ns: int, within_s: float = WAIT_S) -> Heard:
         """Return the first stop that the robot heard from then on."""
@@ -98,6 +112,10 @@ class Rig:
         """Return when ticks were given."""
         with self.engine.changed:
             return [int(line.split()[1]) for line in self.engine.lines if line.startswith("tick ")]
+
+    def given(self, motion: Heard) -> int:
+        """Return when the tick of a frame ``go N`` was given: it was the N-th."""
+        return self.ticks()[int(motion.text.split()[1]) - 1]
 
     def await_another(self, guard: int) -> None:
         """Wait until there is a guard that is not `guard`, and a live line."""
@@ -194,7 +212,8 @@ def test_engine_that_a_pattern_holds_up_stops_the_robot(rig: Rig) -> None:
         stops.append(Stop(took_ms, rig.is_late(since, time.monotonic_ns())))
         stop = rig.stop_after(since)
         began, ended = map(int, rig.engine.wait_for("backtracked", WAIT_S, after=told)[1:])
-        assert began < stop.time_ns < ended, "the robot was stopped while the engine hung"
+        if not stops[-1].is_excused:
+            assert began < stop.time_ns < ended, "the robot was stopped while the engine hung"
         rig.engine.order("rest")
 
 
@@ -219,10 +238,10 @@ def test_killed_guard_is_replaced_and_stops_first(rig: Rig, batch: int) -> None:
         rig.drive()
         guard, since = rig.guard, time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
-        stop = rig.stop_after(since)
-        opened = [at for at, is_open in rig.robots.visits[0] if is_open and at > since]
+        rig.robots.wait_until(lambda since=since: bool(opened(rig, since)), WAIT_S, "a new line")  # type: ignore[misc]
+        stop = rig.stop_after(opened(rig, since)[0])
         rig.engine.order("rest")
-        assert rig.robots.since(0, opened[0])[0].text == STOP
+        assert rig.robots.since(0, opened(rig, since)[0])[0] == stop
         took_ms = (stop.time_ns - since) / 1e6
         late_ms = rig.is_late(since, time.monotonic_ns())
         assert is_soon(took_ms, late_ms), f"death {number} of batch {batch}: {took_ms:.0f} ms"
@@ -234,14 +253,19 @@ def test_killed_guard_is_replaced_and_stops_first(rig: Rig, batch: int) -> None:
         assert now == files, "descriptors are left behind"
 
 
+def opened(rig: Rig, since_ns: int) -> list[int]:
+    """Return when the robot's line was opened since then."""
+    return [at for at, is_open in rig.robots.visits[0] if is_open and at > since_ns]
+
+
 def test_robot_that_stops_reading_is_reached_afresh(rig: Rig) -> None:
     """What it did not take within 250 ms it never gets; the stop is the first of the next line."""
     rig.drive()
     rig.engine.order("release")
     rig.stop_after(0)
     rig.robots.signal(signal.SIGSTOP)
-    rig.engine.order("big")
     told = len(rig.engine.lines)
+    rig.engine.order("big")
     rig.engine.wait_until(
         lambda: any(line.startswith("linked lost") for line in rig.engine.lines[told:]),
         WAIT_S,
@@ -258,7 +282,7 @@ def test_robot_that_stops_reading_is_reached_afresh(rig: Rig) -> None:
 @pytest.mark.needs("iptables")
 @pytest.mark.parametrize("cut_s", [0.3, 0.6, 2.0])
 async def test_cut_link_delivers_nothing_old(rig: Rig, cut_s: float) -> None:
-    """The stop comes as soon as the robot can be reached, and no motion from before."""
+    """The stop comes as soon as the robot can be reached, and no old motion or later one."""
     rig.drive()
     loss = Loss(rig.robots.ports[0])
     await loss.begin()
@@ -268,9 +292,12 @@ async def test_cut_link_delivers_nothing_old(rig: Rig, cut_s: float) -> None:
     await loss.end()
     healed = time.monotonic_ns()
     stop = rig.stop_after(cut)
+    await asyncio.sleep(FOLLOWS_S)
+    late_ms = rig.is_late(healed - OLD_MS * 1_000_000, stop.time_ns)
     motion = [one for one in rig.robots.since(0, healed) if one.text != STOP]
-    assert not motion, "old motion came through"
-    late_ms = rig.is_late(healed, time.monotonic_ns())
+    ages_ms = [(one.time_ns - rig.given(one)) / 1e6 for one in motion]
+    assert max(ages_ms, default=0.0) <= OLD_MS + late_ms, "old motion came through"
+    assert all(one.time_ns < stop.time_ns for one in motion), "motion followed the stop"
     assert (stop.time_ns - healed) / 1e6 <= 100 + late_ms
 
 
@@ -290,8 +317,7 @@ def test_interrupt_of_the_terminal_does_not_reach_the_guard(rig: Rig) -> None:
     guard = rig.guard
     assert os.getpgid(guard) != os.getpgid(rig.engine.pid)
     os.kill(guard, signal.SIGINT)
-    since = time.monotonic_ns()
-    rig.robots.wait_until(lambda: len(rig.robots.since(0, since)) > 4, WAIT_S, "motion")
+    rig.drive()
     assert rig.guard == guard
 
 
@@ -304,8 +330,8 @@ def test_end_of_the_session_stops_the_robot_first(rig: Rig) -> None:
     ended = int(rig.engine.wait_for("ended")[1])
     assert (ended - ending) / 1e9 < END_S
     stop = rig.stop_after(ending - 1_000_000_000)
-    gone = [at for at, is_open in rig.robots.visits[0] if not is_open]
-    assert stop.time_ns <= gone[-1]
+    rig.robots.wait_until(lambda: not rig.robots.visits[0][-1][1], WAIT_S, "a closed line")
+    assert stop.time_ns <= rig.robots.visits[0][-1][0]
     assert rig.robots.heard[0][-1].text == STOP
     assert not is_alive(guard)
 

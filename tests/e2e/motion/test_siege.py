@@ -9,6 +9,7 @@ import contextlib
 import json
 import time
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -160,7 +161,10 @@ async def besieged(rig: Rig, operator: str, watchers: list[str]) -> Trial:
     began_ns = time.monotonic_ns()
     await siege.run(SIEGE_S)
     heard = rig.robots.since(0, began_ns)
+    before = [one.text for one in rig.robots.heard[0] if one.time_ns < began_ns]
     rig.operators.kill(number)
+    if before[-1] == "M 0":  # a busy machine has ended the gesture before the siege
+        return Trial(False, inf)
     assert siege.refused > 0
     assert siege.deaf > DEAF / 2
     stop = next((one for one in heard if one.text == "M 0"), None)
