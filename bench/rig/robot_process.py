@@ -229,6 +229,7 @@ class Others:
         self._everybody = [process]
         """The process and its children, also after their parent has ended."""
         self._waited: dict[str, int] = {}
+        self._has_looked = False
 
     def look(self) -> list[tuple[str, int]]:
         """Return the processes that waited since the last check, with the times in nanoseconds."""
@@ -246,10 +247,12 @@ class Others:
             except OSError:  # it has ended
                 self._everybody.remove(one)
                 continue
-            more = waited - self._waited.get(one, waited)
+            # A child that is new has waited since its start.
+            more = waited - self._waited.get(one, 0 if self._has_looked else waited)
             self._waited[one] = waited
             if more > WAITED_NS:
                 found.append((one, more))
+        self._has_looked = True
         return found
 
 
