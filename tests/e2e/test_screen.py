@@ -5,7 +5,7 @@ from playwright.async_api import expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard
-from tests.e2e.motion.driving import calmly_driven, fire, push
+from tests.e2e.motion.driving import LEFT, calmly_driven, fire, push
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -49,16 +49,19 @@ async def test_the_screen_stays_on_while_this_page_drives(new_page: PageMaker) -
 
 
 async def test_a_screen_that_may_go_dark_is_told(new_page: PageMaker) -> None:
-    """Driving goes on without."""
+    """Driving goes on without, and the note moves no stick under the finger."""
     async with calmly_driven() as (robot, address):
         page = await new_page()
         new_page.allow(page, lambda text: "WebSocket" in text)
         await page.add_init_script(REFUSE)
         await page.goto(address)
         await page.wait_for_function("() => document.querySelector('.joystick')?.dataset.phase")
+        stick = page.locator(LEFT)
+        before = await stick.bounding_box()
         await push(page)
         await robot.until_moving()
         await expect(page.locator("[data-note]")).to_contain_text("The screen may go dark")
+        assert await stick.bounding_box() == before
         await page.mouse.up()
         await robot.until_stopped()
 

@@ -134,13 +134,19 @@ const host = new Host(store, {
   follows,
 });
 const note = part(root, "[data-note]");
-const tell = (/** @type {string} */ text) => {
+/** Time for which a note is shown, in ms. */
+const NOTE_MS = 10_000;
+let noteTimer = 0;
+/** Show a note over the stage for a while, or until the next one if it `stays`. */
+const tell = (/** @type {string} */ text, stays = false) => {
+  clearTimeout(noteTimer);
   note.textContent = text;
+  if (!stays) noteTimer = setTimeout(() => (note.textContent = ""), NOTE_MS);
 };
 const AT_THE_DOOR = t("URC was restarted: open the address that it printed; this page then continues.");
 /** Show how to get access if the server does not know this browser; STOP still works. */
 function tellOfDoor() {
-  if (socket.isShutOut) tell(AT_THE_DOOR);
+  if (socket.isShutOut) tell(AT_THE_DOOR, true);
   else if (note.textContent === AT_THE_DOOR) tell("");
 }
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
