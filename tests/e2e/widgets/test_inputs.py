@@ -62,6 +62,23 @@ async def test_a_stick_tells_the_direction_of_its_arguments(new_page: PageMaker)
         await robot.until_stopped("go")
 
 
+async def test_the_values_of_both_axes_are_one_below_the_other(new_page: PageMaker) -> None:
+    """In the width of a stick next to a picture, both are readable."""
+    async with shown(new_page, use("joystick", **PLAIN)) as (_, page):
+        await page.locator(".joystick").evaluate("(stick) => { stick.style.width = '144px'; }")
+        await drag(page, ".joystick-pad", 300, 300)
+        await until_text(page, ".joystick-y", "right 71 %")
+        ahead = await page.locator(".joystick-x").bounding_box()
+        aside = await page.locator(".joystick-y").bounding_box()
+        pill = await page.locator(".joystick-values").bounding_box()
+        await page.mouse.up()
+    assert ahead is not None
+    assert aside is not None
+    assert pill is not None
+    assert ahead["y"] + ahead["height"] <= aside["y"]
+    assert max(ahead["width"], aside["width"]) <= pill["width"] <= 144
+
+
 async def test_letting_go_counts_while_another_button_of_the_mouse_is_down(
     new_page: PageMaker,
 ) -> None:
