@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The captions and buttons of the background (elements with `data-floats`), moved up or down so that
- * no widget, STOP button or other float covers them.
+ * The captions and buttons of the background (elements with `data-floats`), moved so that no widget,
+ * STOP button or other float covers them.
  *
  * @typedef {{ left: number, top: number, right: number, bottom: number }} Box
  */
@@ -41,10 +41,14 @@ export function keepFloatsFree(stage, signal) {
   });
 }
 
+const buttonsIn = (/** @type {Element} */ el) => el.querySelectorAll("button").length;
+
 /** @param {HTMLElement} stage */
 function placeFloats(stage) {
   const isShown = (/** @type {Element} */ el) => el.checkVisibility() && el.getBoundingClientRect().width > 0;
+  // The buttons choose first: their places matter more than those of captions.
   const floats = [...stage.querySelectorAll("[data-floats]")].filter((el) => el instanceof HTMLElement);
+  floats.sort((one, other) => buttonsIn(other) - buttonsIn(one));
   for (const el of floats) el.style.transform = "";
   // On a phone in portrait, the widgets are below the background.
   if (!matchMedia("(width >= 37.5rem)").matches) return;
@@ -55,28 +59,47 @@ function placeFloats(stage) {
   for (const el of floats) {
     if (!el.closest('[data-place="ground"]') || !isShown(el) || !el.textContent?.trim()) continue;
     const box = el.getBoundingClientRect();
-    const shift = freeShift(box, taken, room);
-    if (shift) el.style.transform = `translateY(${shift}px)`;
-    taken.push({ left: box.left, right: box.right, top: box.top + shift, bottom: box.bottom + shift });
+    const [x, y] = freeShift(box, taken, room);
+    if (x || y) el.style.transform = `translate(${x}px, ${y}px)`;
+    taken.push(moved(box, x, y));
   }
 }
 
 /**
- * Return the shortest vertical shift to a free place for a box; 0 without a free place.
+ * Return the shortest shift to a free place for a box; none without a free place.
  *
  * @param {Box} box
  * @param {readonly Box[]} taken the boxes that must stay visible
  * @param {Box} room the box stays in this area
- * @returns {number} shift in pixels; positive is down
+ * @returns {[number, number]} shift in pixels; positive is right and down
  */
 export function freeShift(box, taken, room) {
-  const beside = taken.filter(({ left, right }) => left < box.right + GAP && right > box.left - GAP);
-  const isFree = (/** @type {number} */ shift) => {
-    const [top, bottom] = [box.top + shift, box.bottom + shift];
-    if (shift && (top < room.top || bottom > room.bottom)) return false;
-    return !beside.some((one) => one.top < bottom && one.bottom > top);
+  /** @type {number[]} */
+  const across = [0];
+  /** @type {number[]} */
+  const along = [0];
+  for (const { left, top, right, bottom } of taken) {
+    across.push(right + GAP - box.left, left - GAP - box.right);
+    along.push(bottom + GAP - box.top, top - GAP - box.bottom);
+  }
+  const isFree = (/** @type {[number, number]} */ [x, y]) => {
+    const { left, top, right, bottom } = moved(box, x, y);
+    if (x && (left < room.left || right > room.right)) return false;
+    if (y && (top < room.top || bottom > room.bottom)) return false;
+    return !taken.some((one) => one.left < right && one.right > left && one.top < bottom && one.bottom > top);
   };
-  const shifts = beside.flatMap(({ top, bottom }) => [bottom + GAP - box.top, top - GAP - box.bottom]);
-  shifts.sort((one, other) => Math.abs(one) - Math.abs(other));
-  return [0, ...shifts].find(isFree) ?? 0;
+  const shifts = across.flatMap((x) => along.map((y) => /** @type {[number, number]} */ ([x, y])));
+  const distance = (/** @type {[number, number]} */ [x, y]) => Math.abs(x) + Math.abs(y);
+  shifts.sort((one, other) => distance(one) - distance(other));
+  return shifts.find(isFree) ?? [0, 0];
+}
+
+/**
+ * @param {Box} box
+ * @param {number} x
+ * @param {number} y
+ * @returns {Box}
+ */
+function moved({ left, top, right, bottom }, x, y) {
+  return { left: left + x, top: top + y, right: right + x, bottom: bottom + y };
 }
