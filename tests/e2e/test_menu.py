@@ -74,7 +74,7 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         await menu.get_by_role("button", name="On 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
-        await expect(state).to_contain_text("seen just now", timeout=PATIENCE_MS)
+        await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
 
 
 async def test_a_hidden_tab_asks_for_nothing(new_page: PageMaker) -> None:

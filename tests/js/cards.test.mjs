@@ -21,11 +21,11 @@ function robot(more = {}) {
 test("without a page the card says when the robot was last seen", () => {
   const away = (/** @type {number} */ ageS) => linkWords(robot({ seen_at: NOW_S - ageS }), NOW_S).words;
   assert.equal(linkWords(robot(), NOW_S).words, "○ Not connected");
-  assert.equal(away(5), "○ Last seen just now");
-  assert.equal(away(-5), "○ Last seen just now"); // the clock went back
-  assert.equal(away(600), "○ Last seen 10 min ago");
-  assert.equal(away(47 * 3600), "○ Last seen 47 h ago");
-  assert.equal(away(72 * 3600), "○ Last seen 3 days ago");
+  assert.equal(away(5), "○ Seen just now");
+  assert.equal(away(-5), "○ Seen just now"); // the clock went back
+  assert.equal(away(600), "○ Seen 10 min ago");
+  assert.equal(away(47 * 3600), "○ Seen 47 h ago");
+  assert.equal(away(72 * 3600), "○ Seen 3 days ago");
 });
 
 test("with a page the card shows the worst connection", () => {

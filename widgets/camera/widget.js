@@ -10,6 +10,8 @@ import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 import { Screen } from "./screen.js";
 
+/** Whether the screen has room for signs only, such as a phone in landscape. */
+const isLow = () => matchMedia("(height < 30rem)").matches;
 const LOOK_AGAIN_MS = 200;
 const FULL_COLOUR_MS = 5000;
 const KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
@@ -101,7 +103,7 @@ class Camera {
   }
 
   addSnapshot() {
-    this.shutter = this.addButton("⤓", this.t("Save picture"), () => void this.keep());
+    this.shutter = this.addButton(isLow() ? "⤓" : `⤓ ${this.t("Save")}`, this.t("Save picture"), () => void this.keep());
     this.shutter.disabled = true;
   }
 

@@ -12,6 +12,8 @@ import { said, t } from "../core/words.js";
 
 /** Time from the loss of a good connection until the card covers the page. */
 const GRACE_MS = 3000;
+/** Time from which the page says that it waits for the first connection. */
+const SHORT_MS = 700;
 /** Reason for a socket that closed itself. */
 const SILENT = "no answer";
 /** Time for which "Try now" stays disabled. */
@@ -36,6 +38,8 @@ export class LostCard {
     this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
     /** Whether any connection has been good since the page was opened. */
     this.wasGood = false;
+    /** Time since which the page waits for the first connection; infinite otherwise. */
+    this.connectingMs = Infinity;
     /** Time of the current loss; 0 without a loss. */
     this.lostMs = 0;
     /** Kind of the current loss, and the time since which it is of this kind. @type {Loss["of"] | undefined} */
@@ -62,6 +66,10 @@ export class LostCard {
     else if (this.lostMs === 0) this.lostMs = nowMs;
     if (loss?.of !== this.lostOf) this.kindMs = nowMs;
     this.lostOf = loss?.of;
+    const isConnecting = !loss && !isReplay && !this.wasGood && waitsIn(store, this.onDemand);
+    if (!isConnecting) this.connectingMs = Infinity;
+    else if (this.connectingMs === Infinity) this.connectingMs = nowMs;
+    this.root.toggleAttribute("data-robot-connecting", nowMs - this.connectingMs >= SHORT_MS);
     const isShown = loss !== null && (!this.wasGood || nowMs - this.lostMs >= GRACE_MS);
     const tries = isShown ? triesWords(loss, store, this.kindMs, nowMs) : "";
     if (this.tries.textContent !== tries) this.tries.textContent = tries;
@@ -151,6 +159,17 @@ export function lossOf(store, socket, onDemand = []) {
   if (!lost || links.some(isConnected)) return null;
   const { transport, cause, address, detail } = lost;
   return { of: "robot", transport, cause, address, detail };
+}
+
+/**
+ * Return whether the page waits for the server or for a first connection.
+ *
+ * @param {Store} store
+ * @param {readonly string[]} onDemand
+ */
+function waitsIn(store, onDemand) {
+  if (!store.isUp) return true;
+  return [...store.links.values()].some(({ transport, state }) => state === "connecting" && !onDemand.includes(transport));
 }
 
 /** @param {Link} link */

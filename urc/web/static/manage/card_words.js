@@ -54,9 +54,9 @@ export function linkWords(robot, nowS) {
 function awayWords(seenAt, nowS) {
   if (seenAt === null) return t("Not connected");
   const ageS = Math.max(0, nowS - seenAt);
-  if (ageS < 60) return t("Last seen just now");
+  if (ageS < 60) return t("Seen just now");
   const age = ageS > LONGEST_HOURS_S ? t("{n} days", { n: Math.floor(ageS / DAY_S) }) : ageText(ageS);
-  return t("Last seen {age} ago", { age });
+  return t("Seen {age} ago", { age });
 }
 
 /**
