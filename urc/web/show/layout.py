@@ -67,10 +67,14 @@ _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-driv
 _SOFT = "minmax(3.625rem,max-content)"
 """Height of a shrinking row: at least the height of a value."""
 _SIDES = ("start", "center", "end")
+_ESCAPED = frozenset('"\\<>&\n\r\f\0')
 
 
 def grid_css(
-    interface: Interface, slots: Sequence[str], footprints: Mapping[str, Footprint] = NOTHING
+    interface: Interface,
+    slots: Sequence[str],
+    footprints: Mapping[str, Footprint] = NOTHING,
+    titles: Mapping[str, str] = NOTHING,
 ) -> str:
     """Return the CSS rules for the cells, numbered in the order of `slots`.
 
@@ -78,6 +82,7 @@ def grid_css(
         interface: the interface.
         slots: names of the slots with widgets.
         footprints: footprint of each slot's widget.
+        titles: title of each slot's widget, for the button of the missing slots.
     """
     css = ""
     background = interface.background if interface.background in slots else ""
@@ -93,9 +98,10 @@ def grid_css(
         css += _both_hands(place, right, left, canvas)
         if any(_missing(grids, screen) for grids in (right, left) for screen in grids):
             css += _both_hands(rest, _rest(right, canvas), _rest(left, canvas), canvas)
-            css += "".join(_button(f":is({place},{rest})", right))
+            both = f":is({place},{rest})"
+            css += "".join(_button(both, right, titles))
             if left != right:
-                css += "".join(_button(f":is({place},{rest})", left, f"{LEFT_HAND} "))
+                css += "".join(_button(both, left, titles, f"{LEFT_HAND} "))
     return css
 
 
@@ -137,13 +143,28 @@ def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
     return rest
 
 
-def _button(place: str, grids: Mapping[str, Layout], hand: str = "") -> Iterator[str]:
+def _button(
+    place: str, grids: Mapping[str, Layout], titles: Mapping[str, str], hand: str = ""
+) -> Iterator[str]:
     """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
-        count = len(_missing(grids, screen))
-        shown = f'display:inline-flex;--urc-rest:"{count}"' if count else "display:none"
+        missing = _missing(grids, screen)
+        names = ", ".join(titles.get(slot.name, slot.name) for slot in missing)
+        shown = "display:none"
+        if missing:
+            shown = f'display:inline-flex;--urc-rest:"{len(missing)}"'
+            shown += f";--urc-rest-names:{_css_string(names)}"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
+
+
+def _css_string(text: str) -> str:
+    """Return a string for a style sheet.
+
+    All characters that could end the string or the sheet are escaped (CSS Syntax Level 3, section
+    4.3.7).
+    """
+    return '"' + "".join(f"\\{ord(one):x} " if one in _ESCAPED else one for one in text) + '"'
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:

@@ -22,7 +22,7 @@ from urc.shipped import shipped
 from urc.web import words
 from urc.web.fleet.robots import Robot
 from urc.web.load.widget_trust import WidgetTrust
-from urc.web.show.cells import Cell, render_foreign, widget_cell
+from urc.web.show.cells import Cell, render_foreign, widget_cell, widget_context
 from urc.web.show.interfaces import (
     DEBUG_STYLES,
     DEBUGGING,
@@ -186,7 +186,7 @@ def robot_page(
             title=profile.title,
             import_map=with_words(server.modules),
             widget_styles=_styles(profile, interface, uses, server.trust),
-            grid_css=grid_css(interface, slots, _footprints(profile, uses)),
+            grid_css=grid_css(interface, slots, _footprints(profile, uses), _titles(profile, uses)),
         ),
         title=profile.title,
         url=url,
@@ -238,6 +238,13 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
 
 def _footprints(profile: Profile, uses: Mapping[str, WidgetUse]) -> dict[str, Footprint]:
     return {slot: profile.widgets[use.widget].footprint for slot, use in uses.items()}
+
+
+def _titles(profile: Profile, uses: Mapping[str, WidgetUse]) -> dict[str, str]:
+    return {
+        slot: widget_context(use, profile.widgets[use.widget], profile, uid="").title
+        for slot, use in uses.items()
+    }
 
 
 def _cells(
