@@ -132,6 +132,24 @@ def test_all_that_may_move_is_stopped_by_the_frames_of_now(guard: GuardClient) -
     ]
 
 
+async def test_a_stop_that_is_due_again_needs_a_new_gesture(guard: GuardClient) -> None:
+    """Reported once; a control that may move, or that is unknown, has no lost stop."""
+    guard.handle(messages.StopDue("nothing"), 0)
+    guard.arm("drive", TERMS)
+    guard.tick("drive", b"go")
+    guard.handle(messages.StopDue("drive"), 0)
+    guard.handle(messages.StopWritten("drive", "released", 1), 0)
+    guard.handle(messages.StopDue("drive"), 0)
+    assert await guard.stops() == (("drive", "released"), ("drive", "lost"))
+    told(guard)
+    guard.tick("drive", b"go")
+    assert told(guard) == []
+    guard.arm("drive", TERMS)
+    guard.tick("drive", b"go")
+    assert messages.ArmControl("wire", "drive", TERMS) in told(guard)
+    assert guard.is_armed("drive")
+
+
 def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(guard: GuardClient) -> None:
     """STOP needs no gesture; on lines that may lose it, it is repeated."""
     guard.stop({"drive": b"halt", "lift": b"down"})

@@ -99,18 +99,19 @@ def test_refusal_ends_the_motion_also_without_a_listener() -> None:
 def test_stop_that_is_lost_with_the_line_is_no_longer_confirmed() -> None:
     """It was written, and the reset of the line discarded it."""
     it = Scene()
-    kept: list[bool] = []
+    kept: list[tuple[object, bool]] = []
     it.controller.stop("ann")
     it.controller.stopped("drive", "stopped")
     it.controller.stopped("lift", "stopped")
-    it.controller.on_change = lambda state: kept.append(it.controller.is_confirmed)
+    it.controller.on_change = lambda state: kept.append((state, it.controller.is_confirmed))
+    latched = it.controller.lease.state
     assert it.controller.is_confirmed
     it.controller.stopped("drive", "lost")
     assert not it.controller.is_confirmed
     assert it.controller.is_stop_due
     it.controller.stopped("drive", "revoked")
     assert it.controller.is_confirmed
-    assert kept == [False, True]
+    assert kept == [(latched, False), (latched, True)]
 
 
 def test_stop_of_a_released_control_that_is_lost_is_due_but_no_stop_of_an_operator() -> None:
@@ -124,6 +125,17 @@ def test_stop_of_a_released_control_that_is_lost_is_due_but_no_stop_of_an_operat
     assert it.controller.is_confirmed, "no STOP was pressed"
     assert not it.controller.rests("drive")
     it.controller.stopped("drive", "revoked")
+    assert it.controller.rests("drive")
+
+
+def test_control_whose_lost_stop_is_written_by_another_release_rests() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.controller.release("ann", "drive")
+    it.controller.stopped("drive", "released")
+    it.controller.stopped("drive", "lost")
+    it.controller.stopped("drive", "released")
     assert it.controller.rests("drive")
 
 
