@@ -21,6 +21,7 @@ APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
 AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
 ROSMSG = Path(__file__).resolve().parents[1] / "node_modules" / "@foxglove"
+WS_PROTOCOL = ROSMSG / "ws-protocol"
 PUPPETEER = Path(__file__).resolve().parents[1] / "node_modules" / "puppeteer-core"
 PYODIDE = Path(__file__).resolve().parents[1] / "node_modules" / "pyodide"
 LANGUAGE_SERVER = (
@@ -262,6 +263,13 @@ NEEDS = (
         package="",
         purpose="tests of ROS messages against the reader of Foxglove",
         other=lambda: os.fspath(ROSMSG) if ROSMSG.is_dir() else None,
+    ),
+    Need(
+        name="ws-protocol",
+        executables=(),
+        package="",
+        purpose="tests of the Foxglove server against Foxglove's client and message schemas",
+        other=lambda: os.fspath(WS_PROTOCOL) if WS_PROTOCOL.is_dir() else None,
     ),
     Need(
         name="axe",

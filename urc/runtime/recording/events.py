@@ -12,7 +12,8 @@ import msgspec
 
 from urc.model.values import Alarm, Reading, Sample, Signal
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry, Traffic
-from urc.runtime.recording.shapes import DRIVING, LEVELS, LINK, LOG, SIGNALS, WIRE
+from urc.runtime.json_messages import LEVELS
+from urc.runtime.recording.shapes import DRIVING, LINK, LOG, SIGNALS, WIRE
 
 __all__ = ["event_of", "is_state", "topic_of"]
 
