@@ -90,7 +90,7 @@ class AccessMiddleware:
         elif is_let_in or self._is_for_all(scope):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
-            await turn_away(receive, send, SAID)
+            await turn_away(scope, receive, send, SAID)
         else:
             await self._refusal(scope)(scope, receive, send)
 

@@ -41,6 +41,7 @@ from urc.web.alarms.routes import AlarmCalls
 from urc.web.api.calls import api_routes
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
+from urc.web.api.stop import delivered_stop, press_stop
 from urc.web.api_document import DOCUMENT, document
 from urc.web.audit.routes import AuditRoutes
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
@@ -48,9 +49,10 @@ from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
 from urc.web.drive.redundant_socket import RedundantSocket
 from urc.web.fleet.contact_watch import ContactWatch
-from urc.web.fleet.fleet import Fleet
+from urc.web.fleet.fleet import Fleet, service_of
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import LINGER_S, Playback, Robot, RobotService, missing_settings
+from urc.web.foxglove.socket import FoxgloveServer, TokenInAddress
 from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
 from urc.web.load.widget_trust import WidgetTrust
@@ -68,7 +70,7 @@ from urc.web.serve.access import Access
 from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
-from urc.web.serve.replies import API, Endpoint, told
+from urc.web.serve.replies import API, Endpoint, answer, answers_errors, told
 from urc.web.serve.rights import (
     DRIVE,
     LOCAL,
@@ -222,6 +224,7 @@ class _Dashboard(Starlette):
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
                 ProtectedSocket("/ws/spare", routes.spare, SIGNED_IN),
+                *routes.foxglove().routes(),
                 *(dev.routes() if dev else no_dev_routes()),
                 *(() if routes.dev_start else no_dev_start()),
             ],
@@ -236,7 +239,8 @@ class _Dashboard(Starlette):
         policy = Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
         )
-        return ProxyMiddleware(policy, self._ways_in.sign_ins, self._ways_in.options.proxies)
+        proxied = ProxyMiddleware(policy, self._ways_in.sign_ins, self._ways_in.options.proxies)
+        return TokenInAddress(proxied)
 
 
 @dataclass(slots=True)
@@ -315,6 +319,11 @@ class _Routes:
             ways=self.ways,
             data=self.data,
         )
+
+    def foxglove(self) -> FoxgloveServer:
+        """Return the server for programs that speak the Foxglove protocol."""
+        run, followed = self.robot_calls.run, self.access.followed
+        return FoxgloveServer(lambda: self.services, run, followed, self.recorder)
 
     def stoppable(self) -> list[Stoppable]:
         """Return all robots that can move and that STOP can therefore stop."""
@@ -442,22 +451,12 @@ class _Routes:
     async def health(self, _: Request) -> Response:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
 
+    @answers_errors
     async def stop(self, request: Request) -> Response:
         """Stop a robot and latch STOP; pages without a working socket use this request."""
-        service = self.services.get(request.path_params["name"])
-        if service is None:
-            return told(404, _NO_ROBOT, "unknown-robot")
-        if not service.controls.controller.can_move or service.robot.playback is not None:
-            return told(409, "this robot has no motion to stop", "no-motion")
-        name = request.path_params["name"]
-        who = stopper_of(request, name)
-        was_latched = bool(service.controls.controller.lease.latched)
-        service.controls.stop(who.name, who)
-        if was_latched and not who.principal:
-            self.recorder.stopped_by_unknown(name, who.place)
-        is_confirmed = await service.deliver_stop()
-        by = service.controls.controller.lease.state.latched_by
-        return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
+        name, service = service_of(self.services, request)
+        press_stop(name, service, stopper_of(request, name), self.recorder)
+        return answer(await delivered_stop(service))
 
     async def controls(self, request: Request) -> Response:
         """Return a robot's lease and the state of its STOP."""

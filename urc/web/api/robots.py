@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp
 
 from urc.images import media_type
+from urc.model.values import Reading
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
 from urc.runtime.contact_times import ContactTimes
@@ -196,14 +197,32 @@ class RobotCalls:
         """Run a command and return its reply."""
         name, service = service_of(self._services(), request)
         asked = await _optional_body(request, CommandAsked, CommandAsked())
-        peer = self._moving_peer(request, name, service)
-        wanted = request.path_params["command"]
+        peer, wanted = self._peer(request, name), request.path_params["command"]
+        values = await self.run(name, service, peer, wanted, asked)
+        return answer(CommandAnswer({key: plain(one) for key, one in values.items()}))
+
+    async def run(
+        self, name: str, service: RobotService, peer: SocketPeer, wanted: str, asked: CommandAsked
+    ) -> Mapping[str, Reading]:
+        """Run a command and return the values of its reply.
+
+        Args:
+            name: name of the robot in paths.
+            service: the robot.
+            peer: the visitor, who has the right `DRIVE` for the robot.
+            wanted: name of the command.
+            asked: arguments and options.
+
+        Raises:
+            ApiError: the command was refused, or has failed.
+        """
+        self._admit(peer, service)
         known = service.robot.profile.driver.commands.get(wanted)
         if known is None:
             raise ApiError(404, f"{name} has no command {wanted!r}", "unknown-command")
         with self._limits.running(peer.who), ExitStack() as stack:
             if asked.session:
-                session = self._session(request, service, asked.session)
+                session = self.sessions.find(asked.session, service, peer.identity)
             else:
                 live = await opened(service, peer, stack)
                 session = stack.enter_context(self.sessions.temporary(service, live, peer))
@@ -218,7 +237,7 @@ class RobotCalls:
             )
             if outcome.code:
                 raise _failure(outcome, session, wanted)
-        return answer(CommandAnswer({key: plain(one) for key, one in outcome.values.items()}))
+        return outcome.values
 
     def _confirmation(self, session: ProgramSession, asked: CommandAsked, wanted: str) -> str:
         """Return a token for a confirmed command; "" if the command needs no confirmation."""
@@ -275,10 +294,13 @@ class RobotCalls:
     def _moving_peer(self, request: Request, name: str, service: RobotService) -> SocketPeer:
         """Return the visitor; raise `ApiError` for a playback or above the maximum rate."""
         peer = self._peer(request, name)
+        self._admit(peer, service)
+        return peer
+
+    def _admit(self, peer: SocketPeer, service: RobotService) -> None:
         self._limits.count(peer.who, service.clock.now())
         if service.robot.playback is not None:
             raise ApiError(409, "this is the playback of a recording", "recorded")
-        return peer
 
     def _session(self, request: Request, service: RobotService, secret: str) -> ProgramSession:
         return self.sessions.find(secret, service, visitor_of(request).identity)

@@ -239,8 +239,11 @@ class Policy:
         is_upgrade = scope["type"] == "websocket"
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
-            if not origins and scope["state"]["visitor"].is_program:
+            visitor = scope["state"]["visitor"]
+            if not origins and visitor.is_program:
                 pass  # pages from other sites cannot send a token
+            elif scope["state"].get("has_address_token") and visitor.is_known:
+                pass  # pages from other sites do not know the token
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")

@@ -14,6 +14,7 @@ from starlette.types import Receive, Scope, Send
 from urc.model.role import Role
 from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
 from urc.web.words import t
+from urc.wire.foxglove import chosen_subprotocol, encode_status
 
 __all__ = [
     "ADMINISTER",
@@ -126,7 +127,7 @@ class ProtectedSocket(WebSocketRoute):
         if _may(scope, self.right):
             await super().handle(scope, receive, send)
         else:
-            await turn_away(receive, send, self.right.refusal)
+            await turn_away(scope, receive, send, self.right.refusal)
 
 
 def stale_text() -> str:
@@ -135,11 +136,14 @@ def stale_text() -> str:
     return t("Sign in again: this needs a sign-in within the last {n} minutes.", n=minutes)
 
 
-async def turn_away(receive: Receive, send: Send, reason: str) -> None:
+async def turn_away(scope: Scope, receive: Receive, send: Send, reason: str) -> None:
     """Accept a socket and close it with the reason; pages can't read refused handshakes."""
     await receive()
-    await send({"type": "websocket.accept"})
-    await send({"type": "websocket.send", "text": encode_error("refused", reason)})
+    # A viewer shows a status of its own protocol.
+    subprotocol = chosen_subprotocol(scope.get("subprotocols", ()))
+    text = encode_status("error", reason).decode() if subprotocol else ""
+    await send({"type": "websocket.accept", "subprotocol": subprotocol})
+    await send({"type": "websocket.send", "text": text or encode_error("refused", reason)})
     await send({"type": "websocket.close", "code": CLOSE_NOT_LET_IN, "reason": reason[:100]})
 
 

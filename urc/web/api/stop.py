@@ -1,0 +1,38 @@
+"""STOP from a program or a page without its WebSocket.
+
+Layer 5. HTTP and the Foxglove server share this code.
+"""
+
+from urc.motion.lease import Operator
+from urc.runtime.server_recorder import ServerRecorder
+from urc.web.fleet.robots import RobotService
+from urc.web.manage.wire import StopResult
+from urc.web.serve.replies import ApiError
+
+__all__ = ["delivered_stop", "press_stop"]
+
+
+def press_stop(name: str, service: RobotService, who: Operator, recorder: ServerRecorder) -> None:
+    """Stop a robot and latch its STOP, before the function returns.
+
+    Args:
+        name: name of the robot in URLs.
+        service: the robot.
+        who: the person or program that presses STOP.
+        recorder: recorder of STOPs by visitors who have not signed in.
+
+    Raises:
+        ApiError: the robot cannot move.
+    """
+    if not service.controls.controller.can_move or service.robot.playback is not None:
+        raise ApiError(409, "this robot has no motion to stop", "no-motion")
+    was_latched = bool(service.controls.controller.lease.latched)
+    service.controls.stop(who.name, who)
+    if was_latched and not who.principal:
+        recorder.stopped_by_unknown(name, who.place)
+
+
+async def delivered_stop(service: RobotService) -> StopResult:
+    """Wait briefly until the robot has received a STOP; connect if necessary."""
+    is_confirmed = await service.deliver_stop()
+    return StopResult(service.controls.controller.lease.state.latched_by, is_confirmed)

@@ -1,0 +1,177 @@
+"""The channels and services that the server offers to one visitor, by the visitor's current rights.
+
+Layer 5. Pure, except for the tasks that the client adds. Channels and services have ids from one
+counter, so an id is never used again.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import NamedTuple
+
+from urc.model.role import Role
+from urc.runtime.hub import Hub
+from urc.web.api.describe import may_run
+from urc.web.feed.client_socket import SocketPeer
+from urc.web.fleet.robots import Robot, RobotService
+from urc.web.foxglove.robot_feed import RobotFeed
+from urc.web.foxglove.services import RobotServiceType, robot_services
+from urc.web.foxglove.topics import HubMessages, RobotTopic, robot_topics
+from urc.wire import foxglove as wire
+
+__all__ = ["Changes", "Offer", "Offers", "OfferSource"]
+
+
+class OfferSource(NamedTuple):
+    """The robots, seen by one visitor."""
+
+    services: Callable[[], Mapping[str, RobotService]]
+    """Function that returns the robots, keyed by their names in URLs."""
+    may_watch: Callable[[str], bool]
+    """Function that returns whether the visitor may watch a robot."""
+    is_let_in: Callable[[], bool]
+    """Function that returns whether the visitor has any role."""
+    peer: Callable[[str, RobotService], SocketPeer]
+    """Function that returns the visitor with the rights for a robot."""
+    messages: Callable[[Hub, RobotService], HubMessages]
+    """Function that returns the messages of a hub, shared by all clients."""
+
+
+class Offer:
+    """One robot that is offered to the visitor."""
+
+    def __init__(
+        self, name: str, service: RobotService, peer: SocketPeer, wake: Callable[[], None]
+    ) -> None:
+        self.name = name
+        self.service = service
+        self.robot: Robot = service.robot
+        """The version of the robot that the channels describe."""
+        self.peer = peer
+        self.feed = RobotFeed(wake)
+        self.task: asyncio.Task[None] | None = None
+        """Task that keeps the robot connected while the client subscribes to a channel."""
+        self.channels: list[int] = []
+        self.services: dict[str, int] = {}
+        """Ids of the services, keyed by command."""
+        self.allowed: frozenset[str] | None = None
+        """Commands that the visitor may run; None until the services are offered."""
+
+    @property
+    def role(self) -> Role | None:
+        """Current role of the visitor for the robot."""
+        return self.peer.rights.role()
+
+
+class Changes(NamedTuple):
+    """The result of an update."""
+
+    texts: list[bytes]
+    """Messages for the client, in order."""
+    ended: list[Offer]
+    """Robots that are no longer offered."""
+
+
+class Offers:
+    """Everything that is offered to one visitor."""
+
+    def __init__(self, source: OfferSource) -> None:
+        """Start without offers; `update` adds them."""
+        self._source = source
+        self._last_id = 0
+        self.robots: dict[str, Offer] = {}
+        self.channels: dict[int, tuple[Offer, RobotTopic]] = {}
+        self.services: dict[int, tuple[Offer, RobotServiceType]] = {}
+
+    @property
+    def is_let_in(self) -> bool:
+        """Whether the visitor may still watch any robot."""
+        return self._source.is_let_in()
+
+    def was_offered(self, number: int) -> bool:
+        """Return whether an id belongs, or once belonged, to a channel or service."""
+        return 0 < number <= self._last_id
+
+    def messages(self, offer: Offer, hub: Hub) -> HubMessages:
+        """Return the messages of a hub, shared by all clients."""
+        return self._source.messages(hub, offer.service)
+
+    def update(self, wake: Callable[[str], None]) -> Changes:
+        """Compare the offers with the robots and the visitor's rights, and apply the differences.
+
+        Args:
+            wake: function that is called with a robot's name when a message of the robot is ready.
+        """
+        changes = Changes([], [])
+        wanted = {
+            name: service
+            for name, service in self._source.services().items()
+            if self._source.may_watch(name)
+        }
+        for name, offer in list(self.robots.items()):
+            service = wanted.get(name)
+            if service is not offer.service or offer.service.robot is not offer.robot:
+                self._withdraw(offer, changes)
+        for name, service in wanted.items():
+            if name not in self.robots:
+                self._offer(name, service, wake, changes)
+            self._update_services(self.robots[name], changes)
+        return changes
+
+    def _offer(
+        self, name: str, service: RobotService, wake: Callable[[str], None], changes: Changes
+    ) -> None:
+        offer = Offer(name, service, self._source.peer(name, service), partial(wake, name))
+        self.robots[name] = offer
+        announced = []
+        for topic in robot_topics(name, service.robot.profile.driver):
+            number = self._next_id()
+            offer.channels.append(number)
+            self.channels[number] = (offer, topic)
+            announced.append(
+                wire.OfferedChannel(number, topic.topic, topic.schema_name, topic.schema)
+            )
+        changes.texts.append(wire.encode_advertise(announced))
+
+    def _withdraw(self, offer: Offer, changes: Changes) -> None:
+        del self.robots[offer.name]
+        for number in offer.channels:
+            del self.channels[number]
+        for number in offer.services.values():
+            del self.services[number]
+        changes.texts.append(wire.encode_unadvertise(offer.channels))
+        if offer.services:
+            changes.texts.append(wire.encode_unadvertise_services(offer.services.values()))
+        changes.ended.append(offer)
+
+    def _update_services(self, offer: Offer, changes: Changes) -> None:
+        """Offer the commands that the visitor may run now."""
+        driver, role, may_give = offer.robot.profile.driver, offer.role, offer.peer.rights.may_give
+        names = {one.name for one in driver.commands.values() if may_run(one, role)}
+        allowed = frozenset(filter(may_give, names))
+        if offer.robot.playback is not None or offer.allowed == allowed:
+            return
+        offer.allowed = allowed
+        found = {
+            one.command: one
+            for one in robot_services(offer.name, driver, lambda one: one.name in allowed)
+        }
+        ended = {name: number for name, number in offer.services.items() if name not in found}
+        for name, number in ended.items():
+            del offer.services[name], self.services[number]
+        if ended:
+            changes.texts.append(wire.encode_unadvertise_services(ended.values()))
+        announced = []
+        for name, one in found.items():
+            if name not in offer.services:
+                number = offer.services[name] = self._next_id()
+                self.services[number] = (offer, one)
+                announced.append(
+                    wire.OfferedService(number, one.name, one.type, one.request, one.response)
+                )
+        if announced:
+            changes.texts.append(wire.encode_services(announced))
+
+    def _next_id(self) -> int:
+        self._last_id += 1
+        return self._last_id

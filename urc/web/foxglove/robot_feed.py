@@ -1,0 +1,179 @@
+"""One client's subscriptions to one robot's topics, with the messages that wait to be sent.
+
+Layer 5. The waiting messages are bounded: a few readings of each signal, the newest image and the
+newest state of each connection. If a client reads too slowly, older readings are dropped and
+counted. Other clients are not affected.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final
+
+from urc.model.values import Sample, Signal
+from urc.runtime.hub import Hub, LinkStatus
+from urc.web.foxglove.topics import LOG_SOURCE, HubMessages, TopicMessage, TopicSource
+from urc.wire.foxglove import encode_message_head
+
+__all__ = ["FIRST_NOTES", "MOST_WAITING", "RobotFeed"]
+
+MOST_WAITING: Final = 16
+"""Maximum number of waiting readings per signal; of images, only the newest waits."""
+FIRST_NOTES: Final = 50
+"""Number of earlier log entries that a new subscription receives."""
+
+
+class RobotFeed:
+    """The subscriptions of one client to one robot."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """Start without subscriptions; `wake` is called when a message is ready to be sent."""
+        self._wake = wake
+        self._ids: dict[TopicSource, int] = {}
+        """The client's subscription ids."""
+        self._waiting: dict[str, deque[Sample]] = {}
+        """Readings that wait to be sent, keyed by subscribed signal."""
+        self._ready: dict[TopicSource, None] = {}
+        """Sources with waiting messages; the first is the next to be sent."""
+        self._seen_notes = 0
+        self._seen_links: dict[str, LinkStatus] = {}
+        self._dropped = 0
+        self._hub: Hub | None = None
+        self._messages: HubMessages | None = None
+
+    @property
+    def is_used(self) -> bool:
+        """Whether the client subscribes to any topic of the robot."""
+        return bool(self._ids)
+
+    def has(self, source: TopicSource) -> bool:
+        """Return whether the client subscribes to the topic of `source`."""
+        return source in self._ids
+
+    def subscribe(self, source: TopicSource, subscription: int, signal: Signal | None) -> None:
+        """Begin to collect messages; the newest known value is the first message.
+
+        Args:
+            source: origin of the messages.
+            subscription: the client's id of the subscription.
+            signal: the signal, if the source is a signal.
+        """
+        self._ids[source] = subscription
+        if signal is not None:
+            size = 1 if signal.type in ("image", "blob") else MOST_WAITING
+            self._waiting[signal.name] = deque(maxlen=size)
+        if self._hub is not None:
+            self._begin(source, self._hub)
+
+    def unsubscribe(self, source: TopicSource) -> None:
+        """Drop a subscription and its waiting messages."""
+        self._ids.pop(source, None)
+        self._ready.pop(source, None)
+        self._waiting.pop(source.name, None) if source.kind == "signal" else None
+        self._seen_links.pop(source.name, None) if source.kind == "link" else None
+
+    def take_dropped(self) -> int:
+        """Return the number of messages dropped since the last call."""
+        dropped, self._dropped = self._dropped, 0
+        return dropped
+
+    @contextmanager
+    def attached(self, hub: Hub, messages: HubMessages) -> Iterator[None]:
+        """Collect messages from the hub of a session while the context is open."""
+        self._hub, self._messages = hub, messages
+        self._seen_notes = max(0, hub.notes_count - FIRST_NOTES)
+        self._seen_links.clear()
+        for source in self._ids:
+            self._begin(source, hub)
+        try:
+            with hub.passed_to(self._arrived), hub.heed(self._changed):
+                yield
+        finally:
+            self._hub = self._messages = None
+            self._ready.clear()
+            for waiting in self._waiting.values():
+                waiting.clear()
+
+    def next_message(self) -> bytes | None:
+        """Remove and return the next binary message; None if no message is ready."""
+        while self._ready:
+            source = next(iter(self._ready))
+            del self._ready[source]
+            message = self._take(source)
+            if message is not None:
+                return encode_message_head(self._ids[source], message.time_ns) + message.data
+        return None
+
+    # -- events of the hub
+
+    def _arrived(self, samples: Sequence[Sample]) -> None:
+        """Collect the subscribed signals' readings."""
+        for sample in samples:
+            waiting = self._waiting.get(sample.signal)
+            if waiting is not None:
+                self._push(waiting, sample)
+
+    def _push(self, waiting: deque[Sample], sample: Sample) -> None:
+        self._dropped += len(waiting) == waiting.maxlen
+        waiting.append(sample)
+        self._mark(TopicSource("signal", sample.signal))
+
+    def _changed(self) -> None:
+        """Note a new log entry or a new state of a connection."""
+        hub = self._hub
+        if hub is None:
+            return
+        if hub.notes_count > self._seen_notes and LOG_SOURCE in self._ids:
+            self._mark(LOG_SOURCE)
+        for source in self._ids:
+            if source.kind == "link" and hub.links.get(source.name) is not self._seen_links.get(
+                source.name
+            ):
+                self._mark(source)
+
+    def _begin(self, source: TopicSource, hub: Hub) -> None:
+        if source.kind == "signal":
+            newest = hub.latest(source.name)
+            if newest is not None:
+                self._push(self._waiting[source.name], newest)
+            return
+        if source.kind == "log":
+            self._seen_notes = max(0, hub.notes_count - FIRST_NOTES)
+        self._changed()
+
+    def _mark(self, source: TopicSource) -> None:
+        self._ready.setdefault(source)
+        self._wake()
+
+    # -- messages
+
+    def _take(self, source: TopicSource) -> TopicMessage | None:
+        hub, messages = self._hub, self._messages
+        if hub is None or messages is None:
+            return None
+        if source.kind == "signal":
+            waiting = self._waiting[source.name]
+            sample = waiting.popleft()
+            if waiting:
+                self._ready[source] = None
+            return messages.of_sample(sample)
+        if source.kind == "log":
+            return self._take_note(hub, messages)
+        status = hub.links.get(source.name)
+        if status is None or status is self._seen_links.get(source.name):
+            return None
+        self._seen_links[source.name] = status
+        return messages.of_link(status)
+
+    def _take_note(self, hub: Hub, messages: HubMessages) -> TopicMessage | None:
+        missing = hub.notes_count - self._seen_notes
+        lost = max(0, missing - len(hub.notes))
+        self._dropped += lost
+        self._seen_notes += lost
+        missing -= lost
+        if not missing:
+            return None
+        self._seen_notes += 1
+        if missing > 1:
+            self._ready[LOG_SOURCE] = None
+        return messages.of_note(hub.notes[-missing])
