@@ -10,8 +10,9 @@ import pytest
 
 from tests.unit.web.test_client import FakeLine
 from urc.model.driver import Argument, Command, Hold
+from urc.model.interface import WidgetUse
 from urc.model.role import Role, includes
-from urc.model.values import Reading, Signal
+from urc.model.values import Reading, Sample, Signal
 from urc.motion.lease import Operator
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
@@ -45,7 +46,10 @@ SIGNALS = {
     "battery": Signal("battery", "integer", unit="%"),
     "mode": Signal("mode", "string"),
     "camera": Signal("camera", "image"),
+    "x": Signal("x", unit="m"),
+    "y": Signal("y", unit="m"),
 }
+MAP = WidgetUse("place", "map", {"x": "x", "y": "y"})
 SPEED = Argument("speed", "number", min=-1, max=1)
 COMMANDS = {
     "say": Command("say", "wire", text("say"), arguments={"word": Argument("word", "string")}),
@@ -79,7 +83,7 @@ class Viewer:
 
     def __init__(self, role: Role | None) -> None:
         self.clock = FakeClock()
-        profile = dashboard_profile(signals=SIGNALS, commands=COMMANDS)
+        profile = dashboard_profile(signals=SIGNALS, commands=COMMANDS, uses=(MAP,))
         self.robot = FakeRobot(profile, self.clock)
         self.audit: list[AuditEntry] = []
         self.services: dict[str, RobotService] = {"puppet": self.service(self.robot)}
@@ -114,8 +118,8 @@ class Viewer:
             may_watch=lambda _: includes(self.rights.now, "watch"),
             is_let_in=lambda: self.rights.now is not None,
             peer=lambda *_: SocketPeer(who="viewer", is_known=True, rights=self.rights),
-            messages=lambda hub, _: self.hubs.setdefault(
-                hub, HubMessages(hub.signals, lambda time_s: round(time_s * 1e9))
+            messages=lambda hub, name, _: self.hubs.setdefault(
+                hub, HubMessages(name, self.robot.profile, lambda time_s: round(time_s * 1e9))
             ),
         )
 
@@ -209,6 +213,9 @@ async def test_a_client_first_learns_of_the_server_then_of_the_channels() -> Non
             "/puppet/battery",
             "/puppet/mode",
             "/puppet/camera",
+            "/puppet/x",
+            "/puppet/y",
+            "/puppet/urc/widget/place",
             "/puppet/urc/log",
             "/puppet/urc/link/wire",
         ]
@@ -274,6 +281,17 @@ async def test_a_picture_is_a_compressed_image() -> None:
         (picture,) = seen.messages(1)
         assert picture["format"] == "jpeg"
         assert picture["frame_id"] == "camera"
+
+
+async def test_a_pose_is_sent_once_for_all_its_signals() -> None:
+    async with viewer() as seen:
+        await seen.subscribe("/puppet/urc/widget/place", 1)
+        now_s = seen.clock.now()
+        seen.robot.hub.publish([Sample("x", 1.5, now_s), Sample("y", -2.0, now_s)])
+        await seen.reading("battery", 1)
+        await seen.reading("y", 3.0)
+        places = [one["pose"]["position"] for one in seen.messages(1)]
+        assert [(one["x"], one["y"]) for one in places] == [(1.5, -2.0), (1.5, 3.0)]
 
 
 async def test_a_slow_client_gets_the_newest_readings_and_is_told_what_it_missed() -> None:

@@ -33,7 +33,7 @@ class OfferSource(NamedTuple):
     """Function that returns whether the visitor has any role."""
     peer: Callable[[str, RobotService], SocketPeer]
     """Function that returns the visitor with the rights for a robot."""
-    messages: Callable[[Hub, RobotService], HubMessages]
+    messages: Callable[[Hub, str, RobotService], HubMessages]
     """Function that returns the messages of a hub, shared by all clients."""
 
 
@@ -94,7 +94,7 @@ class Offers:
 
     def messages(self, offer: Offer, hub: Hub) -> HubMessages:
         """Return the messages of a hub, shared by all clients."""
-        return self._source.messages(hub, offer.service)
+        return self._source.messages(hub, offer.name, offer.service)
 
     def update(self, wake: Callable[[str], None]) -> Changes:
         """Compare the offers with the robots and the visitor's rights, and apply the differences.
@@ -124,7 +124,7 @@ class Offers:
         offer = Offer(name, service, self._source.peer(name, service), partial(wake, name))
         self.robots[name] = offer
         announced = []
-        for topic in robot_topics(name, service.robot.profile.driver):
+        for topic in robot_topics(name, service.robot.profile):
             number = self._next_id()
             offer.channels.append(number)
             self.channels[number] = (offer, topic)

@@ -31,8 +31,10 @@ class RobotFeed:
         self._wake = wake
         self._ids: dict[TopicSource, int] = {}
         """The client's subscription ids."""
-        self._waiting: dict[str, deque[Sample]] = {}
-        """Readings that wait to be sent, keyed by subscribed signal."""
+        self._waiting: dict[TopicSource, deque[Sample | TopicMessage]] = {}
+        """Readings and messages that wait to be sent, keyed by subscribed signal or place."""
+        self._sources: dict[str, list[TopicSource]] = {}
+        """Subscribed signals and places, keyed by signal that changes them."""
         self._ready: dict[TopicSource, None] = {}
         """Sources with waiting messages; the first is the next to be sent."""
         self._seen_notes = 0
@@ -59,18 +61,21 @@ class RobotFeed:
             signal: the signal, if the source is a signal.
         """
         self._ids[source] = subscription
-        if signal is not None:
-            size = 1 if signal.type in ("image", "blob") else MOST_WAITING
-            self._waiting[signal.name] = deque(maxlen=size)
+        if source.kind in ("signal", "place"):
+            is_large = signal is not None and signal.type in ("image", "blob")
+            self._waiting[source] = deque(maxlen=1 if is_large else MOST_WAITING)
         if self._hub is not None:
+            self._sort()
             self._begin(source, self._hub)
 
     def unsubscribe(self, source: TopicSource) -> None:
         """Drop a subscription and its waiting messages."""
         self._ids.pop(source, None)
         self._ready.pop(source, None)
-        self._waiting.pop(source.name, None) if source.kind == "signal" else None
-        self._seen_links.pop(source.name, None) if source.kind == "link" else None
+        self._waiting.pop(source, None)
+        if source.kind == "link":
+            self._seen_links.pop(source.name, None)
+        self._sort()
 
     def take_dropped(self) -> int:
         """Return the number of messages dropped since the last call."""
@@ -83,6 +88,7 @@ class RobotFeed:
         self._hub, self._messages = hub, messages
         self._seen_notes = max(0, hub.notes_count - FIRST_NOTES)
         self._seen_links.clear()
+        self._sort()
         for source in self._ids:
             self._begin(source, hub)
         try:
@@ -106,17 +112,39 @@ class RobotFeed:
 
     # -- events of the hub
 
-    def _arrived(self, samples: Sequence[Sample]) -> None:
-        """Collect the subscribed signals' readings."""
-        for sample in samples:
-            waiting = self._waiting.get(sample.signal)
-            if waiting is not None:
-                self._push(waiting, sample)
+    def _sort(self) -> None:
+        """Find the subscribed signals and places that each signal changes."""
+        self._sources = {}
+        for source in self._waiting:
+            names = {source.name}
+            if source.kind == "place":
+                names = set(self._messages.signals_of(source.name) if self._messages else ())
+            for name in names:
+                self._sources.setdefault(name, []).append(source)
 
-    def _push(self, waiting: deque[Sample], sample: Sample) -> None:
+    def _arrived(self, samples: Sequence[Sample]) -> None:
+        """Collect the subscribed signals' readings, and the places that they change."""
+        places: dict[TopicSource, None] = {}
+        for sample in samples:
+            for source in self._sources.get(sample.signal, ()):
+                if source.kind == "signal":
+                    self._push(source, sample)
+                else:
+                    places[source] = None
+        for source in places:
+            self._push_place(source)
+
+    def _push(self, source: TopicSource, item: Sample | TopicMessage) -> None:
+        waiting = self._waiting[source]
         self._dropped += len(waiting) == waiting.maxlen
-        waiting.append(sample)
-        self._mark(TopicSource("signal", sample.signal))
+        waiting.append(item)
+        self._mark(source)
+
+    def _push_place(self, source: TopicSource) -> None:
+        if self._hub is not None and self._messages is not None:
+            message = self._messages.of_place(source.name, self._hub)
+            if message is not None:
+                self._push(source, message)
 
     def _changed(self) -> None:
         """Note a new log entry or a new state of a connection."""
@@ -135,7 +163,10 @@ class RobotFeed:
         if source.kind == "signal":
             newest = hub.latest(source.name)
             if newest is not None:
-                self._push(self._waiting[source.name], newest)
+                self._push(source, newest)
+            return
+        if source.kind == "place":
+            self._push_place(source)
             return
         if source.kind == "log":
             self._seen_notes = max(0, hub.notes_count - FIRST_NOTES)
@@ -151,12 +182,12 @@ class RobotFeed:
         hub, messages = self._hub, self._messages
         if hub is None or messages is None:
             return None
-        if source.kind == "signal":
-            waiting = self._waiting[source.name]
-            sample = waiting.popleft()
+        if source.kind in ("signal", "place"):
+            waiting = self._waiting[source]
+            item = waiting.popleft()
             if waiting:
                 self._ready[source] = None
-            return messages.of_sample(sample)
+            return messages.of_sample(item) if isinstance(item, Sample) else item
         if source.kind == "log":
             return self._take_note(hub, messages)
         status = hub.links.get(source.name)

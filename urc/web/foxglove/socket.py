@@ -95,14 +95,16 @@ class FoxgloveServer:
         with self._followed(client.recheck):
             await client.serve()
 
-    def _shared(self, hub: Hub, service: RobotService) -> HubMessages:
+    def _shared(self, hub: Hub, name: str, service: RobotService) -> HubMessages:
         """Return the messages of a hub, which all clients share."""
         found = self._messages.get(hub)
         if found is None:
             # A session has one offset, because a change to the system clock must not shift its
             # times.
             offset_ns = time.time_ns() - round(service.clock.now() * _SECOND_NS)
-            found = HubMessages(hub.signals, lambda time_s: offset_ns + round(time_s * _SECOND_NS))
+            found = HubMessages(
+                name, service.robot.profile, lambda time_s: offset_ns + round(time_s * _SECOND_NS)
+            )
             self._messages[hub] = found
         return found
 

@@ -5,12 +5,12 @@ because a signal may have any name.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection
 from typing import Literal, NamedTuple
 
-from urc.model.driver import Driver
-from urc.model.values import Sample, Signal
-from urc.runtime.hub import LinkStatus, LogEntry
+from urc.model.profile import Profile
+from urc.model.values import Sample
+from urc.runtime.hub import Hub, LinkStatus, LogEntry
 from urc.runtime.json_messages import (
     LINK_SCHEMA,
     LOG_SCHEMA,
@@ -20,6 +20,7 @@ from urc.runtime.json_messages import (
     sample_message,
     signal_schema,
 )
+from urc.runtime.place_messages import place_sources
 
 __all__ = ["LOG_SOURCE", "HubMessages", "TopicMessage", "RobotTopic", "TopicSource", "robot_topics"]
 
@@ -29,9 +30,9 @@ _LAST_NS = 2**63 - 1
 class TopicSource(NamedTuple):
     """The origin of a topic's messages in a robot's hub."""
 
-    kind: Literal["signal", "log", "link"]
+    kind: Literal["signal", "place", "log", "link"]
     name: str = ""
-    """Name of the signal or transport."""
+    """Name of the signal, slot or transport."""
 
 
 LOG_SOURCE = TopicSource("log")
@@ -56,12 +57,17 @@ class TopicMessage(NamedTuple):
     """JSON text."""
 
 
-def robot_topics(robot: str, driver: Driver) -> tuple[RobotTopic, ...]:
+def robot_topics(robot: str, profile: Profile) -> tuple[RobotTopic, ...]:
     """Return the topics of a robot, whose name in URLs is `robot`."""
+    driver = profile.driver
     found = [
         _topic(f"/{robot}/{signal.name}", TopicSource("signal", signal.name), signal_schema(signal))
         for signal in driver.signals.values()
     ]
+    for one in place_sources(robot, profile):
+        found.append(
+            _topic(f"/{robot}/urc/widget/{one.slot}", TopicSource("place", one.slot), one.shape)
+        )
     found.append(_topic(f"/{robot}/urc/log", LOG_SOURCE, LOG_SCHEMA))
     for name in driver.transports:
         found.append(_topic(f"/{robot}/urc/link/{name}", TopicSource("link", name), LINK_SCHEMA))
@@ -73,18 +79,38 @@ def _topic(topic: str, source: TopicSource, shape: MessageSchema) -> RobotTopic:
 
 
 class HubMessages:
-    """The messages of one hub; all clients share the newest message of each signal."""
+    """The messages of one hub; all clients share the newest message of each topic."""
 
-    def __init__(self, signals: Mapping[str, Signal], utc_ns: Callable[[float], int]) -> None:
+    def __init__(self, robot: str, profile: Profile, utc_ns: Callable[[float], int]) -> None:
         """Start without messages.
 
         Args:
-            signals: the driver's signals.
+            robot: name of the robot in URLs.
+            profile: profile of the robot.
             utc_ns: function that converts seconds on the hub's clock to nanoseconds since 1970.
         """
-        self._signals = signals
+        self._signals = profile.driver.signals
+        self._places = {one.slot: one for one in place_sources(robot, profile)}
         self._utc_ns = utc_ns
         self._newest: dict[str, tuple[Sample, TopicMessage]] = {}
+        self._newest_places: dict[str, tuple[int, TopicMessage | None]] = {}
+        """Hub revision and message of each place."""
+
+    def signals_of(self, slot: str) -> Collection[str]:
+        """Return the signals that change a place."""
+        place = self._places.get(slot)
+        return place.inputs.values() if place is not None else ()
+
+    def of_place(self, slot: str, hub: Hub) -> TopicMessage | None:
+        """Return the newest message of a place; None without a value."""
+        known = self._newest_places.get(slot)
+        if known is not None and known[0] == hub.revision:
+            return known[1]
+        place = self._places.get(slot)
+        found = place.message(hub.latest, self._time) if place is not None else None
+        message = TopicMessage(*found) if found is not None else None
+        self._newest_places[slot] = hub.revision, message
+        return message
 
     def of_sample(self, sample: Sample) -> TopicMessage:
         """Return the message for a reading."""
