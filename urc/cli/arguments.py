@@ -139,6 +139,17 @@ def add_port(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_foxglove(parser: argparse.ArgumentParser) -> None:
+    """Declare the option `--foxglove`, a port for viewers such as Foxglove and Lichtblick."""
+    parser.add_argument(
+        "--foxglove",
+        type=port,
+        metavar="PORT",
+        help="port for viewers that speak the Foxglove WebSocket protocol, usually 8765;"
+        " 0 selects a free port (default: only the path /api/v1/foxglove of the dashboard)",
+    )
+
+
 def load(word: str) -> "Profile":
     """Return the profile with the name or path `word`; raise `UrcError` for an invalid profile."""
     from urc.runtime.open_profile import open_document

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+from starlette.types import ASGIApp
+
 from urc.cli.data_folder import own_folder
 from urc.cli.error_report import Misuse
 from urc.cli.event_loop import run_loop
@@ -34,6 +36,7 @@ from urc.web.alarms.notify_options import NotifyOptions
 from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
+from urc.web.foxglove.port import FoxglovePort
 from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.clock_check import clock_warning
 from urc.web.serve.service_manager import ServiceManager, answers
@@ -85,6 +88,8 @@ class DashboardAddress:
     """Whether robots stay connected for their alarms by default."""
     notify: NotifyOptions | None = None
     """Hook for alarm notifications; None disables notifications."""
+    foxglove: int | None = None
+    """Port for Foxglove viewers; None if they have no port of their own."""
 
 
 def run_dashboard(
@@ -133,9 +138,7 @@ async def _serve(
     faults: Sequence[str],
 ) -> int:
     async with AsyncExitStack() as stack:
-        audit = AuditLog(own_folder(place.data) / FILE)
-        stack.callback(audit.close)
-        place = replace(place, recorder=ServerRecorder(audit.add))
+        audit, place = _audited(stack, place)
         robot_options = robot_options_of(place, given, faulty)
         data = robot_options.data
         await _warn_of(data)
@@ -143,11 +146,12 @@ async def _serve(
         access.clock_check = partial(clock_warning, data)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
+        foxglove = FoxglovePort(place.foxglove) if place.foxglove is not None else None
         manager = ServiceManager()
         stack.callback(manager.tell, "STOPPING=1")
 
         def ready(url: str) -> None:
-            addresses = ready_addresses(url, place.host, access, certificates, place.tls)
+            addresses = ready_addresses(url, place.host, access, certificates, place.tls, foxglove)
             announce(stack, data, addresses)
             on_ready(addresses)
             _begin_heartbeats(stack, manager, addresses.url)
@@ -170,7 +174,8 @@ async def _serve(
             robot_options=robot_options,
             certificates=certificates,
         )
-        app = build_app(robots, options)
+        app: ASGIApp = build_app(robots, options)
+        app = app if foxglove is None else foxglove.around(app)
         gc.collect()
         gc.freeze()  # exclude loaded objects from later garbage collections, to avoid delays
         await serve(
@@ -180,8 +185,16 @@ async def _serve(
             on_ready=ready,
             certificates=certificates,
             allowed_hosts=place.allowed_hosts,
+            further=[foxglove] if foxglove is not None else [],
         )
     return 0
+
+
+def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:
+    """Open the audit log until `stack` closes; return it, and the options with its recorder."""
+    audit = AuditLog(own_folder(place.data) / FILE)
+    stack.callback(audit.close)
+    return audit, replace(place, recorder=ServerRecorder(audit.add))
 
 
 def _options(place: DashboardAddress) -> DashboardOptions:

@@ -5,15 +5,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_host, add_port, duration, load
+from urc.cli.arguments import add_foxglove, add_host, add_port, duration, load
 from urc.cli.data_folder import own_folder
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.start_addresses import access_for, print_entrance, ready_addresses
-from urc.cli.tls_options import TlsOptions, add_tls, certificates_of, tls_of
+from urc.cli.tls_options import add_tls, certificates_of, tls_of
 from urc.problems import ProblemsError, UrcError
 
 if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
     from urc.model.profile import Profile
     from urc.runtime.recording.player import Player
     from urc.runtime.recording.reader import Recording
@@ -48,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loop", action="store_true", help="restart playback at the end")
     add_host(parser)
     add_port(parser)
+    add_foxglove(parser)
     add_tls(parser)
 
 
@@ -78,26 +81,38 @@ def run(arguments: argparse.Namespace) -> int:
             start_s=start_s,
             is_looped=arguments.loop,
         )
-        serving = _serve(player, arguments.host, arguments.port, tls_of(arguments))
+        serving = _serve(player, arguments)
         return run_loop(serving, code_when_ended=0)
 
 
-async def _serve(player: "Player", host: str, port: int, tls: TlsOptions) -> int:
+async def _serve(player: "Player", arguments: argparse.Namespace) -> int:
     from urc.web.app import DashboardOptions, Robot, build_app, serve
+    from urc.web.foxglove.port import FoxglovePort
 
-    profile = player.profile
+    profile, host, tls = player.profile, arguments.host, tls_of(arguments)
+    foxglove = FoxglovePort(arguments.foxglove) if arguments.foxglove is not None else None
     robot = Robot(profile, player.settings, player.session, playback=player)
     access = access_for()
     certificates = await certificates_of(tls, host, (), own_folder())
-    app = build_app(
+    app: ASGIApp = build_app(
         {profile.name: robot},
         DashboardOptions(access=access, allowed_hosts=tls.hosts(), certificates=certificates),
     )
 
-    def ready(url: str) -> None:
-        print_entrance(ready_addresses(url, host, access, certificates, tls))
+    if foxglove is not None:
+        app = foxglove.around(app)
 
-    await serve(tls.around(app), host=host, port=port, on_ready=ready, certificates=certificates)
+    def ready(url: str) -> None:
+        print_entrance(ready_addresses(url, host, access, certificates, tls, foxglove))
+
+    await serve(
+        tls.around(app),
+        host=host,
+        port=arguments.port,
+        on_ready=ready,
+        certificates=certificates,
+        further=[foxglove] if foxglove is not None else [],
+    )
     return 0
 
 

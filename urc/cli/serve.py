@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_dev, add_host, add_port, add_settings, is_loopback, load
+from urc.cli.arguments import (
+    add_dev,
+    add_foxglove,
+    add_host,
+    add_port,
+    add_settings,
+    is_loopback,
+    load,
+)
 from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
 from urc.cli.output import complain
@@ -32,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add_host(parser)
     add_port(parser)
+    add_foxglove(parser)
     _add_names(parser, "--allow-host", "additional host name of this machine")
     add_tls(parser)
     parser.add_argument(
@@ -90,8 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings_given(profiles, arguments)  # report invalid settings before the server starts
     for folder in dict.fromkeys(each for one in profiles for each in hidden_beside(one.file)):
         complain(f"urc serve: {folder} is ignored: a widget with this name ships with URC")
-    if arguments.is_open:
-        _warn(arguments)
+    _warn(arguments)
 
     def given(profile: "Profile") -> Mapping[str, "Value"]:
         bare = profile._replace(
@@ -106,10 +114,6 @@ def run(arguments: argparse.Namespace) -> int:
         others = [one for one in profiles if one.name != profile.name]
         return settings_given([bare, *others], arguments)[0][0]
 
-    if not arguments.has_guard:
-        complain(
-            "urc serve: no guard process: if this process hangs, moving robots are not stopped"
-        )
     return run_dashboard(
         profiles,
         DashboardAddress(
@@ -127,6 +131,7 @@ def run(arguments: argparse.Namespace) -> int:
             sign_in=_sign_in(arguments),
             monitors=arguments.monitors,
             notify=_notify(arguments),
+            foxglove=arguments.foxglove,
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,
@@ -227,7 +232,12 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _warn(arguments: argparse.Namespace) -> None:
-    complain(
-        f"urc serve: {arguments.host} is reachable from other machines without a sign-in:"
-        " anyone on the network can drive these robots"
-    )
+    if arguments.is_open:
+        complain(
+            f"urc serve: {arguments.host} is reachable from other machines without a sign-in:"
+            " anyone on the network can drive these robots"
+        )
+    if not arguments.has_guard:
+        complain(
+            "urc serve: no guard process: if this process hangs, moving robots are not stopped"
+        )

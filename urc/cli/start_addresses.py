@@ -6,13 +6,14 @@ from contextlib import AsyncExitStack, ExitStack
 from ipaddress import ip_address
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from urc.cli.arguments import is_loopback
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
     from urc.cli.tls_options import TlsOptions
+    from urc.web.foxglove.port import FoxglovePort
     from urc.web.serve.access import Access
     from urc.web.serve.certificates import Certificates, LoadedCertificate
 
@@ -29,6 +30,8 @@ class ReadyDashboard(NamedTuple):
     """Address for other machines; "" if only this machine can reach the dashboard."""
     certificate: "LoadedCertificate | None" = None
     """HTTPS certificate; None for plain HTTP."""
+    foxglove_port: int = 0
+    """Port for Foxglove viewers; 0 if they have no port of their own."""
 
     @property
     def address(self) -> str:
@@ -43,12 +46,22 @@ class ReadyDashboard(NamedTuple):
     def lines(self) -> Iterator[str]:
         """Yield the lines of the start message; the first contains the address with all rights."""
         yield f"dashboard {self.address}"
+        if self.foxglove_port:
+            yield f"foxglove {_viewer_address(self.url, self.foxglove_port, self.access.key)}"
         if self.others and self.access.anonymous:
             yield f"for others {self.others} (without a sign-in: {self.access.anonymous})"
         elif self.others:
             yield f"for others {self.others} (with a sign-in)"
         if self.certificate is not None:
             yield from _certificate_lines(self.certificate, self.others or self.url)
+
+
+def _viewer_address(url: str, port: int, key: str) -> str:
+    """Return the address for viewers on this machine; it grants all rights."""
+    place = urlsplit(url)
+    host = f"[{place.hostname}]" if ":" in (place.hostname or "") else place.hostname
+    scheme = "wss" if place.scheme == "https" else "ws"
+    return f"{scheme}://{host}:{port}/?token={quote(key, safe='')}"
 
 
 def _certificate_lines(certificate: "LoadedCertificate", url: str) -> Iterator[str]:
@@ -62,7 +75,12 @@ def _certificate_lines(certificate: "LoadedCertificate", url: str) -> Iterator[s
 
 
 def ready_addresses(
-    url: str, host: str, access: "Access", certificates: "Certificates | None", tls: "TlsOptions"
+    url: str,
+    host: str,
+    access: "Access",
+    certificates: "Certificates | None",
+    tls: "TlsOptions",
+    foxglove: "FoxglovePort | None" = None,
 ) -> ReadyDashboard:
     """Return the addresses of a dashboard that listens on `host`.
 
@@ -72,12 +90,14 @@ def ready_addresses(
         access: the keys of the dashboard.
         certificates: HTTPS certificates; None for plain HTTP.
         tls: public names of a web server in front of the dashboard.
+        foxglove: port for Foxglove viewers; None if they have no port of their own.
     """
     others = "" if is_loopback(host) else url
     if tls.public_names:
         others = f"https://{tls.public_names[0]}/"
     current = certificates.current if certificates is not None else None
-    return ReadyDashboard(_near(url, host), access, others, current)
+    foxglove_port = foxglove.port if foxglove is not None else 0
+    return ReadyDashboard(_near(url, host), access, others, current, foxglove_port)
 
 
 def print_entrance(ready_dashboard: ReadyDashboard) -> None:

@@ -9,9 +9,9 @@ import contextlib
 import ipaddress
 import signal
 import socket
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 import uvicorn
 from starlette.types import ASGIApp
@@ -30,7 +30,7 @@ from urc.web.serve.tls_listener import FirstBytes, Handshakes
 from urc.web.serve.tls_port import TlsPort
 from urc.web.wire.messages import INBOUND_BYTES
 
-__all__ = ["reachable_urls", "serve"]
+__all__ = ["FurtherPort", "reachable_urls", "serve"]
 
 SEND_BUFFER_BYTES = 64 * 1024
 UNSENT_BYTES = 8 * 1024
@@ -40,6 +40,18 @@ PING_TIMEOUT_S = 10.0
 GRACE_S = 2
 DATE_S = 1.0
 BACKLOG = 128
+
+
+class FurtherPort(Protocol):
+    """A further port of the server, which the application recognises."""
+
+    wanted: int
+    """TCP port; 0 lets the system choose one."""
+    flag: str
+    """Command-line option with the port, named in errors."""
+
+    def opened(self, port: int) -> None:
+        """Store the port on which the server listens."""
 
 
 async def serve(
@@ -53,6 +65,7 @@ async def serve(
     certificates: Certificates | None = None,
     allowed_hosts: Iterable[str] = (),
     handshakes: Handshakes | None = None,
+    further: Sequence[FurtherPort] = (),
 ) -> None:
     """Serve `app` until SIGINT, SIGTERM or cancellation, then close within 3 seconds.
 
@@ -68,30 +81,38 @@ async def serve(
         certificates: certificates for HTTPS; None for plain HTTP.
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
         handshakes: limits on unfinished handshakes; None for the default limits.
+        further: further ports on the same address.
 
     Raises:
         UrcError: the server cannot listen on the address.
     """
-    listener = _listen(host, port)
-    connection: Callable[..., asyncio.Protocol]
     turns = RequestTurns()
-    connection = partial(HttpConnection, turns=turns, request_s=request_s, most=connections)
+    connection: Callable[..., asyncio.Protocol] = partial(
+        HttpConnection, turns=turns, request_s=request_s, most=connections
+    )
     if certificates is not None:
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)
         app = TlsPort(app, allowed_hosts)
     server = _UvicornServer(_config(app, connection))
-    try:
-        with _ending(server), OWN_DOORS.kept(listener), _renewed(certificates, handshakes):
-            running = asyncio.ensure_future(server.serve(sockets=[listener]))
-            await _until_ready(server, running)
-            if on_ready and server.started:
-                scheme = "http" if certificates is None else "https"
-                place, real_port = listener.getsockname()[:2]
-                on_ready(reachable_urls(place, real_port, scheme)[0])
-            await _follow(server, running)
-    finally:
-        listener.close()
+    with contextlib.ExitStack() as stack:
+        listeners = [_kept(stack, host, port, "--port")]
+        for one in further:
+            listeners.append(_kept(stack, host, one.wanted, one.flag))
+            one.opened(listeners[-1].getsockname()[1])
+        stack.enter_context(_ending(server))
+        stack.enter_context(_renewed(certificates, handshakes))
+        running = asyncio.ensure_future(server.serve(sockets=listeners))
+        await _until_ready(server, running)
+        if on_ready and server.started:
+            on_ready(_first_url(listeners[0], "http" if certificates is None else "https"))
+        await _follow(server, running)
+
+
+def _first_url(listener: socket.socket, scheme: str) -> str:
+    """Return the first of `reachable_urls`."""
+    place, real_port = listener.getsockname()[:2]
+    return reachable_urls(place, real_port, scheme)[0]
 
 
 def _config(app: ASGIApp, connection: Callable[..., asyncio.Protocol]) -> uvicorn.Config:
@@ -230,7 +251,15 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         self._urc_flow.resume()
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def _kept(stack: contextlib.ExitStack, host: str, port: int, flag: str) -> socket.socket:
+    """Listen until `stack` closes; no transport may connect to the port."""
+    listener = _listen(host, port, flag)
+    stack.callback(listener.close)
+    stack.enter_context(OWN_DOORS.kept(listener))
+    return listener
+
+
+def _listen(host: str, port: int, flag: str) -> socket.socket:
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -253,7 +282,7 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         reason = error.strerror or str(error)
-        hint = "; choose another with --port" if port else ""
+        hint = f"; choose another with {flag}" if port else ""
         raise UrcError(f"cannot listen on {host} port {port}: {reason}{hint}") from error
     listener.setblocking(False)
     return listener
