@@ -12,6 +12,8 @@ from scripts.node import node_executable
 from tests.contract.profiles import profile_of
 from urc.runtime import foxglove_schemas
 from urc.runtime.recording.shapes import channels
+from urc.web.foxglove.services import robot_services
+from urc.web.foxglove.topics import robot_topics
 
 HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"
@@ -61,3 +63,18 @@ def test_viewers_can_read_every_topic_of_a_recording(robot: Path) -> None:
     for channel in found:
         assert channel.schema["type"] == "object"
         assert list(unreadable(channel.schema, channel.topic)) == []
+
+
+@pytest.mark.parametrize("robot", sorted(ROBOTS.glob("*.yaml")), ids=lambda file: file.stem)
+def test_viewers_can_read_every_topic_and_service_of_a_robot(robot: Path) -> None:
+    profile = profile_of(robot)
+    topics = robot_topics(profile.name, profile)
+    assert len({one.topic for one in topics}) == len(topics)
+    services = robot_services(profile.name, profile.driver, lambda _: True)
+    schemas = [(one.topic, one.schema) for one in topics]
+    for one in services:
+        schemas += [(one.name, one.request), (one.name, one.response)]
+    for name, schema in schemas:
+        assert list(unreadable(json.loads(schema), name)) == []
+    held = {one.name for one in profile.driver.commands.values() if one.hold is not None}
+    assert not held & {one.command for one in services}

@@ -3,12 +3,14 @@
 import json
 import os
 import secrets
+import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx2
 import pytest
@@ -25,6 +27,7 @@ from urc.wire.server_messages import CLOSE_BAD_MESSAGES, CLOSE_NOT_LET_IN, CLOSE
 
 SDK, OLDER = "foxglove.sdk.v1", "foxglove.websocket.v1"
 SOON_S = 10.0
+SLOW_S = 4.0
 CODES = (CLOSE_BAD_MESSAGES, CLOSE_TOO_FAST, 1009, 1006)
 """Codes for a hostile client; 1009 is the protocol's code for a message that is too large. The code
 is lost (1006) if the client is still sending."""
@@ -61,7 +64,11 @@ def client(
 ) -> ClientConnection:
     """Connect a client that can send anything."""
     return connect(
-        address(server, token), subprotocols=[Subprotocol(subprotocol)], proxy=None, **more
+        address(server, token),
+        subprotocols=[Subprotocol(subprotocol)],
+        proxy=None,
+        close_timeout=1,
+        **more,
     )
 
 
@@ -145,6 +152,11 @@ def test_a_held_command_is_no_service_and_stop_is_one_for_everybody(server: ApiS
         headers = headers_for(server.address)
         said = api.get("api/v1/robots/cart/controls", headers=headers).json()
         assert said["latched"] == answer["value"]["latched"]
+        _, driver = server.token("drive@cart")
+        with Viewer(address(server, driver), SDK) as viewer:
+            while "/cart/launch" not in viewer.services:
+                viewer.next()
+            assert "Stopped by" in viewer.call("/cart/launch", 1)["message"]
         reset = {"verb": "reset"}
         lease = api.post("api/v1/robots/cart/lease", json=reset, headers=headers)
         assert lease.json()["latched"] == ""
@@ -274,3 +286,54 @@ def _resident(server: ApiServer) -> int:
     """Return the resident memory of the server in bytes; 0 where the system does not tell."""
     place = Path(f"/proc/{server.process.pid}/statm")
     return int(place.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if place.exists() else 0
+
+
+# ---- a slow client
+
+FAST = """\
+urc: 1
+kind: robot
+name: fast
+title: Fast
+transports:
+  wire: { type: tcp, host: 127.0.0.1, port: 7003, framing: { type: delimiter, tx: LF, rx: LF } }
+signals: { number: { type: integer }, filler: { type: string } }
+messages: { line: { regex: '^(?P<number>\\d+) (?P<filler>x+)$' } }
+simulator:
+  wire: [{ every: 5ms, send: "{{ (now * 1000) | int }} FILLER" }]
+""".replace("FILLER", "x" * 4000)
+
+
+def test_a_slow_client_costs_others_nothing_and_learns_what_it_missed(
+    urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """The slow client reads nothing for some seconds, while 800 kB a second arrive for it."""
+    server = started(urc_process, tmp_path, robots={"fast": FAST})
+    key = key_of(server)
+    place = urlsplit(server.address)
+    small = socket.socket()
+    small.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    small.connect((place.hostname, place.port))
+    with client(server, key, sock=small, max_queue=1) as slow, client(server, key) as quick:
+        _subscribe(slow, "/fast/filler")
+        _subscribe(quick, "/fast/number")
+        before = _resident(server)
+        gaps, last_s, end_s = [], time.monotonic(), time.monotonic() + SLOW_S
+        while time.monotonic() < end_s:
+            if isinstance(quick.recv(SOON_S), bytes):
+                now_s = time.monotonic()
+                gaps.append(now_s - last_s)
+                last_s = now_s
+        assert len(gaps) > 100 * SLOW_S / 2
+        assert max(gaps[5:]) < 1.0
+        assert _resident(server) - before < 16 * 1024 * 1024
+        status = operations(slow, "status")
+        assert status["id"] == "dropped"
+        assert int(status["message"].split()[0]) > 100
+        # What is sent now is new: old readings were dropped instead of queued.
+        for _ in range(60):
+            message = slow.recv(SOON_S)
+            if isinstance(message, bytes):
+                read = FrameReader().read(message)
+                assert isinstance(read, MessageData)
+        assert time.time() - read.time_ns / 1e9 < SLOW_S / 2

@@ -29,7 +29,7 @@ from urc.wire import foxglove as wire
 
 __all__ = ["CALLS_AT_ONCE", "MESSAGES_PER_S", "MOST_ANSWERS", "MOST_FAULTS", "FoxgloveClient"]
 
-MESSAGES_PER_S: Final = 200
+MESSAGES_PER_S: Final = 500
 """Maximum rate of messages from a client; a higher rate closes the socket. A viewer subscribes to
 each of its topics with a message of its own."""
 MOST_FAULTS: Final = 32
@@ -88,8 +88,8 @@ class FoxgloveClient:
         """Answers to calls, each with a flag that is true for text."""
         self._statuses: dict[str, bytes] = {}
         """Newest unsent status, by id."""
-        self._warned: set[str] = set()
-        """Robots with a status that has not been withdrawn."""
+        self._warned: dict[str, str] = {}
+        """Text of each robot's status, until the status is withdrawn."""
         self._ready: dict[str, None] = {}
         """Robots with waiting messages; the first is next."""
         self._subscriptions: dict[int, tuple[Offer, int]] = {}
@@ -145,7 +145,8 @@ class FoxgloveClient:
         """Look for added, removed and changed robots until cancelled."""
         while True:
             await self._clock.sleep(RETRY_S)
-            self.recheck()
+            if self._offers.is_outdated:
+                self.recheck()
 
     def _forget(self, offer: Offer) -> None:
         """End the subscriptions to the channels of a robot that is no longer offered."""
@@ -316,8 +317,7 @@ class FoxgloveClient:
                 try:
                     live = await opened(offer.service, offer.peer, stack)
                 except ApiError as failure:
-                    self._warned.add(offer.name)
-                    self._tell(f"robot {offer.name}", f"{offer.name}: {failure.line}")
+                    self._warn(offer.name, f"{offer.name}: {failure.line}")
                 else:
                     self._untell(offer.name)
                     hub = live.session.hub
@@ -390,10 +390,15 @@ class FoxgloveClient:
         self._statuses[status] = wire.encode_status(level, text, status)
         self._news.set()
 
+    def _warn(self, name: str, text: str) -> None:
+        """Send the status of a robot, unless the client already knows it."""
+        if self._warned.get(name) != text:
+            self._warned[name] = text
+            self._tell(f"robot {name}", text)
+
     def _untell(self, name: str) -> None:
         """Withdraw the status of a robot."""
-        if name in self._warned:
-            self._warned.discard(name)
+        if self._warned.pop(name, None) is not None:
             status = f"robot {name}"
             self._statuses[status] = wire.encode_status_end([status])
             self._news.set()

@@ -79,6 +79,8 @@ class Offers:
         """Start without offers; `update` adds them."""
         self._source = source
         self._last_id = 0
+        self._served: dict[str, tuple[RobotService, Robot]] = {}
+        """All robots of the server at the last update."""
         self.robots: dict[str, Offer] = {}
         self.channels: dict[int, tuple[Offer, RobotTopic]] = {}
         self.services: dict[int, tuple[Offer, RobotServiceType]] = {}
@@ -87,6 +89,17 @@ class Offers:
     def is_let_in(self) -> bool:
         """Whether the visitor may still watch any robot."""
         return self._source.is_let_in()
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether a robot was added, removed or changed since the last update."""
+        services, served = self._source.services(), self._served
+        if services.keys() != served.keys():
+            return True
+        return any(
+            service is not served[name][0] or service.robot is not served[name][1]
+            for name, service in services.items()
+        )
 
     def was_offered(self, number: int) -> bool:
         """Return whether an id belongs, or once belonged, to a channel or service."""
@@ -103,10 +116,10 @@ class Offers:
             wake: function that is called with a robot's name when a message of the robot is ready.
         """
         changes = Changes([], [])
+        services = self._source.services()
+        self._served = {name: (service, service.robot) for name, service in services.items()}
         wanted = {
-            name: service
-            for name, service in self._source.services().items()
-            if self._source.may_watch(name)
+            name: service for name, service in services.items() if self._source.may_watch(name)
         }
         for name, offer in list(self.robots.items()):
             service = wanted.get(name)
