@@ -70,7 +70,7 @@ def test_viewers_can_read_every_topic_and_service_of_a_robot(robot: Path) -> Non
     profile = profile_of(robot)
     topics = robot_topics(profile.name, profile)
     assert len({one.topic for one in topics}) == len(topics)
-    services = robot_services(profile.name, profile.driver, lambda _: True)
+    services = robot_services(profile.name, profile.driver)
     schemas = [(one.topic, one.schema) for one in topics]
     for one in services:
         schemas += [(one.name, one.request), (one.name, one.response)]

@@ -28,14 +28,13 @@ from urc.web.fleet.robots import Robot, RobotService
 from urc.web.foxglove import client as module
 from urc.web.foxglove.calls import FoxgloveCalls
 from urc.web.foxglove.client import (
-    DROPPED_EVERY_S,
     MESSAGES_PER_S,
-    MOST_ANSWERS,
     MOST_FAULTS,
     RETRY_S,
     FoxgloveClient,
 )
-from urc.web.foxglove.offers import Offers, OfferSource
+from urc.web.foxglove.offers import Offers, OfferSource, RobotCatalogue
+from urc.web.foxglove.outbox import DROPPED_EVERY_S, MOST_ANSWERS
 from urc.web.foxglove.robot_feed import MOST_WAITING
 from urc.web.foxglove.topics import HubMessages
 from urc.web.wire.messages import CLOSE_BAD_MESSAGES, CLOSE_NOT_LET_IN, CLOSE_TOO_FAST
@@ -121,6 +120,7 @@ class Viewer:
             messages=lambda hub, name, _: self.hubs.setdefault(
                 hub, HubMessages(name, self.robot.profile, lambda time_s: round(time_s * 1e9))
             ),
+            catalogue=RobotCatalogue(),
         )
 
     # -- what the server said
@@ -348,6 +348,20 @@ async def test_the_end_of_a_session_is_followed_by_the_next_session() -> None:
         assert seen.robot.opened == 2
         await seen.reading("battery", 2)
         assert [one["value"] for one in seen.messages(1)] == [1, 2]
+
+
+async def test_each_state_of_a_connection_is_sent_after_a_new_session_too() -> None:
+    async with viewer() as seen:
+        await seen.subscribe("/puppet/urc/link/wire", 1)
+        seen.robot.link("silent", "one")
+        await settle()
+        seen.services["puppet"].replace(seen.services["puppet"].robot)
+        await seen.clock.advance(2 * RETRY_S)
+        for detail in ("two", "three"):
+            seen.robot.link("silent", detail)
+            await settle()
+        details = [one["detail"] for one in seen.messages(1)]
+        assert details == ["", "one", "", "two", "three"]
 
 
 async def test_an_added_robot_and_a_removed_robot_are_announced() -> None:

@@ -38,17 +38,17 @@ DRIVER = Driver(
 
 
 def services() -> dict[str, RobotServiceType]:
-    found = robot_services("cart", DRIVER, lambda one: one.role == "drive")
+    found = robot_services("cart", DRIVER)
     return {one.name: one for one in found}
 
 
 def test_held_commands_and_commands_of_two_people_are_not_offered() -> None:
-    assert list(services()) == ["/cart/say", "/cart/erase", "/cart/STOP"]
+    assert list(services()) == ["/cart/say", "/cart/erase", "/cart/tune", "/cart/STOP"]
 
 
 def test_a_robot_that_cannot_move_has_no_stop() -> None:
     driver = DRIVER._replace(commands={"say": DRIVER.commands["say"]})
-    assert [one.name for one in robot_services("cart", driver, lambda _: True)] == ["/cart/say"]
+    assert [one.name for one in robot_services("cart", driver)] == ["/cart/say"]
 
 
 def test_the_schemas_come_from_the_declared_arguments_and_reply() -> None:

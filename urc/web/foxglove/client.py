@@ -7,7 +7,6 @@ replace older ones. A client that reads nothing for `STALL_S` seconds is disconn
 
 import asyncio
 import logging
-from collections import deque
 from collections.abc import Coroutine
 from contextlib import ExitStack
 from typing import Final
@@ -21,13 +20,13 @@ from urc.web.api.sessions import opened
 from urc.web.feed.client_socket import ClientSocket, FlowControl, TokenBucket
 from urc.web.foxglove.calls import CallFailed, FoxgloveCalls
 from urc.web.foxglove.offers import Offer, Offers
+from urc.web.foxglove.outbox import Outbox
 from urc.web.foxglove.services import STOP, RobotServiceType
 from urc.web.serve.replies import ApiError
 from urc.web.wire.messages import CLOSE_BAD_MESSAGES, CLOSE_NOT_LET_IN, CLOSE_TOO_FAST
-from urc.web.wire.picture import as_frame
 from urc.wire import foxglove as wire
 
-__all__ = ["CALLS_AT_ONCE", "MESSAGES_PER_S", "MOST_ANSWERS", "MOST_FAULTS", "FoxgloveClient"]
+__all__ = ["CALLS_AT_ONCE", "MESSAGES_PER_S", "MOST_FAULTS", "FoxgloveClient"]
 
 MESSAGES_PER_S: Final = 500
 """Maximum rate of messages from a client; a higher rate closes the socket. A viewer subscribes to
@@ -36,15 +35,11 @@ MOST_FAULTS: Final = 32
 """Number of invalid messages that closes the socket."""
 CALLS_AT_ONCE: Final = 16
 """Maximum number of a client's running calls."""
-MOST_ANSWERS: Final = 2 * CALLS_AT_ONCE
-"""Maximum number of answers that wait to be read; a further answer closes the socket."""
 MOST_ENDED: Final = 4096
 """Maximum number of stored subscriptions that ended together with their channels."""
 STALL_S: Final = 15.0
 RETRY_S: Final = 1.0
 """Interval between attempts to open a robot's session, and between looks for other robots."""
-DROPPED_EVERY_S: Final = 10.0
-"""Minimum time between two reports of dropped messages, in seconds."""
 GOODBYE_S: Final = 2.0
 _BURST: Final = 64
 """Maximum number of messages that are sent before other tasks run."""
@@ -82,16 +77,8 @@ class FoxgloveClient:
         self._calls = calls
         self._clock = clock
         self._news = asyncio.Event()
-        self._texts: deque[bytes] = deque([wire.encode_server_info("URC", __version__, session)])
-        """Announcements, oldest first."""
-        self._answers: deque[tuple[bytes, bool]] = deque()
-        """Answers to calls, each with a flag that is true for text."""
-        self._statuses: dict[str, bytes] = {}
-        """Newest unsent status, by id."""
-        self._warned: dict[str, str] = {}
-        """Text of each robot's status, until the status is withdrawn."""
-        self._ready: dict[str, None] = {}
-        """Robots with waiting messages; the first is next."""
+        self._outbox = Outbox(self._news.set, clock.now)
+        self._outbox.announce([wire.encode_server_info("URC", __version__, session)])
         self._subscriptions: dict[int, tuple[Offer, int]] = {}
         """Robot and channel, by the client's id of the subscription."""
         self._ended: dict[int, None] = {}
@@ -100,9 +87,6 @@ class FoxgloveClient:
         self._allowance = TokenBucket(MESSAGES_PER_S, clock.now())
         self._group: asyncio.TaskGroup | None = None
         self._closing: tuple[int, str] | None = None
-        self._dropped = 0
-        self._told_dropped = 0
-        self._told_dropped_s = float("-inf")
         self.faults = 0
         """Number of invalid messages from the client."""
 
@@ -134,12 +118,10 @@ class FoxgloveClient:
         if not self._offers.is_let_in:
             self._close(CLOSE_NOT_LET_IN, _SIGNED_OUT)
             return
-        changes = self._offers.update(self._awake)
+        changes = self._offers.update(self._outbox.ready)
         for offer in changes.ended:
             self._forget(offer)
-        self._texts.extend(changes.texts)
-        if changes.texts:
-            self._news.set()
+        self._outbox.announce(changes.texts)
 
     async def _watch(self) -> None:
         """Look for added, removed and changed robots until cancelled."""
@@ -152,15 +134,13 @@ class FoxgloveClient:
         """End the subscriptions to the channels of a robot that is no longer offered."""
         if offer.task is not None:
             offer.task.cancel()
-        self._ready.pop(offer.name, None)
-        self._dropped += offer.feed.take_dropped()
+        self._outbox.forget(offer.name, offer.feed)
         for subscription, (other, _) in list(self._subscriptions.items()):
             if other is offer:
                 del self._subscriptions[subscription]
                 self._ended[subscription] = None
         while len(self._ended) > MOST_ENDED:
             self._ended.pop(next(iter(self._ended)))
-        self._untell(offer.name)
 
     # Writing
 
@@ -178,48 +158,16 @@ class FoxgloveClient:
                 await self._news.wait()
 
     def _send(self) -> bool:
-        """Send messages while the kernel accepts them; return whether messages are left."""
-        self._report_dropped()
+        """Send messages while the kernel accepts them; return whether messages may be left."""
+        frames = self._outbox.frames(has_messages=not self._closing)
         for _ in range(_BURST):
             if not self._flow.is_free():
                 return True
-            frame = self._next_frame()
+            frame = next(frames, None)
             if frame is None:
                 return False
             self._flow.write(frame)
         return True
-
-    def _next_frame(self) -> bytes | None:
-        if self._texts:
-            return as_frame(self._texts.popleft(), is_text=True)
-        if self._answers:
-            answer, is_text = self._answers.popleft()
-            return as_frame(answer, is_text=is_text)
-        if self._statuses:
-            return as_frame(self._statuses.pop(next(iter(self._statuses))), is_text=True)
-        while self._ready and not self._closing:
-            name = next(iter(self._ready))
-            del self._ready[name]
-            offer = self._offers.robots.get(name)
-            message = offer.feed.next_message() if offer is not None else None
-            if message is not None:
-                self._ready[name] = None  # the robots take turns
-                return as_frame(message)
-        return None
-
-    def _awake(self, name: str) -> None:
-        """Note that a message of a robot is ready."""
-        self._ready.setdefault(name)
-        self._news.set()
-
-    def _report_dropped(self) -> None:
-        """Tell the client how many messages it has missed, from time to time."""
-        self._dropped += sum(one.feed.take_dropped() for one in self._offers.robots.values())
-        now_s = self._clock.now()
-        if self._dropped > self._told_dropped and now_s >= self._told_dropped_s + DROPPED_EVERY_S:
-            self._told_dropped, self._told_dropped_s = self._dropped, now_s
-            text = f"{self._dropped} messages were dropped, because this client reads too slowly"
-            self._statuses["dropped"] = wire.encode_status("warning", text, "dropped")
 
     # Reading
 
@@ -306,7 +254,7 @@ class FoxgloveClient:
         if self.faults >= MOST_FAULTS:
             self._close(CLOSE_BAD_MESSAGES, f"{MOST_FAULTS} messages were invalid")
         else:
-            self._tell("fault", fault, level="error")
+            self._outbox.tell("fault", fault, level="error")
 
     # Robots
 
@@ -317,9 +265,9 @@ class FoxgloveClient:
                 try:
                     live = await opened(offer.service, offer.peer, stack)
                 except ApiError as failure:
-                    self._warn(offer.name, f"{offer.name}: {failure.line}")
+                    self._outbox.warn(offer.name, f"{offer.name}: {failure.line}")
                 else:
-                    self._untell(offer.name)
+                    self._outbox.end_warning(offer.name)
                     hub = live.session.hub
                     with offer.feed.attached(hub, self._offers.messages(offer, hub)):
                         await live.ended.wait()
@@ -377,34 +325,11 @@ class FoxgloveClient:
         self._answer(wire.encode_failure(said.service, said.call, reason), is_text=True)
 
     def _answer(self, data: bytes, *, is_text: bool) -> None:
-        if len(self._answers) >= MOST_ANSWERS:
+        if not self._outbox.answer(data, is_text=is_text):
             self._close(CLOSE_TOO_FAST, "the client does not read its answers")
-            return
-        self._answers.append((data, is_text))
-        self._news.set()
-
-    # Statuses
-
-    def _tell(self, status: str, text: str, *, level: wire.Level = "warning") -> None:
-        """Send a status, which replaces an earlier status with the same id."""
-        self._statuses[status] = wire.encode_status(level, text, status)
-        self._news.set()
-
-    def _warn(self, name: str, text: str) -> None:
-        """Send the status of a robot, unless the client already knows it."""
-        if self._warned.get(name) != text:
-            self._warned[name] = text
-            self._tell(f"robot {name}", text)
-
-    def _untell(self, name: str) -> None:
-        """Withdraw the status of a robot."""
-        if self._warned.pop(name, None) is not None:
-            status = f"robot {name}"
-            self._statuses[status] = wire.encode_status_end([status])
-            self._news.set()
 
     def _close(self, code: int, reason: str) -> None:
         """Close the socket as soon as the reason is sent."""
         if self._closing is None:
             self._closing = (code, reason)
-            self._tell("closing", reason, level="error")
+            self._outbox.tell("closing", reason, level="error")

@@ -6,8 +6,8 @@ counter, so an id is never used again.
 
 import asyncio
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 from urc.model.role import Role
 from urc.runtime.hub import Hub
@@ -15,11 +15,42 @@ from urc.web.api.describe import may_run
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.foxglove.robot_feed import RobotFeed
-from urc.web.foxglove.services import RobotServiceType, robot_services
+from urc.web.foxglove.services import STOP, RobotServiceType, robot_services
 from urc.web.foxglove.topics import HubMessages, RobotTopic, robot_topics
 from urc.wire import foxglove as wire
 
-__all__ = ["Changes", "Offer", "Offers", "OfferSource"]
+__all__ = ["Changes", "Offer", "OfferSource", "Offers", "RobotCatalogue"]
+
+
+class RobotContents(NamedTuple):
+    """The topics and services of one version of a robot."""
+
+    robot: Robot
+    topics: tuple[RobotTopic, ...]
+    services: tuple[RobotServiceType, ...]
+
+
+class RobotCatalogue:
+    """The contents of all robots, made once for all clients.
+
+    Making the contents of a hundred robots takes longer than driven robots may wait.
+    """
+
+    def __init__(self) -> None:
+        """Start without robots."""
+        self._known: WeakKeyDictionary[RobotService, RobotContents] = WeakKeyDictionary()
+
+    def of(self, name: str, service: RobotService) -> RobotContents:
+        """Return the contents of a robot's current version; the playback has no services."""
+        robot, known = service.robot, self._known.get(service)
+        if known is None or known.robot is not robot:
+            is_played = robot.playback is not None
+            known = self._known[service] = RobotContents(
+                robot,
+                robot_topics(name, robot.profile),
+                () if is_played else robot_services(name, robot.profile.driver),
+            )
+        return known
 
 
 class OfferSource(NamedTuple):
@@ -35,27 +66,33 @@ class OfferSource(NamedTuple):
     """Function that returns the visitor with the rights for a robot."""
     messages: Callable[[Hub, str, RobotService], HubMessages]
     """Function that returns the messages of a hub, shared by all clients."""
+    catalogue: RobotCatalogue
+    """The contents of the robots, shared by all clients."""
 
 
 class Offer:
     """One robot that is offered to the visitor."""
 
     def __init__(
-        self, name: str, service: RobotService, peer: SocketPeer, wake: Callable[[], None]
+        self,
+        name: str,
+        service: RobotService,
+        contents: RobotContents,
+        peer: SocketPeer,
+        ready: Callable[[str, RobotFeed], None],
     ) -> None:
         self.name = name
         self.service = service
-        self.robot: Robot = service.robot
-        """The version of the robot that the channels describe."""
+        self.contents = contents
         self.peer = peer
-        self.feed = RobotFeed(wake)
+        self.feed = RobotFeed(lambda: ready(name, self.feed))
         self.task: asyncio.Task[None] | None = None
         """Task that keeps the robot connected while the client subscribes to a channel."""
         self.channels: list[int] = []
         self.services: dict[str, int] = {}
         """Ids of the services, keyed by command."""
         self.allowed: frozenset[str] | None = None
-        """Commands that the visitor may run; None until the services are offered."""
+        """The commands that the visitor may run, and STOP; none until the services are offered."""
 
     @property
     def role(self) -> Role | None:
@@ -109,11 +146,12 @@ class Offers:
         """Return the messages of a hub, shared by all clients."""
         return self._source.messages(hub, offer.name, offer.service)
 
-    def update(self, wake: Callable[[str], None]) -> Changes:
+    def update(self, ready: Callable[[str, RobotFeed], None]) -> Changes:
         """Compare the offers with the robots and the visitor's rights, and apply the differences.
 
         Args:
-            wake: function that is called with a robot's name when a message of the robot is ready.
+            ready: function that is called with a robot's name and its feed when a message of the
+                robot is ready.
         """
         changes = Changes([], [])
         services = self._source.services()
@@ -123,21 +161,26 @@ class Offers:
         }
         for name, offer in list(self.robots.items()):
             service = wanted.get(name)
-            if service is not offer.service or offer.service.robot is not offer.robot:
+            if service is not offer.service or offer.service.robot is not offer.contents.robot:
                 self._withdraw(offer, changes)
         for name, service in wanted.items():
             if name not in self.robots:
-                self._offer(name, service, wake, changes)
+                self._offer(name, service, ready, changes)
             self._update_services(self.robots[name], changes)
         return changes
 
     def _offer(
-        self, name: str, service: RobotService, wake: Callable[[str], None], changes: Changes
+        self,
+        name: str,
+        service: RobotService,
+        ready: Callable[[str, RobotFeed], None],
+        changes: Changes,
     ) -> None:
-        offer = Offer(name, service, self._source.peer(name, service), partial(wake, name))
+        contents, peer = self._source.catalogue.of(name, service), self._source.peer(name, service)
+        offer = Offer(name, service, contents, peer, ready)
         self.robots[name] = offer
         announced = []
-        for topic in robot_topics(name, service.robot.profile):
+        for topic in contents.topics:
             number = self._next_id()
             offer.channels.append(number)
             self.channels[number] = (offer, topic)
@@ -159,16 +202,14 @@ class Offers:
 
     def _update_services(self, offer: Offer, changes: Changes) -> None:
         """Offer the commands that the visitor may run now."""
-        driver, role, may_give = offer.robot.profile.driver, offer.role, offer.peer.rights.may_give
-        names = {one.name for one in driver.commands.values() if may_run(one, role)}
-        allowed = frozenset(filter(may_give, names))
-        if offer.robot.playback is not None or offer.allowed == allowed:
+        commands = offer.contents.robot.profile.driver.commands
+        role, may_give = offer.role, offer.peer.rights.may_give
+        names = [name for name, one in commands.items() if may_run(one, role) and may_give(name)]
+        allowed = frozenset((STOP, *names))
+        if offer.allowed == allowed:
             return
         offer.allowed = allowed
-        found = {
-            one.command: one
-            for one in robot_services(offer.name, driver, lambda one: one.name in allowed)
-        }
+        found = {one.command: one for one in offer.contents.services if one.command in allowed}
         ended = {name: number for name, number in offer.services.items() if name not in found}
         for name, number in ended.items():
             del offer.services[name], self.services[number]

@@ -39,6 +39,9 @@ class RobotFeed:
         """Sources with waiting messages; the first is the next to be sent."""
         self._seen_notes = 0
         self._seen_links: dict[str, LinkStatus] = {}
+        """Newest state of each subscribed connection that was sent."""
+        self._links_count = 0
+        """Number of changes of connections that were noted."""
         self._dropped = 0
         self._hub: Hub | None = None
         self._messages: HubMessages | None = None
@@ -153,10 +156,16 @@ class RobotFeed:
             return
         if hub.notes_count > self._seen_notes and LOG_SOURCE in self._ids:
             self._mark(LOG_SOURCE)
-        for source in self._ids:
-            if source.kind == "link" and hub.links.get(source.name) is not self._seen_links.get(
-                source.name
-            ):
+        if hub.links_count != self._links_count:
+            self._links_count = hub.links_count
+            for source in self._ids:
+                self._look(source, hub)
+
+    def _look(self, source: TopicSource, hub: Hub) -> None:
+        """Note the state of a connection if it is new."""
+        if source.kind == "link":
+            status = hub.links.get(source.name)
+            if status is not None and status is not self._seen_links.get(source.name):
                 self._mark(source)
 
     def _begin(self, source: TopicSource, hub: Hub) -> None:
@@ -170,6 +179,7 @@ class RobotFeed:
             return
         if source.kind == "log":
             self._seen_notes = max(0, hub.notes_count - FIRST_NOTES)
+        self._look(source, hub)
         self._changed()
 
     def _mark(self, source: TopicSource) -> None:

@@ -6,7 +6,7 @@ the same name.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
 import msgspec
@@ -44,20 +44,15 @@ class RobotServiceType(NamedTuple):
     response: str
 
 
-def robot_services(
-    robot: str, driver: Driver, may_run: Callable[[Command], bool]
-) -> tuple[RobotServiceType, ...]:
-    """Return the services of a robot for one visitor.
+def robot_services(robot: str, driver: Driver) -> tuple[RobotServiceType, ...]:
+    """Return the services of a robot, whose name in URLs is `robot`, for a visitor with all roles.
 
-    Args:
-        robot: name of the robot in URLs.
-        driver: driver of the robot.
-        may_run: function that returns whether the visitor may run a command.
+    A visitor is offered `STOP` and the commands that the visitor may run.
     """
     found = [
         _service(robot, one, driver)
         for one in driver.commands.values()
-        if one.hold is None and not _needs_two_people(one.confirm) and may_run(one)
+        if one.hold is None and not _needs_two_people(one.confirm)
     ]
     if can_move(driver):
         answer = {"latched": {"type": "string"}, "confirmed": {"type": "boolean"}}

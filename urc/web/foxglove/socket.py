@@ -23,7 +23,7 @@ from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import RobotService
 from urc.web.foxglove.calls import FoxgloveCalls, RunCommand
 from urc.web.foxglove.client import FoxgloveClient
-from urc.web.foxglove.offers import Offers, OfferSource
+from urc.web.foxglove.offers import Offers, OfferSource, RobotCatalogue
 from urc.web.foxglove.topics import HubMessages
 from urc.web.serve.actors import stopper_of
 from urc.web.serve.replies import told
@@ -65,6 +65,7 @@ class FoxgloveServer:
         self._recorder = recorder
         self._clock: Clock = clock or LoopClock()
         self._session = secrets.token_hex(8)
+        self._catalogue = RobotCatalogue()
         self._messages: WeakValueDictionary[Hub, HubMessages] = WeakValueDictionary()
 
     def routes(self) -> list[ProtectedSocket]:
@@ -86,6 +87,7 @@ class FoxgloveServer:
             is_let_in=lambda: visitor.best_role() is not None,
             peer=lambda name, service: _peer(websocket, name, service),
             messages=self._shared,
+            catalogue=self._catalogue,
         )
         calls = FoxgloveCalls(self._run, lambda name: stopper_of(websocket, name), self._recorder)
         flow = websocket.scope["state"]["flow"]

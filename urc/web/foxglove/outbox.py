@@ -1,0 +1,125 @@
+"""Everything that waits to be sent to one Foxglove client, in the order of sending.
+
+Layer 5. Pure. Announcements come first, then answers, then statuses, then the messages of the
+robots, which take turns. Each kind is bounded.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
+
+from urc.web.foxglove.robot_feed import RobotFeed
+from urc.web.wire.picture import as_frame
+from urc.wire import foxglove as wire
+
+__all__ = ["DROPPED_EVERY_S", "MOST_ANSWERS", "Outbox"]
+
+MOST_ANSWERS: Final = 32
+"""Maximum number of answers that wait to be read; a further answer closes the socket."""
+DROPPED_EVERY_S: Final = 10.0
+"""Minimum time between two reports of dropped messages, in seconds."""
+
+
+class Outbox:
+    """The unsent frames of one client."""
+
+    def __init__(self, wake: Callable[[], None], now: Callable[[], float]) -> None:
+        """Start without frames.
+
+        Args:
+            wake: callback that is called when a frame can be sent.
+            now: function that returns the time in seconds.
+        """
+        self._wake = wake
+        self._now = now
+        self._texts: deque[bytes] = deque()
+        self._answers: deque[tuple[bytes, bool]] = deque()
+        self._statuses: dict[str, bytes] = {}
+        """Newest unsent status, by id."""
+        self._warned: dict[str, str] = {}
+        """Text of each robot's status, until the status is withdrawn."""
+        self._ready: dict[str, RobotFeed] = {}
+        """Robots with waiting messages; the first is next."""
+        self._dropped = 0
+        self._told_dropped = 0
+        self._told_dropped_s = float("-inf")
+
+    # What to send
+
+    def announce(self, texts: Iterable[bytes]) -> None:
+        """Add announcements."""
+        before = len(self._texts)
+        self._texts.extend(texts)
+        if len(self._texts) > before:
+            self._wake()
+
+    def answer(self, data: bytes, *, is_text: bool) -> bool:
+        """Add an answer to a call; return whether there is room for it."""
+        if len(self._answers) >= MOST_ANSWERS:
+            return False
+        self._answers.append((data, is_text))
+        self._wake()
+        return True
+
+    def tell(self, status: str, text: str, *, level: wire.Level = "warning") -> None:
+        """Add a status, which replaces an earlier status with the same id."""
+        self._statuses[status] = wire.encode_status(level, text, status)
+        self._wake()
+
+    def warn(self, robot: str, text: str) -> None:
+        """Add the status of a robot, unless the client already knows it."""
+        if self._warned.get(robot) != text:
+            self._warned[robot] = text
+            self.tell(f"robot {robot}", text)
+
+    def end_warning(self, robot: str) -> None:
+        """Withdraw the status of a robot."""
+        if self._warned.pop(robot, None) is not None:
+            status = f"robot {robot}"
+            self._statuses[status] = wire.encode_status_end([status])
+            self._wake()
+
+    def ready(self, robot: str, feed: RobotFeed) -> None:
+        """Note that a message of a robot is ready."""
+        self._ready.setdefault(robot, feed)
+        self._wake()
+
+    def forget(self, robot: str, feed: RobotFeed) -> None:
+        """Drop the waiting messages of a robot that is no longer offered."""
+        self._ready.pop(robot, None)
+        self._dropped += feed.take_dropped()
+        self.end_warning(robot)
+
+    # What is sent
+
+    def frames(self, *, has_messages: bool) -> Iterator[bytes]:
+        """Remove and yield WebSocket frames; `has_messages` includes messages of the robots."""
+        while (frame := self._next(has_messages=has_messages)) is not None:
+            yield frame
+            self._report_dropped()
+
+    def _next(self, *, has_messages: bool) -> bytes | None:
+        if self._texts:
+            return as_frame(self._texts.popleft(), is_text=True)
+        if self._answers:
+            answer, is_text = self._answers.popleft()
+            return as_frame(answer, is_text=is_text)
+        if self._statuses:
+            return as_frame(self._statuses.pop(next(iter(self._statuses))), is_text=True)
+        while self._ready and has_messages:
+            robot = next(iter(self._ready))
+            feed = self._ready.pop(robot)
+            message = feed.next_message()
+            self._dropped += feed.take_dropped()
+            if message is not None:
+                self._ready[robot] = feed  # the robots take turns
+                return as_frame(message)
+        return None
+
+    def _report_dropped(self) -> None:
+        """Tell the client how many messages it has missed, from time to time."""
+        now_s = self._now()
+        if self._dropped > self._told_dropped and now_s >= self._told_dropped_s + DROPPED_EVERY_S:
+            self._told_dropped, self._told_dropped_s = self._dropped, now_s
+            text = f"{self._dropped} messages were dropped, because this client reads too slowly"
+            self.tell("dropped", text)
