@@ -2,6 +2,7 @@
 
 import json
 import socket
+import ssl
 from collections.abc import Callable
 from pathlib import Path
 
@@ -78,6 +79,17 @@ def test_the_port_serves_no_pages(urc_process: Start, tmp_path: Path) -> None:
         assert answer.status_code == 426
         assert "Foxglove" in answer.text
         assert "default-src 'none'" in answer.headers["content-security-policy"]
+
+
+def test_the_port_has_the_certificate_of_the_dashboard(urc_process: Start, tmp_path: Path) -> None:
+    process = cart(urc_process, tmp_path, "--tls", "auto")
+    address = process.wait_for(r"foxglove (wss://127\.0\.0\.1:\d+/\?token=\S+)$")[1]
+    (authority,) = (tmp_path / "data").rglob("authority.pem")
+    trusted = ssl.create_default_context(cafile=authority)
+    with connect(
+        address, subprotocols=[Subprotocol(SDK)], proxy=None, ssl=trusted, close_timeout=1
+    ) as line:
+        assert json.loads(line.recv(10))["op"] == "serverInfo"
 
 
 def test_a_port_in_use_is_named_with_its_option(tmp_path: Path) -> None:
