@@ -66,7 +66,7 @@ async def test_refusal_is_told_in_the_robots_words() -> None:
 async def test_guard_that_does_not_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urc.guard.proxy.START_S", 0.01)
     await Guard().line.ready()
-    with pytest.raises(ConnectFailed, match="the guard has not started; see the server's log"):
+    with pytest.raises(ConnectFailed, match=r"^the guard has not started; see the server's log$"):
         await Guard(is_there=False).line.ready()
 
 

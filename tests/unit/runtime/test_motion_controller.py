@@ -357,6 +357,22 @@ def test_a_line_that_the_guard_lost_is_not_ready_whatever_the_engine_knows() -> 
     assert it.heard() == ["stop drive"]
 
 
+def test_a_repeated_stop_of_a_released_stick_ends_its_gesture() -> None:
+    """The guard disarms the stick, so a tick that is still on its way must not count."""
+    it = Scene(driver=greeted("wire"))
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.controller.release("ann", "drive")
+    it.frames.is_greeted = False
+    it.controller.stopped("drive", "released")
+    it.frames.is_greeted = True
+    it.heard()
+    it.controller.handle(MotionReady("wire"))
+    assert it.heard() == ["stop drive"]
+    it.tick(speed=0.5)
+    assert it.heard() == []
+
+
 def test_a_stop_on_a_line_that_is_ready_is_not_repeated() -> None:
     it = Scene(driver=greeted("wire"))
     it.drive("ann", "take")
