@@ -105,6 +105,18 @@ NEEDS = (
         purpose="tests of the pages in WebKit",
     ),
     Need(
+        name="zsh",
+        executables=("zsh",),
+        package="zsh",
+        purpose="tests of completion in zsh",
+    ),
+    Need(
+        name="fish",
+        executables=("fish",),
+        package="fish",
+        purpose="tests of completion in fish",
+    ),
+    Need(
         name="netcat",
         executables=("nc",),
         package="netcat-openbsd",
