@@ -27,6 +27,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from scripts.publication import PAGE, missing_values
 from urc import __version__
 
 __all__ = ["NOTICES", "ReleaseError", "changes_of", "main", "notices", "write_sums"]
@@ -88,6 +89,8 @@ def release(out: Path, wheels: Path | None) -> None:
     write_sums(out)
     for file in sorted(path for path in out.rglob("*") if path.is_file()):
         print(f"{file.stat().st_size / 1e6:8.2f} MB  {file.relative_to(out)}")
+    for line in missing_values(ROOT, __version__):
+        print(f"to fill in before the first publication ({PAGE}): {line}")
 
 
 def say(text: str) -> None:
