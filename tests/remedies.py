@@ -192,6 +192,54 @@ def _named_group(text: str, problem: Problem, found: re.Match[str]) -> str:
     return text[: start - 2] + re.sub(r"\(\?<", "(?P<", lines, count=1)
 
 
+def _start_in_column(text: str, problem: Problem, found: re.Match[str]) -> str:
+    lines = text.splitlines(keepends=True)
+    lines[problem.line - 1] = " " * (int(found[1]) - 1) + lines[problem.line - 1].lstrip()
+    return "".join(lines)
+
+
+def _end_of_line(text: str, problem: Problem, found: re.Match[str]) -> str:
+    lines = text.splitlines(keepends=True)
+    lines[problem.line - 1] = f"{lines[problem.line - 1].rstrip()}{found[1]}\n"
+    return "".join(lines)
+
+
+def _comma_before(text: str, problem: Problem, found: re.Match[str]) -> str:
+    start, _ = _span(text, problem)
+    return f"{text[:start].rstrip()}, {text[start:]}"
+
+
+def _quote(text: str, problem: Problem, found: re.Match[str]) -> str:
+    """Write the quoted text over the same text without quotes, in the underlined line."""
+    lines = text.splitlines(keepends=True)
+    plain = found[1][1:-1]
+    if plain not in lines[problem.line - 1]:
+        return _write(text, problem, found[1])
+    lines[problem.line - 1] = lines[problem.line - 1].replace(plain, found[1], 1)
+    return "".join(lines)
+
+
+def _indent_entry(text: str, problem: Problem, found: re.Match[str]) -> str:
+    """Indent an entry, at or below the underlined line, by two more spaces."""
+    lines = text.splitlines(keepends=True)
+    for number in range(problem.line - 1, len(lines)):
+        if lines[number].lstrip().startswith(f"{found[1]}:"):
+            lines[number] = f"  {lines[number]}"
+            break
+    return "".join(lines)
+
+
+def _without_dashes(text: str, problem: Problem, found: re.Match[str]) -> str:
+    """Remove the dashes of the list below the underlined key."""
+    lines = text.splitlines(keepends=True)
+    for number in range(problem.line, len(lines)):
+        deep = len(lines[number]) - len(lines[number].lstrip())
+        if lines[number].strip() and deep < problem.column:
+            break
+        lines[number] = re.sub(r"^( +)- ", r"\1", lines[number])
+    return "".join(lines)
+
+
 def _unchanged(text: str, problem: Problem, found: re.Match[str]) -> str:
     return text
 
@@ -204,7 +252,21 @@ _RULES: tuple[tuple[str, Rule], ...] = (
     (r"^write the unit: (\S+),", _put()),
     (r"^remove the quotes: (\S+)", _put()),
     (r"^quote it: (\"[^\"]*\"):$", _put()),
-    (r"^quote it: ('[^']*'|\"[^\"]*\")$", _put()),
+    (r"^quote it: ('[^']*'|\"[^\"]*\")$", _quote),
+    (r"^if '#' belongs to it, quote it: ('[^']*')", _quote),
+    (r"^write the number (?:alone|with a point): (\S+)$", _put()),
+    (r"^put a colon after the key: '([^']+)'$", lambda t, p, f: _line_rest(t, p, f[1])),
+    (r"^put a space after the dash: '([^']+)'$", lambda t, p, f: _line_rest(t, p, f[1])),
+    (r"^put a comma before the key: ", _comma_before),
+    (r"^start this line in column (\d+), like line", _start_in_column),
+    (r"^start the comment with '#': (.+)$", lambda t, p, f: _line_rest(t, p, f[1])),
+    (r"^write straight quotes: (\"[^\"]*\")$", _put()),
+    (r"^end the text with ([\"'])$", _end_of_line),
+    (r"^close it with '([}\]])' at the end of this line$", _end_of_line),
+    (r"^indent '(\w+)' by two more spaces", _indent_entry),
+    (r"^write the entries without '- '$", _without_dashes),
+    (r"^write (release: \{ \w[^}]*\}) with arguments that stop the robot", _insert),
+    (r"^bind it as (\{.*\})$", _put()),
     (r"^write a mapping, such as (\{.*\})$", _put()),
     (r"^for lines of text, write framing: \{ (.*) \}$", lambda t, p, f: _write_type(t, p, f[1])),
     (r"^for most text protocols: (framing: \{.*\})$", _insert),

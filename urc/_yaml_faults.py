@@ -11,6 +11,15 @@ from typing import Final, NamedTuple
 
 import yaml
 
+from urc._yaml_layout import (
+    column_hint,
+    entry_hint,
+    item_hint,
+    missing_comma,
+    open_braces,
+    runaway_quote,
+)
+
 __all__ = ["UNQUOTED_TEMPLATE", "SyntaxFault", "advice", "explain"]
 
 _QUOTED_VALUE = re.compile(r"""^(?:[^'"]*?[:\-,{\[]\s+|\s*)(?P<value>'[^']*'|"[^"]*")\s*\S""")
@@ -144,6 +153,24 @@ def _open_quote(at: _Clue) -> SyntaxFault | None:
     )
 
 
+def _runaway_quote(at: _Clue) -> SyntaxFault | None:
+    words = ("expected key", "block end", "',' or", "values are not allowed", "expected ':'")
+    if not any(word in at.said for word in words):
+        return None
+    found = runaway_quote(at.lines, at.line, at.column) if at.text else None
+    if found is None:
+        return None
+    line, column, quote = found
+    name = "single" if quote == "'" else "double"
+    return SyntaxFault(
+        line,
+        column,
+        "open-quote",
+        f"this {name} quote is closed only in line {at.line + 1}",
+        f"end the text with {quote}",
+    )
+
+
 def _indicator(at: _Clue) -> SyntaxFault | None:
     for word, char in (("alias", "*"), ("anchor", "&"), ("tag", "!")):
         if re.search(rf"an? {word}\b", at.context) or f"{word} handle" in at.said:
@@ -190,6 +217,17 @@ def _flow(at: _Clue) -> SyntaxFault | None:
                 advice(at.opened_text, start),
             )
     bracket, other = ("{", "}") if "mapping" in at.context else ("[", "]")
+    comma = missing_comma(at.text, at.column) if at.line == at.opened_line else None
+    if comma is not None:
+        key = re.match(r"[\w-]+", at.text[comma:])
+        name = key[0] if key else ""
+        return SyntaxFault(
+            at.line,
+            comma,
+            "open-bracket",
+            f"a comma is missing before the key {name!r}",
+            f"put a comma before the key: ', {name}'",
+        )
     rest = [at.text[at.column :], *at.lines[at.line + 1 :]]
     is_end = not any(line.strip() for line in rest)  # the two parsers count the end differently
     place = "the end" if is_end else f"line {at.line + 1}, column {at.column + 1}"
@@ -198,7 +236,9 @@ def _flow(at: _Clue) -> SyntaxFault | None:
         column,
         "open-bracket",
         f"{bracket!r} is opened here, and ',' or {other!r} is missing before {place}",
-        f"close it with {other!r}; a value with special characters needs quotes",
+        f"close it with {other!r} at the end of this line"
+        if (is_end or at.line > at.opened_line) and open_braces(at.opened_text)
+        else f"close it with {other!r}; a value with special characters needs quotes",
     )
 
 
@@ -221,14 +261,15 @@ def _block(at: _Clue) -> SyntaxFault | None:
             at.opened_column,
             "no-colon",
             "a line without ': ' between key and value",
-            "write 'key: value'",
+            entry_hint(at.opened_text.strip()),
         )
     if "expected key" in said or "block end" in said or "'-' indicator" in said:
         return SyntaxFault(
             *place,
             "indentation",
             "the indentation of this line does not match its block",
-            "indent the line like the rest of its block; quote values with special characters",
+            (at.text and column_hint(at.lines, at.line))
+            or "indent the line like the rest of its block; quote values with special characters",
         )
     if "<document start>" in said:
         return SyntaxFault(
@@ -238,14 +279,6 @@ def _block(at: _Clue) -> SyntaxFault | None:
             "start every top-level key in column 1, as 'key: value'",
         )
     return None
-
-
-def _with_space(text: str) -> str:
-    """Return the hint for a line without ``: ``, such as ``type:tcp``."""
-    key, colon, value = text.partition(":")
-    if colon and re.fullmatch(r"[a-z][a-z0-9_-]*", key) and not value.startswith("//"):
-        return f"put a space after the colon: '{key}: {value}'"
-    return "write 'key: value', with a space after the colon"
 
 
 def _second_colon(at: _Clue) -> SyntaxFault:
@@ -266,14 +299,18 @@ def _second_colon(at: _Clue) -> SyntaxFault:
             len(above) - len(above.lstrip()),
             "no-colon",
             "a line without ': ' between key and value",
-            _with_space(above.strip()),
+            entry_hint(above.strip()),
         )
+    if hint := item_hint(above):
+        start = len(above) - len(above.lstrip())
+        message = "a list item without a space after its dash"
+        return SyntaxFault(at.line - 1, start, "indentation", message, hint)
     return SyntaxFault(
         at.line,
         len(at.text) - len(at.text.lstrip()),
         "indentation",
         "this line is indented more than the line above, which already has a value",
-        "give both lines the same indentation",
+        column_hint(at.lines, at.line) or "give both lines the same indentation",
     )
 
 
@@ -307,6 +344,7 @@ _RULES: tuple[Callable[[_Clue], SyntaxFault | None], ...] = (
     _reserved,
     _escape,
     _open_quote,
+    _runaway_quote,
     _indicator,
     _after_quote,
     _flow,

@@ -24,6 +24,9 @@ _PROBLEMS_MOST: Final = 100
 """Maximum number of problems in one text. Each problem copies its source line, which may be
 long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
+_OPENING: Final = ("“", "„", "‘", "‚", "«", "»", "”", "’")
+_CLOSING: Final = ("”", "“", "’", "‘", "»", "«")
+"""Typographic quotes of several languages; word processors write them instead of straight ones."""
 
 
 class DocumentLimits(NamedTuple):
@@ -223,6 +226,8 @@ class TreeReader:
             return None
         if not is_key and (value is None or isinstance(value, str)):
             self._warn_of_cut(event)
+            if text[:1] in _OPENING and text[-1:] in _CLOSING and len(text) > 1:
+                self._warn_of_quotes(event, text[1:-1])
         return value
 
     def _tagged(self, event: Any, text: str, tag: str) -> object:
@@ -313,6 +318,16 @@ class TreeReader:
             "cut-value",
             "the value ends before ' #', because a comment starts there",
             hint=f"if '#' belongs to it, {whole}; else write '# ' with a space",
+            severity="warning",
+        )
+
+    def _warn_of_quotes(self, event: Any, inner: str) -> None:
+        is_plain = not {'"', "\\"} & {*inner}
+        self._report(
+            event,
+            "typographic-quotes",
+            "typographic quotes are part of the text",
+            hint="write straight quotes" + (f': "{inner}"' if is_plain else ""),
             severity="warning",
         )
 

@@ -24,6 +24,7 @@ UNMENDED = {
     "look-ahead": "no pattern without it does the same",
     "port-too-large": "only the robot's sheet tells the right port",
     "argument-missing": "no name resembles the unknown one",
+    "text-for-number": "only the writer knows the number",
 }
 """Mistakes whose hint says what is wrong, but not what is right."""
 
@@ -112,7 +113,7 @@ def test_hint_mends_the_mistake(
 
 
 def test_there_are_enough_mistakes() -> None:
-    """Check 8 of the documentation: 50 wrong files, 45 with a remedy that works."""
-    assert len(MISTAKES) >= 50
+    """The collection may grow, not shrink; a script can follow nine hints of ten."""
+    assert len(MISTAKES) >= 90
     assert UNMENDED.keys() <= {one.name for one in MISTAKES}
     assert len(UNMENDED) <= len(MISTAKES) // 10

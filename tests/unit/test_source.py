@@ -308,8 +308,7 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         ("a:\n\tb: 1\n", "tab", (2, 1), "YAML indents with spaces only: two for each level"),
         ("a: b: c\n", "unquoted", (1, 5), "quote it: 'b: c'"),
         ("a: 'x\n", "open-quote", (1, 4), "end the text with '"),
-        ("a: [1, 2\n", "open-bracket", (1, 4),
-         "close it with ']'; a value with special characters needs quotes"),
+        ("a: [1, 2\n", "open-bracket", (1, 4), "close it with ']' at the end of this line"),
         ('a: "\\d"\n', "bad-escape", (1, 5),
          "use single quotes, where a backslash is plain text and '' is a quote; in double quotes,"
          " write a backslash as \\\\"),

@@ -23,6 +23,9 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
     bare = re.fullmatch(r"\{\{\s*([\w-]+)\s*\}\}", word)
     if bare and bare[1] in names:
         return f"write the name without braces: {bare[1]}"
+    plain, slashes, comment = word.partition(" //")
+    if slashes and plain.strip() in names:
+        return f"start the comment with '#': {plain.strip()} # {comment.strip()}"
     near = closest(word, names)
     if near:
         return f"did you mean '{near[0]}'?"

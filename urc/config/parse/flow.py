@@ -147,7 +147,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         retries=retries,
         retry=retry,
         is_idempotent=is_idempotent,
-        hold=_hold(hold, problems) if hold else None,
+        hold=_hold(hold, command, problems) if hold else None,
         moves=moves,
         moves_if=moves_if,
         stops=stops,
@@ -308,7 +308,7 @@ def _rate(part: Node | None, problems: Problems) -> float | None:
     return rate
 
 
-def _hold(part: Node, problems: Problems) -> Hold:
+def _hold(part: Node, command: Command, problems: Problems) -> Hold:
     repeat_s = problems.duration(part, "repeat", 0.05, least=0.01, most=10)
     lease_s = problems.duration(part, "lease", 0.25, least=0.1, most=1.0)
     release, step = part.get("release"), part.get("step")
@@ -322,8 +322,8 @@ def _hold(part: Node, problems: Problems) -> Hold:
             "missing-release",
             "'release' or 'step' is missing, so nothing stops the motion",
             key=True,
-            hint="write release: { … } with arguments that stop the robot, or 'step' with the"
-            " step's duration if the robot stops after each step",
+            hint=f"write release: {_rest_of(command)} with arguments that stop the robot, or 'step'"
+            " with the step's duration if the robot stops after each step",
         )
         return Hold(repeat_s)
     entries = release.entries() if release is not None else {}
@@ -331,6 +331,14 @@ def _hold(part: Node, problems: Problems) -> Hold:
     slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
     on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
     return Hold(repeat_s, values, lease_s, _watchdog_s(part, problems), slew, on_stall, step_s)
+
+
+def _rest_of(command: Command) -> str:
+    """Return zeros for all arguments that go in both directions, such as speeds; else dots."""
+    ranges = [(one.min, one.max) for one in command.arguments.values()]
+    is_both = all(low is not None and high is not None and low < 0 < high for low, high in ranges)
+    names = [f"{name}: 0" for name in command.arguments] if is_both else []
+    return f"{{ {', '.join(names) or '…'} }}"
 
 
 def _watchdog_s(part: Node, problems: Problems) -> float | None:

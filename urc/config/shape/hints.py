@@ -2,13 +2,23 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import Any, Final
 
 from urc.config.renames import renamed_hint
 from urc.config.spelling_suggestions import did_you_mean
 from urc.source import Document, Path
 
-__all__ = ["example_of", "key_hint", "mapping_hint", "text_hint", "type_hint", "word_hint"]
+__all__ = [
+    "example_of",
+    "inner_key_hint",
+    "key_hint",
+    "mapping_hint",
+    "number_hint",
+    "text_hint",
+    "type_hint",
+    "word_hint",
+]
 
 _DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
 _OTHER_WORDS: Final = {
@@ -63,6 +73,10 @@ _SPAN: Final = re.compile(
     re.IGNORECASE,
 )
 """Pattern for a duration or rate in the notation of other programs."""
+_QUANTITY: Final = re.compile(
+    r"(?P<number>[-+]?[0-9]{1,15}(?:\.[0-9]{1,15})?)\s*(?P<unit>[^\s0-9]\S{0,15})"
+)
+_COMMA: Final = re.compile(r"[-+]?[0-9]{1,15},[0-9]{1,15}")
 _UNITS: Final = "a duration has the unit ms, s, m (minutes) or h"
 _NUMBERS: Final = {"integer", "number"}
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
@@ -122,12 +136,14 @@ def word_hint(word: str, words: Sequence[str]) -> str:
     return near if near.startswith("did you") else ""
 
 
-def example_of(schema: Mapping[str, Any], key: str) -> str:
-    """Return the schema's example for a missing key; "" if the schema has no example."""
+def example_of(document: Document, path: Path, schema: Mapping[str, Any], key: str) -> str:
+    """Return an example for a missing key; "" if the schema has no example."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
     if key == "urc":
         return "write 'urc: 1' in the first line"
+    if key == "name" and not path:
+        return f"for example 'name: {_plain_name(PurePath(document.file).stem) or 'my-robot'}'"
     if key == "framing":
         return f"for most text protocols: {_FRAMING}"
     if not examples or isinstance(examples[0], (dict, list)):
@@ -163,6 +179,61 @@ def _quoted(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) and not value.isalnum() else str(value)
 
 
+def number_hint(document: Document, path: Path, text: str) -> str:
+    """Return a hint for a number with a unit or a decimal comma; "" for other text."""
+    if _COMMA.fullmatch(text):
+        return f"write the number with a point: {text.replace(',', '.')}"
+    found = _QUANTITY.fullmatch(text)
+    if found is None:
+        return ""
+    unit = _unit_above(document, path)
+    if unit and unit != found["unit"]:
+        return f"write the number alone, in the unit {unit}"
+    return f"write the number alone: {found['number']}"
+
+
+def _unit_above(document: Document, path: Path) -> str:
+    """Return the unit of the signal or argument that contains the value; "" without a unit."""
+    inner = _mappings_above(document, path)[-2:]
+    return str(next((one["unit"] for one in reversed(inner) if "unit" in one), ""))
+
+
+def inner_key_hint(document: Document, path: Path, known: Mapping[str, Any]) -> str:
+    """Return a hint for entries that belong inside the key before them; "" for other values.
+
+    Args:
+        document: the document.
+        path: path of the key without a value, or of the first entry below it.
+        known: keys that a mapping in this place may have.
+    """
+    above = _mappings_above(document, path)
+    keys = list(above[-1]) if above else []
+    if not path or path[-1] not in keys:
+        return ""
+    place = keys.index(path[-1])
+    first = place if above[-1][keys[place]] is None else place - 1
+    if first < 0 or first + 1 >= len(keys) or above[-1][keys[first]] is not None:
+        return ""
+    outer, inner = keys[first], keys[first + 1]
+    if inner not in known:
+        return ""
+    return f"indent '{inner}' by two more spaces, to put it inside '{outer}'"
+
+
+def _mappings_above(document: Document, path: Path) -> list[Mapping[str | int, Any]]:
+    """Return the mappings on the way to a value, from the root, as far as they exist."""
+    found: list[Mapping[str | int, Any]] = []
+    inner: Any = document.data
+    for part in path:
+        if isinstance(inner, dict):
+            found.append(inner)
+        try:
+            inner = inner[part]
+        except (KeyError, IndexError, TypeError):  # an option of a widget is checked by itself
+            break
+    return found
+
+
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
@@ -176,14 +247,19 @@ def type_hint(
     if isinstance(value, str):
         if _is_filled_in(document, path):
             return 'only a text that consists of a name in braces becomes a value: "{i}"'
-        if {"integer", "number"} & set(types) and _looks_like_number(value):
-            return f"remove the quotes: {value}"
+        if _NUMBERS & set(types):
+            if _looks_like_number(value):
+                return f"remove the quotes: {value}"
+            if hint := number_hint(document, path, value):
+                return hint
         if "boolean" in types:
             return "yes, no, on and off are text in YAML 1.2; write true or false"
         if "object" in types:
             return "indent the inner keys, or write { key: value }"
     if "string" in types and isinstance(value, list) and path[-1:] == ("grid",):
         return "write the rows below 'grid: |', without '- '"
+    if "object" in types and isinstance(value, list) and _is_of_entries(value):
+        return "write the entries without '- '"
     if "array" in types:
         return "write a list: '- ' before each item, or [a, b]"
     return ""
@@ -196,13 +272,27 @@ def text_hint(document: Document, path: Path, value: str, schema: Mapping[str, A
         if found is None:
             return ""
         return f"write {_duration(float(found['number']), found['unit'])}; {_UNITS}"
-    if _NUMBERS & {*_listed(schema.get("type", ()))} and value.isascii() and value.isdecimal():
-        return "" if _is_filled_in(document, path) else f"remove the quotes: {value}"
+    if _NUMBERS & {*_listed(schema.get("type", ()))} and not _is_filled_in(document, path):
+        if value.isascii() and value.isdecimal():
+            return f"remove the quotes: {value}"
+        if hint := number_hint(document, path, value):
+            return hint
     if path == ("name",):
-        plain = re.sub(r"[^a-z0-9]+", "-", value.lower()).strip("-")
         rule = "a name may have only lower-case letters, digits and '-'"
-        return f"write {plain}; {rule}" if plain[:1].isalpha() else ""
+        plain = _plain_name(value)
+        return f"write {plain}; {rule}" if plain else ""
     return ""
+
+
+def _plain_name(text: str) -> str:
+    """Return a valid document name that resembles a text, or ""."""
+    plain = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    return plain if plain[:1].isalpha() else ""
+
+
+def _is_of_entries(value: Sequence[object]) -> bool:
+    """Return whether each item of a list is a mapping with one key."""
+    return bool(value) and all(isinstance(one, dict) and len(one) == 1 for one in value)
 
 
 def _listed(types: object) -> Sequence[str]:

@@ -15,8 +15,10 @@ from referencing.jsonschema import DRAFT202012
 
 from urc.config.shape.hints import (
     example_of,
+    inner_key_hint,
     key_hint,
     mapping_hint,
+    number_hint,
     text_hint,
     type_hint,
     word_hint,
@@ -75,6 +77,7 @@ def report(
         tell = _REPORTS.get(error.keyword, _other)
         for problem in tell(document, where, error):
             what = problem.message if problem.code != "wrong-type" else ""
+            what = what.partition(" missing from ")[0]  # a branch may have another title
             if (one := (problem.path, problem.column, what)) not in said:
                 said.add(one)
                 problems[problem] = len(where)
@@ -145,7 +148,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
             path,
             "missing-key",
             f"{names} {verb} missing from {_noun(error.schema)}",
-            hint=example_of(error.schema, missing[0].strip("'")),
+            hint=example_of(document, path, error.schema, missing[0].strip("'")),
             key=True,
         )
     ]
@@ -179,7 +182,13 @@ def _wrong_type(document: Document, path: Path, error: _Error) -> list[Problem]:
         wanted = " or ".join(_EXPECTED[name] for name in types)
     message = f"expected {wanted}, found {_found(error.value)}"
     hint = type_hint(document, path, error.value, types, is_duration=title == "duration")
-    if isinstance(error.value, (str, bool)) and "object" in types:
+    known = error.schema.get("properties", {}) if "object" in types else {}
+    if inner := inner_key_hint(document, path, known):
+        return [document.problem(path, "wrong-type", message, hint=inner, key=True)]
+    is_text = isinstance(error.value, (str, bool))
+    if {"number", "integer"} & {*types} and isinstance(error.value, str):
+        is_text = not number_hint(document, path, error.value)
+    if is_text and "object" in types:
         hint = mapping_hint(document, path, error.value, error.schema) or hint
     return [document.problem(path, "wrong-type", message, hint=hint)]
 
