@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import sysconfig
 import venv
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -15,10 +18,35 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import urc
+from urc.cli.verbs import VERBS, module_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 TIMEOUT_S = 100
+SERVING = {"demo": "dashboard http://", "serve": "dashboard http://", "simulate": "listening wire"}
+"""Subcommands that run until Ctrl-C, with the start of the line that they print when ready."""
+NEEDING = {
+    "migrate": "there is no such file",
+    "send": "there is no such file",
+    "trust": "there is no such file",
+    "replay": "puppet.mcap cannot be read",
+    "restore": "urc-backup.zip: No such file",
+    "publish": "token.txt: No such file",
+    "watch": "nothing listens on",
+    "record": "nothing listens on",
+    "discover": "nothing was found",
+    "repo": "connection attempts failed",
+    "install": "no repository is configured",
+    "update": "no repository is configured",
+    "search": "no repository is configured",
+    "bundle": "no repository is configured",
+    "remove": "is not installed",
+    "backup": "has nothing to back up",
+    "audit": "start 'urc serve' to create the file",
+}
+"""Subcommands whose example needs a file, a robot or a server, with what they say without it."""
+NOWHERE = "127.0.0.1"
+"""Replaces the addresses of the examples: a test sends nothing to other computers."""
 
 
 def run(*command: str | Path, cwd: Path) -> str:
@@ -180,3 +208,37 @@ def test_the_installed_urc_explains_its_findings(installed: Path, tmp_path: Path
     )
     answer = run(installed / Path(sys.executable).name, "-c", question, cwd=tmp_path)
     assert answer.strip() == "{'urc'}"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_example_of_help_runs_in_an_empty_folder(
+    installed: Path, tmp_path: Path, verb: str
+) -> None:
+    """It does its work, or says in one line what it needs; never a traceback."""
+    example = import_module(module_of(verb)).EXAMPLE
+    example = re.sub(r"192\.168\.[0-9.]+(?::[0-9]+)?|robots\.example", NOWHERE, example)
+    example = example.replace("port=6789", "port=0")
+    example += {"demo": " --no-browser --port 0", "serve": " --port 0"}.get(verb, "")
+    example += " --set port=9" if verb in ("watch", "record", "discover") else ""
+    path = os.pathsep.join([str(installed), os.environ["PATH"]])
+    environment = os.environ | {"PATH": path, "URC_DATA_DIR": str(tmp_path / "data")}
+    here = tmp_path / "here"
+    here.mkdir()
+    with subprocess.Popen(
+        ["bash", "-c", f"exec {example}"],
+        cwd=here, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
+        try:
+            if verb in SERVING:
+                assert running.stdout is not None
+                assert running.stdout.readline().startswith(SERVING[verb])
+                running.send_signal(signal.SIGINT)
+            _, errors = running.communicate(timeout=TIMEOUT_S)
+        finally:
+            running.kill()
+    assert "Traceback" not in errors
+    if verb not in NEEDING:
+        assert (running.returncode, errors if verb in SERVING else "") == (0, "")
+        return
+    assert running.returncode in (1, 2)
+    assert NEEDING[verb] in errors

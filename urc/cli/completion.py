@@ -11,7 +11,7 @@ from pathlib import Path
 
 from urc.shipped import shipped
 
-EXAMPLE = "urc completion bash > ~/.local/share/bash-completion/completions/urc"
+EXAMPLE = "urc completion bash > urc-completion.bash"
 SHELLS = ("bash", "zsh", "fish")
 
 
