@@ -48,6 +48,8 @@ DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
 CACHE = ROOT / "build" / "playground"
 """Compiled files, by the hash of their sources."""
+WHEELS = CACHE / "wheels"
+"""Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800
 _DATED = (1980, 1, 1, 0, 0, 0)
 
@@ -140,9 +142,24 @@ def _unpack_wheel(package: str, code: Path) -> None:
     found = re.search(rf"^{package}=={re.escape(version)} \\\n((?: +--hash=.*\n)+)", lock, re.M)
     if found is None:
         raise BuildError(f"{package} {version} is not the locked version; run: ./dev run --version")
+    wheel = _kept_wheel(package, version, found[0]) or _download(package, found[0])
+    with zipfile.ZipFile(wheel) as opened:
+        opened.extractall(code)
+
+
+def _kept_wheel(package: str, version: str, locked: str) -> Path | None:
+    """Return a browser build from an earlier download whose hash is locked, or None."""
+    for wheel in WHEELS.glob(f"{package}-{version}-*{ABI}.whl"):
+        if f"sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}" in locked:
+            return wheel
+    return None
+
+
+def _download(package: str, locked: str) -> Path:
+    """Download a package's browser build with a locked hash, and keep it for later builds."""
     with tempfile.TemporaryDirectory(prefix="urc-playground-") as folder:
         wanted = Path(folder, "wanted.txt")
-        wanted.write_text(found[0], "utf-8")
+        wanted.write_text(locked, "utf-8")
         command = [
             sys.executable, "-m", "pip", "download", "--quiet", "--only-binary=:all:", "--no-deps",
             "--require-hashes", "--platform", ABI, "--python-version", PYTHON,
@@ -150,8 +167,8 @@ def _unpack_wheel(package: str, code: Path) -> None:
             "--dest", folder, "--requirement", str(wanted),
         ]  # fmt: skip
         _run(command, f"pip could not download {package} for browsers")
-        with zipfile.ZipFile(next(Path(folder).glob("*.whl"))) as wheel:
-            wheel.extractall(code)
+        WHEELS.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.copy(next(Path(folder).glob("*.whl")), WHEELS))
 
 
 def _compile(work: Path) -> None:

@@ -1,7 +1,8 @@
 """Build the documentation site: `python -m scripts.site`, part of `./dev docs`.
 
 Sphinx reads docs/ and writes .site/html. Warnings are errors: for example, a broken reference, a
-page without a table of contents entry, or a heading that skips a level. The build needs no network.
+page without a table of contents entry, or a heading that skips a level. Sphinx needs no network;
+the playground downloads one package at its first build and keeps it.
 """
 
 import shutil
@@ -23,10 +24,14 @@ def main() -> int:
     folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
     code = build(folder)
     if code == 0:
-        from scripts.playground import PYODIDE, write
+        from scripts.playground import PYODIDE, BuildError, write
 
         if PYODIDE.is_dir():  # npm installs it; without it, the site has no playground
-            write(folder / "playground")
+            try:
+                write(folder / "playground")
+            except BuildError as error:
+                print(f"site: {error}", file=sys.stderr)
+                code = 1
     print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
     return code
 
