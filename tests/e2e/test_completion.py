@@ -21,7 +21,7 @@ TYPED = [
 ]
 """A line, and the same line after a press of Tab: each word has one completion."""
 WITHIN_S = 100
-"""On a busy machine, a press of Tab takes seconds: it starts Python."""
+"""The end of each wait; a press of Tab starts Python."""
 
 
 def completed(line: str, folder: Path) -> list[str]:
