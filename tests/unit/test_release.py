@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from scripts.debian_package import packaged_service
+from scripts.debian_package import TEMPLATE, packaged_service
 from scripts.release import ReleaseError, changes_of, notices, write_sums, write_tar
 
 CHANGELOG = """\
@@ -110,3 +110,16 @@ def test_the_packaged_service_starts_the_packaged_command() -> None:
     assert lines[0] == "[Unit]"
     (command,) = [line for line in lines if line.startswith("ExecStart=")]
     assert command.startswith("ExecStart=/usr/bin/urc serve ")
+
+
+def test_removing_the_package_stops_the_service_and_purging_it_deletes_the_data() -> None:
+    """debhelper stops no service that it does not start, and `rules` tells it to start none."""
+    rules, before, after = ((TEMPLATE / one).read_text() for one in ("rules", "prerm", "postrm"))
+    assert "dh_installsystemd --no-enable --no-start" in rules
+    assert 'if [ "$1" = remove ]' in before
+    assert "deb-systemd-invoke stop urc.service" in before
+    assert 'if [ "$1" = purge ]' in after
+    assert "rm -rf /var/lib/private/urc\n" in after
+    for name in ("prerm", "postrm"):
+        assert "#DEBHELPER#" in (TEMPLATE / name).read_text()
+        subprocess.run(["sh", "-n", TEMPLATE / name], check=True)
