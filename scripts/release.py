@@ -63,6 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def release(out: Path, wheels: Path | None) -> None:
     """Build and check all files of the release in the folder `out`."""
+    if shutil.which("git") is None:
+        raise ReleaseError("git is missing: a release contains the files and the time of a commit")
     changes_of((ROOT / "CHANGELOG.md").read_text("utf-8"), __version__)
     epoch = commit_time()
     date = datetime.fromtimestamp(epoch, UTC).strftime("%Y-%m-%d")
