@@ -17,7 +17,7 @@ FOLDERS = ("robots", "widgets", "tests", "urc", "bench")
 def documents() -> list[Path]:
     """Return every YAML file of the folders, without what programs have put there."""
     found = (path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.yaml")))
-    return [path for path in found if not any(part[:1] == "." for part in path.parts)]
+    return [path for path in found if "/." not in f"/{path.relative_to(ROOT).as_posix()}"]
 
 
 def test_no_document_of_the_tree_has_an_old_name() -> None:
