@@ -1,4 +1,4 @@
-"""Write docs/licences.md from the lock files.
+"""Write docs/licences.md from the lock files and playground/parts.toml.
 
 python -m scripts.licences           write the page
 python -m scripts.licences --check   exit 1 if the page is outdated
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import hatch_build
 import hatch_sbom
+from scripts.playground_licences import contents
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "licences.md"
@@ -29,6 +30,10 @@ The wheel does not contain these packages. \
 An installation of URC needs them; `./dev demo` installs exactly these versions. \
 Packages marked with “extra” are needed for cameras and laser scanners of emulated robots only.
 """
+_PLAYGROUND = """\
+The playground of the site contains these packages, besides the browser modules above. \
+Its folder `playground/licences/` contains their licence texts and notices.
+"""
 
 
 def page() -> str:
@@ -43,6 +48,13 @@ def page() -> str:
         "## Python packages\n",
         _PACKAGES,
         _table((_named(one), _version(one), one.licence) for one in packages),
+        "## The playground\n",
+        _PLAYGROUND,
+        _table(
+            (one.name, one.version or "–", one.licence)
+            for one in contents()
+            if one.name not in hatch_build.VENDORED and one.name != "URC"
+        ),
     ]
     return "\n".join(parts)
 

@@ -6,7 +6,8 @@ folder contains:
 - the interpreter: Pyodide from npm, in the version from `package-lock.json`;
 - `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
 - `dash/`: the modules and styles of the dashboard and the widgets, at a server's paths;
-- the page, its worker and its service worker, from `playground/static`.
+- the page, its worker and its service worker, from `playground/static`;
+- `licences/`: see `scripts.playground_licences`.
 
 Packages are copied from this environment, which has the versions from `requirements/`. `msgspec` is
 the only package with a browser build on the package index; pip checks its locked hash.
@@ -25,22 +26,17 @@ from collections.abc import Iterable
 from importlib.metadata import distribution
 from pathlib import Path
 
-from hatch_build import LICENCES, VENDORED
 from scripts.node import node_executable
+from scripts.playground_licences import PACKAGES, write_licences
 from urc.shipped import vendored
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "playground" / "static"
 PYODIDE = ROOT / "node_modules" / "pyodide"
 RUNTIME = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm")
-PACKAGES = (
-    "anycrc", "anyio", "attrs", "idna", "jinja2", "jmespath", "jsonschema",
-    "jsonschema-specifications", "markdown-it-py", "markupsafe", "mdurl", "pyyaml", "referencing",
-    "semver", "sniffio", "starlette", "typing-extensions",
-)  # fmt: skip
-"""Packages whose pure Python files are sufficient; `playground.stand_ins` replaces other parts."""
 COMPILED = ("msgspec",)
-"""Packages with a browser build on the package index."""
+"""Packages with a browser build on the package index. The pure Python files of the other packages
+are sufficient; `playground.stand_ins` replaces their other parts."""
 ABI = "pyemscripten_2026_0_wasm32"
 """Platform of the browser builds for this version of Pyodide."""
 PYTHON = "3.14"
@@ -51,6 +47,7 @@ CACHE = ROOT / "build" / "playground"
 WHEELS = CACHE / "wheels"
 """Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800
+_BUILD = re.compile(r"^const BUILD = .*;$", re.MULTILINE)
 _DATED = (1980, 1, 1, 0, 0, 0)
 
 
@@ -73,13 +70,20 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def write(folder: Path) -> None:
-    """Write the whole folder, replacing an existing folder.
+def is_possible() -> bool:
+    """Return whether npm has installed Pyodide."""
+    return (PYODIDE / "pyodide.mjs").is_file()
+
+
+def write(folder: Path) -> str:
+    """Write the whole folder, replacing an existing folder; return its version.
+
+    The version is 16 hex digits that depend on the bytes of all files.
 
     Raises:
         BuildError: Node or Pyodide is missing, or a package cannot be downloaded.
     """
-    if not (PYODIDE / "pyodide.mjs").is_file():
+    if not is_possible():
         raise BuildError("Pyodide is missing; run: npm ci --ignore-scripts")
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(PAGE, folder)
@@ -94,8 +98,11 @@ def write(folder: Path) -> None:
         _pack(code, folder / "python.zip")
         _pack(library, folder / "pyodide" / "python_stdlib.zip")
     _write_dashboard(folder / "dash")
-    _write_licences(folder / "licences")
-    _write_list(folder)
+    try:
+        write_licences(folder / "licences")
+    except FileNotFoundError as fault:
+        raise BuildError(str(fault)) from fault
+    return write_list(folder)
 
 
 def _stage_code(code: Path) -> None:
@@ -110,7 +117,8 @@ def _stage_code(code: Path) -> None:
     for name in ("__init__.py", "importmap.json"):
         _copy(vendor / name, code / "urc_vendor" / name)
     for package in PACKAGES:
-        _copy_distribution(package, code)
+        if package not in COMPILED:
+            _copy_distribution(package, code)
     for package in COMPILED:
         _unpack_wheel(package, code)
 
@@ -232,43 +240,24 @@ def _copy_tree_of(source: Path, target: Path, kinds: tuple[str, ...]) -> None:
             _copy(file, target / file.relative_to(source))
 
 
-def _write_licences(folder: Path) -> None:
-    """Copy the licence text of everything that the folder contains."""
-    _copy(ROOT / "LICENSE", folder / "urc.txt")
-    _copy(ROOT / "LICENSES" / "MPL-2.0.txt", folder / "pyodide.txt")
-    _copy(ROOT / "LICENSES" / "Python-2.0.txt", folder / "python.txt")
-    for package in (*PACKAGES, *COMPILED):
-        texts = [
-            Path(str(file.locate())).read_text("utf-8")
-            for file in distribution(package).files or ()
-            if re.match(r"(LICEN[CS]E|COPYING|NOTICE)", file.name, re.I)
-        ]
-        if not texts:
-            raise BuildError(f"{package} has no licence text")
-        (folder / f"{package}.txt").write_text("\n\n".join(texts), "utf-8")
-    vendor = vendored()
-    for package in VENDORED if vendor is not None else ():
-        assert vendor is not None  # noqa: S101  # for the type checker
-        text = vendor / package / "LICENSE"
-        if not text.is_file():
-            text = ROOT / LICENCES[package]
-        _copy(text, folder / f"{package.replace('/', '-').removeprefix('@')}.txt")
+def write_list(folder: Path) -> str:
+    """Write the SHA-256 of all files and their version into the service worker; return the version.
 
-
-def _write_list(folder: Path) -> None:
-    """Write the list of all files, from which the service worker fills its cache."""
-    files = {
-        file.relative_to(folder).as_posix(): hashlib.blake2b(
-            file.read_bytes(), digest_size=12
-        ).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file()
-    }
-    digest = hashlib.blake2b(json.dumps(files).encode(), digest_size=12).hexdigest()
+    The service worker keeps these files for use offline.
+    """
     worker = folder / "sw.js"
-    worker.write_text(worker.read_text("utf-8").replace("VERSION", digest, 1), "utf-8")
-    listed = {"version": digest, "files": sorted(files)}
-    (folder / "files.json").write_text(json.dumps(listed, indent=1) + "\n", "utf-8")
+    files = {
+        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file() and file != worker
+    }
+    version = hashlib.sha256(json.dumps(files).encode()).hexdigest()[:16]
+    build = json.dumps({"version": version, "files": files}, indent=0)
+    text, count = _BUILD.subn(lambda _: f"const BUILD = {build};", worker.read_text("utf-8"))
+    if count != 1:
+        raise BuildError("sw.js has no line for the list of files")
+    worker.write_text(text, "utf-8")
+    return version
 
 
 def _copy(source: Path, target: Path) -> None:

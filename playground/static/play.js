@@ -6,10 +6,12 @@
 import { Editor } from "./editor.js";
 import { PythonWorker } from "./python_worker.js";
 import { staticPage } from "./robot_html.js";
-import { textOf } from "./text_link.js";
+import { fragmentOf, textOf } from "./text_link.js";
 
 /** Time limit of a request to the robot; the longest one loads a document. */
 const WITHIN_MS = 30_000;
+/** Pause before the files are kept, so that the first picture of the robot comes first. */
+const KEEP_AFTER_MS = 3000;
 const FIRST = "dash/robots/turtlebot4.yaml";
 /** @type {Record<string, string>} */
 const STEPS = { interpreter: "Loading Python…", code: "Loading URC…" };
@@ -28,11 +30,18 @@ const worker = new PythonWorker((step) => tell(STEPS[step] ?? step));
 const address = location.href.replace(/[?#].*/, "");
 /** @type {HTMLIFrameElement | null} */
 let frame = null;
-/** The text of the running robot. */
+/** The text of the shipped robot. */
+let first = "";
+/** The text of the running robot, and its name. */
 let running = "";
+let robot = "";
 /** The newest text without errors. */
 let wanted = "";
 let isOpening = false;
+/** What is said of all running robots. */
+let note = "";
+/** Whether this page is part of another page of the site, whose button loaded it. */
+const isEmbedded = window.parent !== window && new URLSearchParams(location.search).has("embedded");
 
 /** @param {string} text */
 const tell = (text) => {
@@ -69,20 +78,39 @@ async function begin() {
   const linked = await textOf(location.hash);
   if (linked !== null) editor.text = linked;
   else if (location.hash.length > 1) tell("This link holds no valid text; the page shows the TurtleBot.");
-  if (!editor.text) editor.text = await (await fetch(new URL(FIRST, import.meta.url))).text();
+  if (!editor.text) editor.text = first = await shipped();
   part("[data-tabs]").hidden = false;
   if (linked !== null) {
     view("text");
     void editor.check();
   }
+  if (isEmbedded) await start();
 }
 
-/** Keep everything for later starts without a network, where the browser permits it. */
-async function keepOffline() {
+/** @returns {Promise<string>} the text of the shipped robot */
+async function shipped() {
+  const response = await fetch(new URL(FIRST, import.meta.url));
+  if (!response.ok) throw new Error(`${response.url}: HTTP ${response.status}`);
+  return response.text();
+}
+
+/**
+ * Keep all files for later visits without a network, and tell when all are kept. Some browsers permit
+ * no service worker, for example in private windows.
+ */
+async function keep() {
   if (!("serviceWorker" in navigator)) return;
   try {
     await navigator.serviceWorker.register(new URL("sw.js", import.meta.url));
-    await navigator.serviceWorker.ready;
+    const { active } = await navigator.serviceWorker.ready;
+    const { port1, port2 } = new MessageChannel();
+    const told = new Promise((resolve) => port1.addEventListener("message", ({ data }) => resolve(data)));
+    port1.start();
+    active?.postMessage("keep", [port2]);
+    const { isKept, reason } = await told;
+    if (!isKept) throw new Error(reason);
+    note = " This page also works offline.";
+    tellRunning();
   } catch (error) {
     console.info("URC: the playground is not kept for use offline:", error);
   }
@@ -90,25 +118,30 @@ async function keepOffline() {
 
 async function start() {
   go.disabled = true;
+  go.textContent = "Starting…";
   try {
-    await keepOffline();
     await open(editor.text);
     frame = document.createElement("iframe");
     frame.title = "Dashboard of the robot";
     frame.src = new URL("frame.html", import.meta.url).href;
     part("[data-robot]").replaceChildren(frame);
-    navigator.serviceWorker?.controller?.postMessage("keep all");
+    setTimeout(() => void keep(), KEEP_AFTER_MS);
   } catch (error) {
     tell(`The robot did not start: ${error instanceof Error ? error.message : error}`);
     go.disabled = false;
+    go.textContent = "Start the robot";
   }
 }
 
 /** @param {string} text */
 async function open(text) {
-  const name = await ask({ verb: "open", text });
+  robot = await ask({ verb: "open", text });
   running = text;
-  tell(`${name} runs in this page. No real robot moves.`);
+  tellRunning();
+}
+
+function tellRunning() {
+  tell(`${robot} runs in this page. No real robot moves.${note}`);
 }
 
 /** Switch the robot to the newest valid text, and show its page. */
@@ -138,6 +171,16 @@ function view(name) {
 for (const button of document.querySelectorAll("[data-tabs] button")) {
   button.addEventListener("click", () => view(button.getAttribute("data-view") ?? "robot"));
 }
+if (isEmbedded) {
+  document.documentElement.classList.add("play-embedded");
+  const whole = /** @type {HTMLAnchorElement} */ (part("[data-whole]"));
+  whole.hidden = false;
+  whole.addEventListener("click", (event) => {
+    if (editor.text === first) return;
+    event.preventDefault();
+    void fragmentOf(editor.text).then((fragment) => window.open(address + fragment, "_top"));
+  });
+}
 go.addEventListener("click", () => void start());
 addEventListener("hashchange", () => location.reload());
-void begin();
+begin().catch((error) => tell(`The page did not load: ${error instanceof Error ? error.message : error}`));

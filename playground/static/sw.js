@@ -1,64 +1,151 @@
 // @ts-check
 /**
- * The service worker of the playground: it keeps the files of one version, and answers from them.
+ * The service worker of the playground: it keeps all files of one version, and answers from them.
  *
- * The build writes the version into this file, so a browser notices every other version.
+ * Either all files of this version are kept, or requests go to the server: a page never gets files of
+ * two versions. A new version that follows a kept one is kept before it replaces the old one, which
+ * happens when no page uses the old one any more.
  */
 
 /**
  * @typedef {Event & {waitUntil: (work: Promise<unknown>) => void}} LifeEvent
  * @typedef {LifeEvent & {request: Request, respondWith: (answer: Promise<Response>) => void}} AskEvent
- * @typedef {LifeEvent & {data: unknown}} SaidEvent
+ * @typedef {LifeEvent & {data: unknown, ports: readonly MessagePort[]}} SaidEvent
  */
+
+/**
+ * The build writes this line, so a browser notices every other version: SHA-256 of each file.
+ *
+ * @type {{version: string, files: Record<string, string>}}
+ */
+const BUILD = { version: "", files: {} };
 
 /** TypeScript's page types lack service workers. @type {any} */
 const worker = self;
-const PREFIX = "urc-playground-";
-const CACHE = `${PREFIX}VERSION`;
+/** @type {string} */
+const SCOPE = worker.registration.scope;
+/** One origin may have several playgrounds, and all share its caches. */
+const PREFIX = `urc-playground ${SCOPE} `;
+const CACHE = PREFIX + BUILD.version;
+/** An entry that is written last, once a cache has all files. */
+const WHOLE = new URL("whole", SCOPE).href;
+const AT_ONCE = 4;
 
-worker.addEventListener("install", () => worker.skipWaiting());
+let isWhole = false;
+/** @type {Promise<void> | undefined} */
+let keeping;
 
-worker.addEventListener("activate", (/** @type {LifeEvent} */ event) => {
-  event.waitUntil(
-    (async () => {
-      const names = await caches.keys();
-      const old = names.filter((name) => name.startsWith(PREFIX) && name !== CACHE);
-      await Promise.all(old.map((name) => caches.delete(name)));
-      await worker.clients.claim();
-    })(),
-  );
-});
+worker.addEventListener("install", (/** @type {LifeEvent} */ event) => event.waitUntil(install()));
+worker.addEventListener("activate", (/** @type {LifeEvent} */ event) => event.waitUntil(activate()));
 
 worker.addEventListener("message", (/** @type {SaidEvent} */ event) => {
-  if (event.data === "keep all") event.waitUntil(keepAll());
+  if (event.data !== "keep") return;
+  const told = keep().then(
+    () => ({ isKept: true }),
+    (error) => ({ isKept: false, reason: String(error) }),
+  );
+  event.waitUntil(told.then((found) => event.ports[0]?.postMessage(found)));
 });
 
 worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
   const { request } = event;
-  if (request.method !== "GET" || !request.url.startsWith(worker.registration.scope)) return;
-  event.respondWith(answer(event, request));
+  const name = nameOf(request.url);
+  if (request.method === "GET" && Object.hasOwn(BUILD.files, name)) event.respondWith(answer(request, name));
 });
 
-/**
- * @param {AskEvent} event
- * @param {Request} request
- */
-async function answer(event, request) {
-  const cache = await caches.open(CACHE);
-  const old = await cache.match(request, { ignoreSearch: true });
-  if (old) return old;
-  const found = await fetch(request);
-  if (found.ok && !found.redirected) event.waitUntil(cache.put(request, found.clone()));
-  return found;
+async function install() {
+  const old = await oldCaches();
+  const kept = await Promise.all(old.map(async (name) => (await caches.open(name)).match(WHOLE)));
+  if (kept.some(Boolean)) await keep();
+  else await worker.skipWaiting();
 }
 
-/** Fetch the files that no page has needed yet. */
+async function activate() {
+  await Promise.all((await oldCaches()).map((name) => caches.delete(name)));
+  await worker.clients.claim();
+}
+
+async function oldCaches() {
+  return (await caches.keys()).filter((name) => name.startsWith(PREFIX) && name !== CACHE);
+}
+
+/** @param {string} url */
+function nameOf(url) {
+  const { origin, pathname } = new URL(url);
+  const path = origin + pathname;
+  if (!path.startsWith(SCOPE)) return "";
+  return path.slice(SCOPE.length) || "index.html";
+}
+
+/** @param {string} name */
+function addressOf(name) {
+  return new URL(name, SCOPE).href;
+}
+
+/**
+ * @param {Request} request
+ * @param {string} name
+ */
+async function answer(request, name) {
+  const cache = await caches.open(CACHE);
+  isWhole ||= (await cache.match(WHOLE)) !== undefined;
+  const kept = isWhole ? await cache.match(addressOf(name)) : undefined;
+  return kept ?? fetch(request);
+}
+
+/** Keep all files that are not kept yet; reject if a file is not of this version. */
+function keep() {
+  keeping ??= keepAll().finally(() => {
+    keeping = undefined;
+  });
+  return keeping;
+}
+
 async function keepAll() {
   const cache = await caches.open(CACHE);
-  const list = new URL("files.json", worker.registration.scope);
-  const { files } = await (await fetch(list)).json();
-  const urls = ["", ...files].map((file) => new URL(file, worker.registration.scope).href);
-  for (const url of urls) {
-    if (!(await cache.match(url))) await cache.add(url);
+  if (await cache.match(WHOLE)) return;
+  const old = await Promise.all((await oldCaches()).map((name) => caches.open(name)));
+  const names = Object.keys(BUILD.files);
+  const next = async () => {
+    for (let name = names.pop(); name !== undefined; name = names.pop()) {
+      const url = addressOf(name);
+      if (!(await cache.match(url))) await cache.put(url, await found(name, old));
+    }
+  };
+  await Promise.all(Array.from({ length: AT_ONCE }, next));
+  await cache.put(WHOLE, new Response(BUILD.version));
+}
+
+/**
+ * Return a file of this version: from an older cache, or from the server.
+ *
+ * @param {string} name
+ * @param {Cache[]} old
+ */
+async function found(name, old) {
+  const url = addressOf(name);
+  for (const cache of old) {
+    const checked = await ofThisVersion(name, await cache.match(url));
+    if (checked) return checked;
   }
+  for (const how of /** @type {const} */ (["default", "reload"])) {
+    const checked = await ofThisVersion(name, await fetch(url, { cache: how }));
+    if (checked) return checked;
+  }
+  throw new Error(`${url}: the server has another version of this file`);
+}
+
+/**
+ * Return a new response, because the answer to a redirected request would not open a page.
+ *
+ * @param {string} name
+ * @param {Response | undefined} response
+ */
+async function ofThisVersion(name, response) {
+  if (!response?.ok) return undefined;
+  const data = await response.arrayBuffer();
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", data));
+  const text = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  if (text !== BUILD.files[name]) return undefined;
+  return new Response(data, { headers: { "content-type": response.headers.get("content-type") ?? "" } });
 }

@@ -2,6 +2,7 @@
 
 import json
 import re
+from html import escape
 from importlib.metadata import PackageMetadata, PackageNotFoundError, metadata
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 import hatch_build
 import hatch_sbom
 from scripts.licences import PAGE, page
+from scripts.playground_licences import NO_TEXT, Part, contents, parts, write_licences
+from scripts.playground_licences import PACKAGES as IN_PLAYGROUND
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = list(hatch_sbom.python_packages(ROOT))
@@ -82,3 +85,50 @@ def test_a_bundled_module_brings_the_text_of_its_licence(one: hatch_sbom.NpmPack
     assert parts_of(one.licence) <= KNOWN
     files = hatch_build.VENDORED[one.name]
     assert "LICENSE" in files or one.name in hatch_build.LICENCES
+
+
+PYODIDE = ROOT / "node_modules" / "pyodide"
+LINKED = {"Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "LLVM-exception", "MIT", "MPL-2.0",
+          "Python-2.0", "Zlib", "bzip2-1.0.6", "dtoa"}  # fmt: skip
+"""All licences of what is linked into Pyodide."""
+
+
+@pytest.fixture(scope="module")
+def binary() -> bytes:
+    """The files of Pyodide that the playground contains."""
+    names = ("pyodide.asm.wasm", "pyodide.asm.mjs", "pyodide.mjs")
+    return b"".join((PYODIDE / name).read_bytes() for name in names)
+
+
+@pytest.mark.needs("pyodide")
+@pytest.mark.parametrize("one", parts(), ids=lambda one: one.name)
+def test_a_part_of_pyodide_is_in_its_files(one: Part, binary: bytes) -> None:
+    """With the listed version, and under a known licence."""
+    assert one.marks
+    assert [mark for mark in one.marks if mark.encode() not in binary] == []
+    assert not one.version or any(one.version in mark for mark in one.marks)
+    assert one.licence == NO_TEXT or parts_of(one.licence) <= LINKED
+    assert one.notice
+
+
+@pytest.mark.needs("pyodide")
+def test_pyodide_has_the_version_of_the_lock() -> None:
+    """And the licence that its manifest names."""
+    manifest = json.loads((PYODIDE / "package.json").read_bytes())
+    named = next(one for one in contents() if one.name == "pyodide")
+    assert (manifest["version"], manifest["license"]) == (named.version, named.licence)
+
+
+def test_each_licence_in_the_playground_has_its_text(tmp_path: Path) -> None:
+    """The page links a text for each package, with its version; no text is left over."""
+    write_licences(tmp_path / "licences")
+    listed = contents()
+    assert {one.name for one in listed} > {*IN_PLAYGROUND, "pyodide", "CPython", "uplot"}
+    page = (tmp_path / "licences" / "index.html").read_text("utf-8")
+    for one in listed:
+        assert len((tmp_path / "licences" / one.file).read_text("utf-8")) > 200, one
+        assert f">{escape(one.name)}</a></td><td>{one.version or '–'}</td>" in page, one
+    files = {file.name for file in (tmp_path / "licences").iterdir()}
+    assert files == {"index.html", *(one.file for one in listed)}
+    told = (tmp_path / "licences" / "pyodide-parts.txt").read_text("utf-8")
+    assert [one for one in parts() if one.notice not in told] == []

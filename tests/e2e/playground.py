@@ -14,10 +14,22 @@ from playground.checker import report
 from tests.e2e import axe
 from tests.e2e.browser import LOCALE, PageFaults
 
-__all__ = ["WITHIN_MS", "all_files", "command_report", "opened", "served", "shown_report"]
+__all__ = [
+    "OFFLINE",
+    "WITHIN_MS",
+    "all_files",
+    "command_report",
+    "opened",
+    "put",
+    "served",
+    "shown_report",
+    "start",
+]
 
 WITHIN_MS = 110_000
 """Limit for the start of Python, in milliseconds."""
+OFFLINE = "works offline"
+"""What the page says as soon as all its files are kept."""
 _COMPARED = ("line", "column", "severity", "code", "message")
 
 

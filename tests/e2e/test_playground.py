@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from random import Random
 from typing import Literal
 
+import anyio
 import pytest
 from playwright.async_api import Browser, Locator, Page, expect
 
@@ -13,6 +15,7 @@ from scripts.playground import write
 from tests.contract.test_broken_documents import BROKEN, DOCUMENTS
 from tests.e2e import axe
 from tests.e2e.playground import (
+    OFFLINE,
     WITHIN_MS,
     all_files,
     command_report,
@@ -32,18 +35,25 @@ pytestmark = [
 GESTURES = 5
 """Gestures until the robot has moved: the first one may only take the controls, and a pause of a
 busy machine ends a gesture."""
+PLACE = "some/path/playground"
 FIRST = "dash/robots/turtlebot4.yaml"
 SAMPLE = Random(22).sample(DOCUMENTS, 12)  # noqa: S311  # no secret
 """A browser takes a second for each; `tests/contract/test_stand_ins.py` compares all of them."""
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a built playground, under a path."""
-    root = tmp_path_factory.mktemp("site")
-    write(root / "some" / "path" / "playground")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a built playground, under a path."""
+    folder = tmp_path_factory.mktemp("site")
+    write(folder / PLACE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(root: Path) -> Iterator[str]:
+    """The address of the playground."""
     with served(root) as url:
-        yield f"{url}some/path/playground/"
+        yield f"{url}{PLACE}/"
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +85,20 @@ async def test_reports_are_those_of_the_command(page: Page) -> None:
 
 async def test_a_turtlebot_is_driven_let_go_and_stopped(page: Page) -> None:
     """By a hand on the real dashboard: it moves while held, and not after STOP."""
+    await drive_and_let_go(page)
+    frame = page.frame_locator("iframe")
+    place = frame.locator("[data-cell]").filter(has_text="Position")
+    await frame.locator("[data-stop-button]").click()
+    await expect(frame.locator("[data-latched]")).to_be_visible()
+    still = await place.inner_text()
+    pad = frame.locator(".joystick-pad")
+    assert not await pushed(page, pad, lambda: place.inner_text(), still)
+    await frame.locator("[data-verb='reset']").first.click()
+    await expect(frame.locator("[data-latched]")).to_be_hidden()
+
+
+async def drive_and_let_go(page: Page) -> None:
+    """Fail unless the robot moves while the stick is held, and stops when it is let go."""
     frame = page.frame_locator("iframe")
     place = frame.locator("[data-cell]").filter(has_text="Position")
     speed = frame.locator("[data-cell]").filter(has_text="Speed").first
@@ -85,12 +109,6 @@ async def test_a_turtlebot_is_driven_let_go_and_stopped(page: Page) -> None:
             break
     assert await place.inner_text() != before
     await expect(speed).to_contain_text("0.00")
-    await frame.locator("[data-stop-button]").click()
-    await expect(frame.locator("[data-latched]")).to_be_visible()
-    still = await place.inner_text()
-    assert not await pushed(page, pad, lambda: place.inner_text(), still)
-    await frame.locator("[data-verb='reset']").first.click()
-    await expect(frame.locator("[data-latched]")).to_be_hidden()
 
 
 async def pushed(page: Page, pad: Locator, read: Callable[[], Awaitable[str]], before: str) -> bool:
@@ -143,12 +161,28 @@ async def test_the_page_is_accessible(page: Page, theme: Literal["light", "dark"
     assert await axe.faults(page) == []
 
 
-def test_the_build_names_no_other_host(
-    address: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+async def test_once_loaded_it_works_without_a_server(browser: Browser, root: Path) -> None:
+    """After the server has ended, the page is loaded again, and the robot is driven."""
+    with ExitStack() as stack:
+        url = f"{stack.enter_context(served(root))}{PLACE}/"
+        async with opened(browser, url) as page:
+            await start(page)
+            await expect(page.locator("[data-state]")).to_contain_text(OFFLINE, timeout=WITHIN_MS)
+            stack.close()
+            host, _, port = url.split("/")[2].partition(":")
+            with pytest.raises(OSError, match="connect"):
+                await anyio.connect_tcp(host, int(port))
+            answer = await page.reload()
+            assert answer is not None
+            assert answer.from_service_worker
+            await start(page)
+            await drive_and_let_go(page)
+
+
+def test_the_build_names_no_other_host(root: Path) -> None:
     """Neither the page nor its modules, apart from the interpreter, contain an address."""
-    root = next(Path(tmp_path_factory.getbasetemp()).glob("site*/some/path/playground"))
-    ours = [*root.glob("*.js"), *root.glob("*.html"), *root.glob("*.css")]
+    home = root / PLACE
+    ours = [*home.glob("*.js"), *home.glob("*.html"), *home.glob("*.css")]
     assert len(ours) > 8
     assert [
         file.name for file in ours if "http://" in (said := file.read_text()) or "https://" in said
