@@ -30,6 +30,7 @@ NAMES = (
     "browser_roslibjs",
     "browser_turtlebot",
     "page_layouts",
+    "playground",
     "browser_frames",
     "browser_firefox",
     "browser_webkit",
@@ -59,6 +60,7 @@ PROGRAMS = {
     "browser_firefox": ("firefox", "node", "puppeteer"),
     "browser_webkit": ("webkit-driver", "xvfb"),
     "page_layouts": ("chromium",),
+    "playground": ("chromium", "node", "pyodide", "axe"),
     "motion_input": ("chromium",),
 }
 """Programs that each benchmark needs besides Python, as named in `scripts.needs`."""
