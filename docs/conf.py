@@ -8,6 +8,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path.insert(0, str(ROOT))
 
+from scripts.playground import is_possible  # noqa: E402
 from urc import __version__  # noqa: E402
 
 project = "URC"
@@ -67,8 +68,8 @@ if "Source" in _urls:
         "source_directory": "docs/",
     }
 
-# The playground, on every page: see scripts/site.py.
-if (HERE / "_static/playground/page.js").exists():
+# The buttons of the playground, on every page; scripts/site.py adds the playground itself.
+if is_possible():
+    tags.add("playground")  # noqa: F821  # Sphinx provides the name
     html_js_files.append(("playground/page.js", {"type": "module"}))
-if (HERE / "_static/playground/page.css").exists():
     html_css_files.append("playground/page.css")

@@ -4,7 +4,8 @@ Any static web server can serve the folder, under any path. The pages contact no
 folder contains:
 
 - the interpreter: Pyodide from npm, in the version from `package-lock.json`;
-- `python.zip`: URC, its documents and templates, and the packages that they need, compiled;
+- `python.bin`: URC, its documents and templates, and the packages that they need, compiled, as a
+  tar archive in gzip;
 - `dash/`: the modules and styles of the dashboard and the widgets, at a server's paths;
 - the page, its worker and its service worker, from `playground/static`;
 - `licences/`: see `scripts.playground_licences`.
@@ -14,12 +15,15 @@ the only package with a browser build on the package index; pip checks its locke
 """
 
 import argparse
+import gzip
 import hashlib
+import io
 import json
 import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 from collections.abc import Iterable
@@ -93,10 +97,10 @@ def write(folder: Path) -> str:
         code, library = Path(work, "code"), Path(work, "library")
         _stage_code(code)
         with zipfile.ZipFile(PYODIDE / "python_stdlib.zip") as stdlib:
-            stdlib.extractall(library)
+            stdlib.extractall(library)  # noqa: S202  # npm checks its hash
         _compile(Path(work))
-        _pack(code, folder / "python.zip")
-        _pack(library, folder / "pyodide" / "python_stdlib.zip")
+        _pack(code, folder / "python.bin")
+        _zip(library, folder / "pyodide" / "python_stdlib.zip")
     _write_dashboard(folder / "dash")
     try:
         write_licences(folder / "licences")
@@ -212,6 +216,22 @@ def _run(command: list[str], fault: str) -> None:
 
 
 def _pack(folder: Path, archive: Path) -> None:
+    """Write a tar archive in gzip that has the same bytes in every build.
+
+    Its name must not end with ".gz": some web servers would let the browser unpack it.
+    """
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as packed:
+        for file in sorted(folder.rglob("*")):
+            if file.is_file():
+                entry = tarfile.TarInfo(file.relative_to(folder).as_posix())
+                entry.size = file.stat().st_size
+                with file.open("rb") as opened:
+                    packed.addfile(entry, opened)
+    archive.write_bytes(gzip.compress(buffer.getvalue(), mtime=0))
+
+
+def _zip(folder: Path, archive: Path) -> None:
     """Write a ZIP archive that has the same bytes in every build."""
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
         for file in sorted(folder.rglob("*")):

@@ -1,8 +1,9 @@
 """Build the documentation site: `python -m scripts.site`, part of `./dev docs`.
 
 Sphinx reads docs/ and writes .site/html. Warnings are errors: for example, a broken reference, a
-page without a table of contents entry, or a heading that skips a level. Sphinx needs no network;
-the playground downloads one package at its first build and keeps it.
+page without a table of contents entry, or a heading that skips a level. Sphinx needs no network.
+If npm has installed Pyodide, the site contains the playground; its first build downloads one
+package and keeps it.
 """
 
 import shutil
@@ -23,15 +24,6 @@ def main() -> int:
     """Build the site, by default in .site/; return the exit code."""
     folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
     code = build(folder)
-    if code == 0:
-        from scripts.playground import PYODIDE, BuildError, write
-
-        if PYODIDE.is_dir():  # npm installs it; without it, the site has no playground
-            try:
-                write(folder / "playground")
-            except BuildError as error:
-                print(f"site: {error}", file=sys.stderr)
-                code = 1
     print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
     return code
 
@@ -44,12 +36,24 @@ def build(html: Path = HTML) -> int:
     """
     from sphinx.cmd.build import build_main  # takes a second, which the link check does not need
 
+    from scripts.playground import BuildError, is_possible, write
+
     shutil.rmtree(html, ignore_errors=True)
     options = ("--builder=html", "--fail-on-warning", "--keep-going", f"--jobs={PROCESSES}")
     trees = f"--doctree-dir={html.parent / 'doctrees'}"
     with redirect_stdout(StringIO()):
         code = build_main([*options, "--fresh-env", trees, str(ROOT / "docs"), str(html)])
-    return int(code)
+    if code != 0:
+        return int(code)
+    if not is_possible():
+        print("site: without the playground; to add it, run: npm ci --ignore-scripts")
+        return 0
+    try:
+        write(html / "playground")
+    except BuildError as fault:
+        print(f"site: {fault}", file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":

@@ -30,6 +30,12 @@ const worker = new PythonWorker((step) => tell(STEPS[step] ?? step));
 const address = location.href.replace(/[?#].*/, "");
 /** @type {HTMLIFrameElement | null} */
 let frame = null;
+/**
+ * The first page of the robot, which the worker renders while the frame loads.
+ *
+ * @type {Promise<string> | null}
+ */
+let early = null;
 /** The text of the shipped robot. */
 let first = "";
 /** The text of the running robot, and its name. */
@@ -59,7 +65,11 @@ Object.assign(window, {
     /** @param {string} method @param {string} url @param {string} body */
     ask: (method, url, body) => ask({ verb: "ask", method, url, body }),
     /** @param {string} query */
-    page: async (query) => staticPage(await ask({ verb: "page", query })),
+    page: async (query) => {
+      const found = early && query === "" ? early : ask({ verb: "page", query });
+      early = null;
+      return staticPage(await found);
+    },
   },
 });
 
@@ -121,6 +131,8 @@ async function start() {
   go.textContent = "Starting…";
   try {
     await open(editor.text);
+    early = ask({ verb: "page", query: "" });
+    early.catch(() => {}); // reported to the frame
     frame = document.createElement("iframe");
     frame.title = "Dashboard of the robot";
     frame.src = new URL("frame.html", import.meta.url).href;
@@ -151,6 +163,7 @@ async function reopen() {
   try {
     while (frame && wanted !== running) {
       await open(wanted);
+      early = null;
       frame.contentWindow?.location.replace(new URL("frame.html", import.meta.url));
     }
   } catch (error) {

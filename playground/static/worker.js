@@ -6,10 +6,11 @@
  * Messages in: `{id, do: "check", text}`, `{id, do: "report", folder, path, files}`, and those of
  * `playground/robot.py`. Messages out: `{id, value}` or `{id, fault}`, and `{progress}` while loading.
  */
+import { unpack } from "./archive.js";
 import { loadPyodide } from "./pyodide/pyodide.mjs";
 
 const HOME = "/urc";
-/** Pyodide's list of packages: none, because everything is in `python.zip`. */
+/** Pyodide's list of packages: none, because everything is in `python.bin`. */
 const NO_PACKAGES = {
   info: { abi_version: "2026_0", arch: "wasm32", platform: "emscripten_5_0_3", python: "3.14.2", version: "0" },
   packages: {},
@@ -22,14 +23,14 @@ const tell = (step) => postMessage({ progress: step });
 async function started() {
   tell("interpreter");
   const root = new URL("./", import.meta.url);
-  const archive = fetch(new URL("python.zip", root)).then(whole);
+  const archive = fetch(new URL("python.bin", root));
   archive.catch(() => {}); // reported below
   const python = await loadPyodide({
     indexURL: new URL("pyodide/", root).href,
     lockFileContents: /** @type {any} */ (NO_PACKAGES),
   });
   tell("code");
-  python.unpackArchive(await archive, "zip", { extractDir: HOME });
+  await unpack(await archive, python.FS, HOME);
   python.runPython(`
 import sys
 sys.path.insert(0, "${HOME}")
@@ -37,12 +38,6 @@ from playground.stand_ins import install
 install()
 `);
   return python;
-}
-
-/** @param {Response} response */
-function whole(response) {
-  if (!response.ok) throw new Error(`${response.url}: HTTP ${response.status}`);
-  return response.arrayBuffer();
 }
 
 /** @type {Promise<any> | undefined} */

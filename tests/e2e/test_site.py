@@ -18,6 +18,7 @@ from playwright.async_api import Browser, Page, Request
 from scripts.check import BUILT_SITE
 from tests.documentation import ROOT
 from tests.e2e.axe import faults, prepare
+from tests.e2e.playground import WITHIN_MS
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("chromium")]
 
@@ -59,6 +60,8 @@ QUESTIONS = {
 }
 """A question as people type it, and the page that answers it."""
 FIRST = 3
+MOST_LINES_PX = 100
+"""A text that breaks between all its letters is higher."""
 LOADING = re.compile(r"<(?:script|img|iframe|source|video|link)\b[^>]*>", re.IGNORECASE)
 """The tags that load something; the parser needs a minute for the whole text of all pages."""
 READ = ("index", "tutorials/cart", "how-to/arduino", "reference/keys/serial", "reference/cli")
@@ -214,6 +217,49 @@ async def test_pages_are_accessible(browser: Browser, address: str, scheme: str)
             assert await faults(opened) == [], name
             wide = await opened.evaluate("document.documentElement.scrollWidth - innerWidth")
             assert wide <= 0, f"{name} scrolls to the side"
+    finally:
+        await context.close()
+
+
+@pytest.mark.needs("node")
+@pytest.mark.needs("pyodide")
+async def test_a_robot_is_driven_on_the_front_page_after_a_click(page: Page, address: str) -> None:
+    """Nothing of the playground is loaded before; an edit beside the robot changes it."""
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await page.goto(f"{address}/index.html")
+    button = page.get_by_role("button", name="Drive it here")
+    await button.wait_for()
+    assert not any(one.startswith(f"{address}/playground/") for one in asked)
+    await button.click()
+    inner = page.frame_locator(".urc-demo iframe")
+    dashboard = inner.frame_locator("iframe")
+    good = dashboard.locator("[data-badge][data-state=good]")
+    await good.wait_for(timeout=WITHIN_MS)
+    who = await dashboard.locator("[data-who]").bounding_box()
+    assert who is not None
+    assert who["height"] < MOST_LINES_PX
+    area = inner.locator("textarea")
+    text = await area.input_value()
+    await area.fill(text.replace("title: TurtleBot 4\n", "title: Edited robot\n", 1))
+    title = dashboard.locator(".urc-bar-title", has_text="Edited robot")
+    await title.wait_for(timeout=WITHIN_MS)
+    assert await area.is_visible()
+
+
+@pytest.mark.needs("pyodide")
+async def test_without_javascript_a_link_leads_to_the_playground(
+    browser: Browser, address: str, html: Path
+) -> None:
+    """It stands where the button would be."""
+    context = await browser.new_context(java_script_enabled=False)
+    try:
+        opened = await context.new_page()
+        await opened.goto(f"{address}/index.html")
+        link = opened.get_by_role("link", name="Drive it here")
+        assert await link.is_visible()
+        assert (html / str(await link.get_attribute("href"))).is_file()
     finally:
         await context.close()
 

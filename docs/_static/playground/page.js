@@ -36,13 +36,34 @@ function offerCheck(block) {
   });
 }
 
-/** @param {HTMLElement} place */
+/**
+ * Let a button take the place of the link, which remains without JavaScript.
+ *
+ * @param {HTMLElement} place
+ */
 function offerRobot(place) {
-  const link = document.createElement("a");
-  link.className = "urc-check urc-demo-start";
-  link.href = playground.href;
-  link.textContent = "Drive it in this browser";
-  place.append(link);
+  const link = place.querySelector(".urc-demo-start");
+  if (!(link instanceof HTMLAnchorElement)) return;
+  const button = made(link.className, link.textContent);
+  button.addEventListener("click", () => drive(place, link.href));
+  link.replaceWith(button);
+}
+
+/**
+ * Put the playground in the place of the picture. In a frame, its style sheets and those of the site
+ * do not meet, and its service worker controls it.
+ *
+ * @param {HTMLElement} place
+ * @param {string} page
+ */
+function drive(place, page) {
+  const frame = document.createElement("iframe");
+  frame.title = "An emulated robot, and its file";
+  frame.src = `${page}?embedded`;
+  document.body.classList.add("urc-demo-running");
+  place.replaceChildren(frame);
+  place.scrollIntoView({ block: "nearest" });
+  frame.focus({ preventScroll: true });
 }
 
 /**
