@@ -47,7 +47,7 @@ PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
 CACHE = ROOT / "build" / "playground"
-"""Compiled files, by the hash of their sources."""
+"""The compiled files of the last build, by the hash of their sources."""
 WHEELS = CACHE / "wheels"
 """Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800
@@ -184,17 +184,22 @@ def _download(package: str, locked: str) -> Path:
 
 
 def _compile(work: Path) -> None:
-    """Compile all Python files; reuse the bytecode of unchanged files from earlier builds."""
-    key = (PYODIDE / "package.json").read_bytes()
-    kept = {
-        file: CACHE / hashlib.blake2b(key + file.read_bytes(), digest_size=16).hexdigest()
-        for file in work.rglob("*.py")
-    }
-    for file, made in kept.items():
-        if made.is_file():
-            shutil.copyfile(made, file.with_suffix(".pyc"))
-            file.unlink()
-    if not any(file.is_file() for file in kept):
+    """Compile all Python files, or take the bytecode of a build with the same files.
+
+    The bytecode of a file depends on the files that the same process has compiled before. Therefore
+    all files are compiled or none, so that each build has the same bytes.
+    """
+    sources = sorted(work.rglob("*.py"))
+    total = hashlib.sha256((PYODIDE / "package.json").read_bytes())
+    for file in sources:
+        total.update(f"{file.relative_to(work).as_posix()}\n".encode() + file.read_bytes())
+    made = CACHE / f"{total.hexdigest()}.zip"
+    if made.is_file():
+        with zipfile.ZipFile(made) as compiled:
+            compiled.extractall(work)  # noqa: S202  # an earlier build has written it
+        for file in sources:
+            if file.with_suffix(".pyc").is_file():
+                file.unlink()
         return
     node = node_executable()
     if node is None:
@@ -202,9 +207,12 @@ def _compile(work: Path) -> None:
     script = ROOT / "playground" / "compile.mjs"
     _run([node, str(script), str(PYODIDE), str(work)], "Python files could not be compiled")
     CACHE.mkdir(parents=True, exist_ok=True)
-    for file, made in kept.items():
-        if file.with_suffix(".pyc").is_file() and not made.is_file():
-            shutil.copyfile(file.with_suffix(".pyc"), made)
+    for old in CACHE.glob("*.zip"):
+        old.unlink(missing_ok=True)
+    with tempfile.TemporaryDirectory(prefix="urc-playground-", dir=CACHE.parent) as folder:
+        packed = Path(folder, made.name)
+        _zip(work, packed, "*.pyc")
+        packed.replace(made)  # at once, because another build may look for it
 
 
 def _run(command: list[str], fault: str) -> None:
@@ -231,10 +239,10 @@ def _pack(folder: Path, archive: Path) -> None:
     archive.write_bytes(gzip.compress(buffer.getvalue(), mtime=0))
 
 
-def _zip(folder: Path, archive: Path) -> None:
+def _zip(folder: Path, archive: Path, pattern: str = "*") -> None:
     """Write a ZIP archive that has the same bytes in every build."""
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
-        for file in sorted(folder.rglob("*")):
+        for file in sorted(folder.rglob(pattern)):
             if file.is_file():
                 entry = zipfile.ZipInfo(file.relative_to(folder).as_posix(), _DATED)
                 entry.compress_type = zipfile.ZIP_DEFLATED
