@@ -248,6 +248,23 @@ async def test_a_robot_is_driven_on_the_front_page_after_a_click(page: Page, add
     assert await area.is_visible()
 
 
+@pytest.mark.needs("node")
+@pytest.mark.needs("pyodide")
+async def test_a_document_is_checked_on_its_page(page: Page, address: str) -> None:
+    """“Check” opens an editor with the report; a mistake is listed with its place."""
+    await page.goto(f"{address}/tutorials/cart.html")
+    await page.get_by_role("button", name="Check").click()
+    good = page.locator(".urc-editor-summary[data-state=good]")
+    await good.wait_for(timeout=WITHIN_MS)
+    assert "0 errors" in await good.inner_text()
+    area = page.locator(".urc-editor textarea")
+    text = await area.input_value()
+    await area.fill(text.replace("kind: robot", "kind: robbot", 1))
+    problem = page.locator(".urc-editor-problems li").first
+    await problem.wait_for(timeout=WITHIN_MS)
+    assert "line 2, column" in await problem.inner_text()
+
+
 @pytest.mark.needs("pyodide")
 async def test_without_javascript_a_link_leads_to_the_playground(
     browser: Browser, address: str, html: Path
