@@ -202,6 +202,8 @@ async def _drive(page: Page) -> list[float]:
             break
     if await place.inner_text() == before:
         raise SystemExit("bench: the robot did not move")
+    if not await frame.locator(".camera[data-state=live]").count():
+        raise SystemExit("bench: the camera's images ended during the drive")
     found: list[float] = await page.evaluate("() => window.benchBetween")
     return found
 

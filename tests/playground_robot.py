@@ -104,6 +104,9 @@ async def drive(text: str, folder: Path) -> dict[str, Any]:
             await page.hold(0.1, speed=0, turn=0)  # neutral first
             await page.hold(0.5, speed=0.3, turn=0)
     told["driven_m_s"] = page.values["speed"]
+    seen = len(page.pictures)
+    await until(lambda: len(page.pictures) > seen + 1)
+    told["pictures_later"] = len(page.pictures) - seen
     page.say(t="release", command=COMMAND)
     await until(lambda: page.values["speed"] == 0)
     told["let_go_m_s"] = page.values["speed"]

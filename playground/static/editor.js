@@ -152,7 +152,8 @@ export class Editor {
       pieces.push(this.text.slice(at, start), mark);
       at = end;
     }
-    this.marks.replaceChildren(...pieces, this.text.slice(at));
+    // A line break at the end adds no line here, but one to the text area.
+    this.marks.replaceChildren(...pieces, `${this.text.slice(at)}\n`);
   }
 
   /** @param {Problem[]} problems */

@@ -77,6 +77,7 @@ def test_the_turtlebot_is_driven_let_go_and_stopped(tmp_path: Path) -> None:
     assert isinstance(told, dict)
     assert told["picture"] == "image/png"
     assert told["driven_m_s"] > 0.05
+    assert told["pictures_later"] > 1
     assert told["let_go_m_s"] == 0.0
     assert told["latched"] is True
     assert told["refused_after_stop"] is True

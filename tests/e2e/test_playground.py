@@ -108,6 +108,8 @@ async def drive_and_let_go(page: Page) -> None:
         if await pushed(page, pad, lambda: place.inner_text(), before):
             break
     assert await place.inner_text() != before
+    # A robot that has moved leans, and its camera with it.
+    await expect(frame.locator(".camera")).to_have_attribute("data-state", "live")
     await expect(speed).to_contain_text("0.00")
 
 
@@ -138,6 +140,18 @@ async def test_an_edit_changes_the_robot_and_an_error_does_not(page: Page) -> No
     problem = page.locator(".urc-editor-problems li").first
     await expect(problem).to_contain_text("line 9", timeout=WITHIN_MS)
     await expect(title).to_have_text("Edited robot")
+
+
+async def test_lines_stay_next_to_their_numbers(page: Page) -> None:
+    """The text area has all its lines in sight, so it never scrolls within its frame."""
+    heights = await page.evaluate(
+        """() => ["textarea", ".urc-editor-numbers", ".urc-editor-marks"].map((name) => {
+          const { offsetHeight, scrollHeight } = document.querySelector(name);
+          return [offsetHeight, scrollHeight];
+        })"""
+    )
+    assert heights[0][0] > 1000
+    assert {one for pair in heights for one in pair} == {heights[0][0]}
 
 
 async def test_a_link_carries_the_text(page: Page, browser: Browser, address: str) -> None:

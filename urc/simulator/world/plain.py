@@ -45,12 +45,16 @@ Colour = tuple[float, float, float]
 
 
 class LevelPose(NamedTuple):
-    """Pose of a level camera, in metres and radians."""
+    """Pose of a nearly level camera, in metres and radians."""
 
     x: float
     y: float
     z: float
     yaw: float
+    pitch: float = 0.0
+    """Small pitch in radians, positive with the nose down."""
+    roll: float = 0.0
+    """Small roll in radians, positive with the right side down."""
 
 
 class _Hit(NamedTuple):
@@ -146,9 +150,11 @@ def level_picture(
 ) -> list[bytearray]:
     """Return the forward image as three planes of rows: red, green and blue.
 
+    Pitch and roll move whole columns up or down, which is accurate enough for a body that leans.
+
     Args:
         plan: the obstacles.
-        pose: pose of the camera, without pitch and roll.
+        pose: pose of the camera.
         size: columns and rows of the image.
         view: horizontal field of view in radians, below pi.
     """
@@ -156,6 +162,7 @@ def level_picture(
     planes = [bytearray(width * height) for _ in range(3)]
     edges = [_relative(one, pose) for one in plan.edges if _is_ahead(one, pose)]
     columns = _columns(plan.spec.ground, width, height, view, max(pose.z, 0.02))
+    focus, down, aside = _focus(width, view), math.tan(pose.pitch), math.tan(pose.roll)
     for number, column in enumerate(columns):
         drawn = [bytearray(channel) for channel in column.even]
         angle = pose.yaw + column.turn
@@ -163,10 +170,25 @@ def level_picture(
         _draw_ground(drawn, column, plan, pose, angle, layers[-1].far if layers else _TILES_M)
         for hit in reversed(layers):
             _draw_edge(drawn, column, pose, hit)
+        if rows := round(focus * (down - aside * math.tan(column.turn))):
+            drawn = [_moved_up(channel, rows) for channel in drawn]
         for place in range(number * STRIDE, min(width, number * STRIDE + STRIDE)):
             for plane, channel in zip(planes, drawn, strict=True):
                 plane[place::width] = channel
     return planes
+
+
+def _focus(width: int, view: float) -> float:
+    """Return the focal length in pixels."""
+    return width / 2 / math.tan(view / 2)
+
+
+def _moved_up(channel: bytearray, rows: int) -> bytearray:
+    """Return a column moved up by a number of rows; its last pixel fills the gap."""
+    rows = max(-len(channel), min(len(channel), rows))
+    if rows < 0:
+        return channel[:1] * -rows + channel[: len(channel) + rows]
+    return channel[rows:] + channel[-1:] * rows
 
 
 def _relative(edge: Edge, pose: LevelPose) -> _Relative:
@@ -194,7 +216,7 @@ def _is_ahead(edge: Edge, pose: LevelPose) -> bool:
 
 @lru_cache(maxsize=4)
 def _columns(ground: str, width: int, height: int, view: float, z: float) -> list[_Column]:
-    focus = width / 2 / math.tan(view / 2)
+    focus = _focus(width, view)
     steepest = height / 2 / focus
     first, second = _GROUNDS[ground]
     shades = [_shades(colour, z, steepest) for colour in (second, first, _HOLE)]

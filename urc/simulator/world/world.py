@@ -179,13 +179,14 @@ class World:
         return self._faces
 
     def _plain_picture(self, *, flip: bool, mirror: bool) -> bytes:
-        """Return the image of a level camera as PNG; raise KeyError for any other camera."""
+        """Return the image of a camera without tilt as PNG; raise KeyError for any other camera."""
         from urc.simulator.world.plain import LevelPose, level_picture, png
 
         spec, motion = self.spec.camera, self.motion
-        if spec.tilt or motion.pitch or motion.roll:
+        if spec.tilt:
             raise KeyError("picture")
-        pose = LevelPose(motion.x, motion.y, motion.z + spec.mount_height, motion.yaw)
+        place = (motion.x, motion.y, motion.z + spec.mount_height)
+        pose = LevelPose(*place, motion.yaw, motion.pitch, motion.roll)
         planes = level_picture(self.plan, pose, (spec.width, spec.height), spec.fov)
         return png(planes, spec.width, flip=flip, mirror=mirror)
 

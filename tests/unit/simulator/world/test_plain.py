@@ -40,6 +40,34 @@ def test_a_picture_is_the_picture_of_numpy_but_at_edges(pose: tuple[float, float
     assert mine.std() > 10
 
 
+@pytest.mark.parametrize(("pitch", "roll"), [(0.04, 0.0), (-0.04, 0.0), (0.0, 0.03), (0.02, -0.03)])
+@pytest.mark.parametrize("pose", POSES)
+def test_a_leaning_camera_sees_almost_what_numpy_sees(
+    pose: tuple[float, float, float], pitch: float, roll: float
+) -> None:
+    """A robot leans as soon as it moves; the image is then far from the level image."""
+    x, y, yaw = pose
+
+    def seen(*lean: float) -> Any:
+        planes = plain.level_picture(PLAN, plain.LevelPose(x, y, 0.24, yaw, *lean), SIZE, VIEW)
+        rows = [np.frombuffer(one, np.uint8).reshape(SIZE[::-1]) for one in planes]
+        return np.stack(rows, -1).astype(int)
+
+    leaning = CameraPose(x, y, 0.24, yaw, pitch, roll)
+    other = camera_picture(PLAN, EdgeArrays(PLAN), leaning, SIZE, VIEW)
+    fault = np.abs(seen(pitch, roll) - other).mean()
+    assert fault < np.abs(seen() - other).mean() * 0.6
+    assert (np.abs(seen(pitch, roll) - other).max(axis=-1) > 8).mean() < 0.1
+
+
+@pytest.mark.parametrize("rows", [-200, -1, 0, 1, 119, 120, 200])
+def test_a_moved_column_keeps_its_length(rows: int) -> None:
+    """Also if it moves by more than the image's height."""
+    moved = plain._moved_up(bytearray(range(120)), rows)
+    assert len(moved) == 120
+    assert moved[60] == min(119, max(0, 60 + rows))
+
+
 @pytest.mark.parametrize(("flip", "mirror"), [(False, False), (True, False), (False, True)])
 def test_a_png_contains_the_planes(flip: bool, mirror: bool) -> None:
     """As an independent decoder reads them."""
