@@ -2,7 +2,7 @@
 
 Signals either freeze the real server for 5 s, or kill it. A new server starts 1 s after a kill.
 Several robots are driven in parallel, each with its own server, session and guard. An interrupted
-run can continue.
+run can be resumed.
 """
 
 import asyncio

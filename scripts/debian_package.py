@@ -72,7 +72,8 @@ def build_package(release: Path, wheels: Path, epoch: int) -> Path:
     """
     if shutil.which("dpkg-buildpackage") is None or shutil.which("dh") is None:
         raise SystemExit(
-            "release: the Debian package needs debhelper and dpkg-dev (apt-get install)"
+            "release: building the Debian package needs two programs;"
+            " run 'apt-get install debhelper dpkg-dev'"
         )
     with TemporaryDirectory(prefix="urc-debian-") as folder:
         source = Path(folder, f"urc-{__version__}")

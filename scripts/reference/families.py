@@ -7,7 +7,7 @@ __all__ = ["FAMILIES", "Family"]
 
 
 class Family(NamedTuple):
-    """One page of keys."""
+    """One page of the reference of keys."""
 
     title: str
     summary: str
@@ -24,7 +24,7 @@ def _driver(words: str) -> tuple[str, ...]:
 FAMILIES: Mapping[str, Family] = {
     "documents": Family(
         "Keys of documents",
-        "Keys at the top level of robots and drivers, and the types of values.",
+        "Top-level keys of the documents of robots and drivers, and the types of their values.",
         (
             *("robot", "robot:usedDriver", "robot:inlineDriver", "driver"),
             *_driver(

@@ -91,7 +91,8 @@ def _is_ours(handle: int) -> bool:
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
     """Declare the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
-    which = " for all emulated robots, or ROBOT:FAULT for a single robot," if has_names else ","
+    which = " of all emulated robots" if has_names else ""
+    single = " ROBOT:FAULT for a single robot;" if has_names else ""
     name = "tello:" if has_names else ""
     parser.add_argument(
         "--fault",
@@ -99,8 +100,8 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
         action="append",
         default=[],
         metavar="FAULT",
-        help=f"a fault{which} such as delay=200ms, loss=5%%, silent, noise=2x,"
-        " dropout=SIGNAL, stuck=SIGNAL, low-battery; repeatable, and changed by"
+        help=f"a fault{which}, such as delay=200ms, loss=5%%, silent, noise=2x,"
+        f" dropout=SIGNAL, stuck=SIGNAL, low-battery;{single} repeatable, and changed by"
         f" lines on standard input: 'fault {name}loss=10%%', 'mend', 'faults'",
     )
 

@@ -168,7 +168,7 @@ def test_a_command_that_fails_is_tried_again_logged_and_counted(
 
 
 class Hook(BaseHTTPRequestHandler):
-    """A web hook."""
+    """A webhook."""
 
     got: ClassVar[list[tuple[str, str | None, dict[str, Any]]]] = []
     status = 204

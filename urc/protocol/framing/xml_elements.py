@@ -190,7 +190,7 @@ class _XmlDecoder(StreamDecoder):
         return 1 if len(self._open) <= _NESTING_MOST else _BAD
 
     def _taken(self, size: int) -> bytes | FrameFault | None:
-        """Remove and return the next element; return None for a section between elements."""
+        """Remove and return the next element; return None for a comment or a declaration."""
         stream = self._stream
         piece = bytes(stream.data[stream.at : stream.at + size])
         stream.at += size

@@ -1,6 +1,6 @@
 """The options file that defines the maintainer's hook for alarm notifications.
 
-Layer 5. A web hook's URL is often a secret, so it can be stored in a separate file that only the
+Layer 5. A webhook's URL is often a secret, so it can be stored in a separate file that only the
 file's owner can read.
 """
 

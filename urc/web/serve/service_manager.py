@@ -44,7 +44,7 @@ class ServiceManager:
         """Interval within which systemd expects a heartbeat, in seconds; 0 without a watchdog."""
 
     def tell(self, *lines: str) -> None:
-        """Send assignments such as ``READY=1`` to systemd; only log a failure."""
+        """Send assignments such as ``READY=1`` to systemd; log a failure instead of raising it."""
         if sys.platform == "win32" or not self._place:
             return
         # A leading @ denotes the abstract namespace (unix(7)).
