@@ -51,7 +51,7 @@ commands:
   drive:
     send: "V {{ speed | round(2) }} {{ turn | round(2) }}"
     args: { speed: { min: -1, max: 1, default: 0 }, turn: { min: -1, max: 1, default: 0 } }
-    hold: { repeat: 50ms, lease: 1s, release: {}, watchdog: none }
+    hold: { repeat: 50ms, lease: LEASE, release: {}, watchdog: none }
 MORE
 widgets:
   level: { use: bar, bind: { value: level } }
@@ -62,9 +62,11 @@ LIFT = """\
   lift:
     send: "L {{ rate | round(2) }}"
     args: { rate: { min: -1, max: 1, default: 0 } }
-    hold: { repeat: 50ms, lease: 1s, release: {}, watchdog: none }
+    hold: { repeat: 50ms, lease: LEASE, release: {}, watchdog: none }
 """
 STOPPED = "V 0 0"
+CALM_LEASE = "1s"
+"""The longest lease: a shorter pause of a busy machine ends no gesture."""
 
 
 class Cart:
@@ -128,20 +130,23 @@ class Cart:
             writer.close()
 
 
-def cart_file(folder: Path, port: int, more: str = "") -> Path:
-    """Write the cart's profile, with `more` commands."""
+def cart_file(folder: Path, port: int, more: str = "", lease: str = CALM_LEASE) -> Path:
+    """Write the cart's profile, with `more` commands, and a lease for all held commands."""
     file = folder / "cart.yaml"
-    file.write_text(PROFILE.replace("PORT", str(port)).replace("MORE\n", more), "utf-8")
+    text = PROFILE.replace("PORT", str(port)).replace("MORE\n", more).replace("LEASE", lease)
+    file.write_text(text, "utf-8")
     return file
 
 
 @asynccontextmanager
-async def carted(folder: Path, more: str = "") -> AsyncIterator[tuple[Cart, Path]]:
+async def carted(
+    folder: Path, more: str = "", lease: str = CALM_LEASE
+) -> AsyncIterator[tuple[Cart, Path]]:
     """Run a cart; give it, and the file of its profile."""
     cart = Cart()
     listener = await asyncio.start_server(cart.serve, "127.0.0.1", 0)
     try:
-        yield cart, cart_file(folder, listener.sockets[0].getsockname()[1], more)
+        yield cart, cart_file(folder, listener.sockets[0].getsockname()[1], more, lease)
     finally:
         listener.close()
         cart.cut()

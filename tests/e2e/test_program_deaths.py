@@ -44,7 +44,7 @@ async def program_driving(
 ) -> AsyncIterator[tuple[Cart, asyncio.subprocess.Process]]:
     """Let another process drive a cart; give both."""
     async with AsyncExitStack() as stack:
-        cart, file = await stack.enter_async_context(carted(folder))
+        cart, file = await stack.enter_async_context(carted(folder, lease="250ms"))
         place = str(file)
         if opening != "here":
             place = await stack.enter_async_context(served_robot(file))
