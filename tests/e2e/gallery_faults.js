@@ -34,7 +34,7 @@
       const el = node.parentElement;
       if (!text || !el.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
       isBlank = false;
-      if (el.closest(".urc-hidden, [data-scale], option, title, desc, script, style")) continue;
+      if (el.closest(".urc-hidden, [data-scale], [data-text-cut], option, title, desc, script, style")) continue;
       for (const word of broken(node)) found.push(`${name}: ${JSON.stringify(word)} is broken`);
       const range = document.createRange();
       range.selectNodeContents(node);

@@ -140,7 +140,7 @@ async def test_lost_lines_of_the_log_are_counted_and_none_comes_twice() -> None:
         async with asyncio.timeout(20):
             while "d" not in texts:
                 texts.append((await anext(lines)).text)
-    wanted = ["a", "b", "lines of the log lost: 3", "c"]
+    wanted = ["a", "b", "log lines lost: 3", "c"]
     assert [text for text in texts if "connection" not in text] == [*wanted, "d"]
 
 

@@ -338,7 +338,7 @@ class RemoteRobot(HubReadings):
         """Add the new lines of the log, and report how many lines the server has dropped."""
         known = message.first if self._next_line is None else self._next_line
         if message.first > known:
-            self._note("warning", f"lines of the log lost: {message.first - known}")
+            self._note("warning", f"log lines lost: {message.first - known}")
         for row in message.lines[max(0, known - message.first) :]:
             self.hub.log(entry_of(row, now))
         self._next_line = max(known, message.first + len(message.lines))

@@ -89,7 +89,7 @@ class UploadTokens:
         text = new_token()
         with self._changing() as known:
             if any(token.name == name for token in known):
-                raise PackageError(f"{self.file}: a token {name!r} already exists")
+                raise PackageError(f"{self.file}: a token named {name!r} already exists")
             if len(known) >= _MOST:
                 raise PackageError(f"{self.file}: at most {_MOST} tokens can be stored")
             self._write((*known, UploadToken(name, sha256(text.encode()), may)))

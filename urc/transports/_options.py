@@ -20,7 +20,7 @@ def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
 
 
 def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
-    """Return a port from 1 to 65535.
+    """Return the port in the option `key`; it must be from 1 to 65535.
 
     Raises:
         TransportError: the option is missing or invalid.

@@ -212,7 +212,7 @@ def _load_own(
     key = _options.text(where, options, "key")
     if not certificate:
         if is_server or key:
-            raise TransportError(f"{where} needs a certificate as cert")
+            raise TransportError(f"{where} needs a certificate in the option cert")
         return
     try:
         # The library reads only from files, but a key may be a secret setting. The key is therefore
@@ -242,7 +242,9 @@ def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
         if code == _EXPIRED:
             return f"the certificate of {place} has expired"
         if code == _NOT_YET:
-            return f"the certificate of {place} is not valid yet; check both clocks"
+            return (
+                f"the certificate of {place} is not valid yet; check the clocks of both computers"
+            )
         if code in _WRONG_NAME:
             return f"the certificate of {place} is not for {name!r}; see tls.server_name"
         if code in _UNKNOWN:

@@ -160,7 +160,7 @@ async def test_robot_may_ask_for_our_certificate(authority: Authority) -> None:
     ("tls", "told"),
     [
         ({"ca": "/nowhere.pem"}, "tcp, tls: cannot use ca (no such file or directory)"),
-        ({"key": "/nowhere.key"}, "tcp, tls: needs a certificate as cert"),
+        ({"key": "/nowhere.key"}, "tcp, tls: needs a certificate in the option cert"),
         ({"verify": "no"}, "tcp, tls: needs true or false as verify, not 'no'"),
         ("yes", "tcp needs true or options as tls, not 'yes'"),
     ],

@@ -349,7 +349,7 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
         "drivers/puppet", "drivers/puppet-2", "widgets/dial",
     ]  # fmt: skip
     assert tokens.find(text[:-1]) is None
-    with pytest.raises(PackageError, match="a token 'ci' already exists"):
+    with pytest.raises(PackageError, match="a token named 'ci' already exists"):
         tokens.add("ci", ("*",))
     with pytest.raises(PackageError, match="unknown token 'x'; expected one of: ci"):
         tokens.remove("x")

@@ -191,7 +191,7 @@ def _payload(
         problems.error(
             part,
             "overlap",
-            f"the payload begins at {head}, inside the start bytes",
+            f"the payload begins at byte {head}, inside the start bytes",
             at="from",
         )
     if tail < len(frame.end):

@@ -140,7 +140,7 @@ def _axes(part: Node, kind: str, problems: Problems) -> str:
         wanted = "a number with axes needs a unit"
     else:
         fits = kind == "object" or (kind == "array" and size in (2, 3, 4))
-        wanted = "write an array of size 2 or 3 (vector) or 4 (quaternion), or an object"
+        wanted = "declare an object, or an array of size 2 or 3 (a vector) or 4 (a quaternion)"
     if not fits:
         problems.error(inner, "wrong-axes", f"axes {axes} do not fit this signal", hint=wanted)
     return axes

@@ -1,8 +1,8 @@
 """An emulated robot behind a UDP port.
 
 Clients are identified by the source address of their datagrams. If the driver listens on a port
-(``listen``), the robot sends to that port from the start. Unsolicited datagrams are sent to the
-local machine until another host sends a datagram to the robot.
+(``listen``), the robot sends to that port from the start. Unsolicited datagrams go to the local
+machine at first, then to the host that last sent data to the robot.
 """
 
 import asyncio

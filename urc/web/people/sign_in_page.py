@@ -89,7 +89,7 @@ class SignInPages:
         return [ProtectedRoute("/sign-in", self.page, ANYONE)]
 
     async def page(self, request: Request) -> Response:
-        """Show the sign-in page; the query ``to`` is the path of the next page."""
+        """Show the sign-in page; the query parameter ``to`` is the path of the next page."""
         found = self.response(request.scope, path=own_path(request.query_params.get("to", "/")))
         found.status_code = 200
         del found.headers["www-authenticate"]
