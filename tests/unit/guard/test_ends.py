@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire
+from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire, ScatteredWire
 from urc.guard import guarded_connection, messages
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed
@@ -127,21 +127,24 @@ async def test_log_says_why_a_line_could_not_be_closed(caplog: pytest.LogCapture
 
 
 class Faulty(CountedWire):
-    """A wire whose `unsent` and `offer` raise an exception."""
+    """A wire whose `unsent` and `offer`, or only one of them, raise an exception."""
 
-    def __init__(self) -> None:
+    def __init__(self, *faults: str) -> None:
         super().__init__()
         self.is_faulty = False
+        self._faults = faults or ("unsent", "offer")
 
     def unsent(self) -> int:
-        if self.is_faulty:
-            raise RuntimeError("no such socket")
+        self._fail("unsent")
         return super().unsent()
 
     def offer(self, data: bytes) -> bool:
-        if self.is_faulty:
-            raise RuntimeError("no such socket")
+        self._fail("offer")
         return super().offer(data)
+
+    def _fail(self, name: str) -> None:
+        if self.is_faulty and name in self._faults:
+            raise RuntimeError("no such socket")
 
     async def abort(self) -> None:
         self.is_faulty = False
@@ -169,3 +172,75 @@ async def test_bug_of_a_transport_at_the_release_loses_no_stop(benches: list[Ben
     await bench.clock.advance(0.2)
     assert robot.written[:2] == [b"go 1", STOP]
     assert set(robot.written[1:]) == {STOP}, "the queue took it, and it comes first again"
+
+
+async def test_stop_that_a_faulty_transport_did_not_take_is_not_reported(
+    benches: list[Bench],
+) -> None:
+    """Only the stop on the next connection counts."""
+    robot = Faulty("offer")
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    await bench.clock.advance(0.05)
+    bench.heard()
+    robot.is_faulty = True
+    bench.tell(messages.ReleaseControl("drive"))
+    assert not any(isinstance(one, messages.StopWritten) for one in bench.heard())
+    await bench.clock.advance(0.2)
+    assert robot.opens == 2
+    assert any(isinstance(one, messages.StopWritten) for one in bench.heard())
+
+
+async def test_frame_that_a_faulty_transport_did_not_take_is_sent_by_the_queue(
+    benches: list[Bench],
+) -> None:
+    robot = Faulty("offer")
+    benches.append(bench := Bench(robot))
+    await bench.open()
+    robot.is_faulty = True
+    bench.tell(messages.SendBytes("wire", 1, 1, b"poll"))
+    await bench.clock.advance(0.3)
+    assert robot.written == [b"poll"]
+    assert robot.aborts == 1
+
+
+async def test_stop_stays_in_doubt_while_a_faulty_transport_cannot_count(
+    benches: list[Bench],
+) -> None:
+    """The reset discards the stop, so it is due again."""
+    robot = Faulty("unsent")
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    await bench.clock.advance(0.05)
+    robot.is_stuck = True
+    bench.tell(messages.ReleaseControl("drive"))
+    bench.heard()
+    robot.is_faulty = True
+    await bench.clock.advance(0.2)
+    assert messages.StopDue("drive") in bench.heard()
+
+
+class Unforgetful(ScatteredWire):
+    """A wire whose `forget` raises an exception until it is reset."""
+
+    is_faulty = True
+
+    def forget(self) -> None:
+        if self.is_faulty:
+            raise RuntimeError("no such socket")
+        super().forget()
+
+    async def abort(self) -> None:
+        self.is_faulty = False
+        await super().abort()
+
+
+async def test_transport_that_cannot_forget_is_reset_for_the_stop(benches: list[Bench]) -> None:
+    robot = Unforgetful()
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    await bench.clock.advance(0.05)
+    bench.tell(messages.ReleaseControl("drive"))
+    await bench.clock.advance(0.3)
+    assert robot.opens == 2
+    assert robot.written[-1] == STOP

@@ -150,6 +150,15 @@ async def test_a_stop_that_is_due_again_needs_a_new_gesture(guard: GuardClient) 
     assert guard.is_armed("drive")
 
 
+def test_a_new_guard_numbers_ticks_from_one(guard: GuardClient) -> None:
+    """So a stop at the first tick disarms the control."""
+    guard.arm("drive", TERMS)
+    assert list(guard.briefing()) == [messages.ArmControl("wire", "drive", TERMS)]
+    guard.tick("drive", b"go")
+    guard.handle(messages.StopWritten("drive", "expired", 1), 0)
+    assert not guard.is_armed("drive")
+
+
 def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(guard: GuardClient) -> None:
     """STOP needs no gesture; on lines that may lose it, it is repeated."""
     guard.stop({"drive": b"halt", "lift": b"down"})

@@ -169,6 +169,8 @@ async def test_guard_that_must_stop_its_robot_waits_for_no_turn(
     house.guard.arm("drive", TERMS)
     assert house.started == []
     house.guard.stop({"drive": STOP})
+    await settle()
+    assert len(house.started) == 1, "the other guard still has the only turn"
     process = await house.nth(1)
     assert await process.hears(2) == [
         MAKE,

@@ -163,6 +163,15 @@ def test_stop_needs_no_lease_stops_all_and_latches() -> None:
     assert it.heard() == []
 
 
+def test_a_reset_that_does_not_know_the_newest_stop_is_refused() -> None:
+    it = Scene()
+    it.controller.stop("ann")
+    known = it.controller.lease.state.stops
+    it.controller.stop("vic")
+    assert it.drive("bob", "reset", stops=known) == "STOP was pressed again: reset it again"
+    assert it.drive("bob", "reset", stops=known + 1) == ""
+
+
 def test_a_stop_is_confirmed_when_every_line_has_taken_it() -> None:
     """And whoever looks is told of that moment."""
     it = Scene()
