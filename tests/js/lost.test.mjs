@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { lossOf, triesWords, wordsOf } from "../../urc/web/static/live/lost_card.js";
+import { lossOf, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -31,6 +31,18 @@ test("a robot is lost if no connection is good and one is lost", () => {
   const loss = lossOf(robot({ wire: "idle", eye: "lost" }), socket());
   assert.equal(loss?.of, "robot");
   assert.deepEqual(loss, { of: "robot", transport: "eye", cause: "refused", address: "ros 127.0.0.1:9 eye", detail: "x" });
+});
+
+test("a page waits for the server, and for a connection that is not open yet", () => {
+  assert.equal(waitsIn(new Store(), []), true);
+  assert.equal(waitsIn(robot({ wire: "connecting" }), []), true);
+  assert.equal(waitsIn(robot({ wire: "connecting" }), ["wire"]), false, "only commands open it");
+  assert.equal(waitsIn(robot({ wire: "live" }), []), false);
+  const quiet = robot({ wire: "connecting" });
+  const wire = quiet.links.get("wire");
+  assert.ok(wire);
+  wire.detail = "connected; nothing received yet";
+  assert.equal(waitsIn(quiet, []), false, "a robot may wait to be asked");
 });
 
 test("without the server the card speaks of the server, after the first failure", () => {

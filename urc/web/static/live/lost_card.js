@@ -16,6 +16,8 @@ const GRACE_MS = 3000;
 const SHORT_MS = 700;
 /** Reason for a socket that closed itself. */
 const SILENT = "no answer";
+/** Detail of an open connection whose robot has sent nothing yet: it may wait to be asked. */
+const NOTHING_YET = "connected; nothing received yet"; // as in urc/runtime/hub.py
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
 
@@ -167,9 +169,10 @@ export function lossOf(store, socket, onDemand = []) {
  * @param {Store} store
  * @param {readonly string[]} onDemand
  */
-function waitsIn(store, onDemand) {
+export function waitsIn(store, onDemand) {
   if (!store.isUp) return true;
-  return [...store.links.values()].some(({ transport, state }) => state === "connecting" && !onDemand.includes(transport));
+  const links = [...store.links.values()].filter(({ transport }) => !onDemand.includes(transport));
+  return links.some(({ state, detail }) => state === "connecting" && detail !== NOTHING_YET);
 }
 
 /** @param {Link} link */
