@@ -41,7 +41,7 @@ test("a page waits for the server, and for a connection that is not open yet", (
   const quiet = robot({ wire: "connecting" });
   const wire = quiet.links.get("wire");
   assert.ok(wire);
-  wire.detail = "connected; nothing received yet";
+  wire.ready = true;
   assert.equal(waitsIn(quiet, []), false, "a robot may wait to be asked");
 });
 

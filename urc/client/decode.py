@@ -88,7 +88,14 @@ def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
         state: LinkState = row.state if row.state in _STATES else "lost"  # type: ignore[assignment]
         since_s = now_s - row.since / 1000
         yield LinkStatus(
-            row.transport, state, row.address, since_s, row.detail, row.attempts, row.faults
+            transport=row.transport,
+            state=state,
+            address=row.address,
+            since_s=since_s,
+            detail=row.detail,
+            attempts=row.attempts,
+            faults=row.faults,
+            is_ready=row.ready,
         )
 
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from urc.runtime.audit_entry import AuditEntry
 
 __all__ = [
-    "NOTHING_YET",
     "STREAM_KEPT",
     "Hub",
     "LinkState",
@@ -93,8 +92,6 @@ class SampleHistory:
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 """In the state ``idle``, no connection has been requested yet. In the state ``silent``, the link is
 connected, but data is overdue. In the state ``lost``, the link is not connected."""
-NOTHING_YET: Final = "connected; nothing received yet"
-"""Detail of a connecting link whose login has ended and that awaits the robot's first data."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
@@ -116,6 +113,8 @@ class LinkStatus:
     """Number of failed attempts since the last valid frame."""
     faults: int = 0
     """Number of protocol violations since the session began."""
+    is_ready: bool = False
+    """Whether the connection is open and its login has ended, even if no data has arrived yet."""
 
     @property
     def is_opening(self) -> bool:
@@ -124,7 +123,7 @@ class LinkStatus:
         Many robots send nothing until they are asked, so a link that awaits only the first data
         counts as open.
         """
-        return self.state == "connecting" and not self.attempts and self.detail != NOTHING_YET
+        return self.state == "connecting" and not self.attempts and not self.is_ready
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,6 +68,7 @@ LINK_SCHEMA: Final = object_schema(
         "detail": _TEXT,
         "attempts": _WHOLE,
         "faults": _WHOLE,
+        "ready": {"type": "boolean"},
     },
 )
 LOG_SCHEMA: Final = MessageSchema("foxglove.Log", FOXGLOVE_LOG)
@@ -135,6 +136,7 @@ def link_message(status: LinkStatus) -> bytes:
             "detail": status.detail,
             "attempts": status.attempts,
             "faults": status.faults,
+            "ready": status.is_ready,
         }
     )
 

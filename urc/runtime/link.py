@@ -28,7 +28,7 @@ from urc.model.payload import Envelope, Payload
 from urc.protocol.events import Send, Violation
 from urc.runtime.clock import Clock, PeriodicTimer, within
 from urc.runtime.dispatcher import Dispatcher
-from urc.runtime.hub import NOTHING_YET, Hub, LinkState
+from urc.runtime.hub import Hub, LinkState
 from urc.runtime.link_report import LinkReport
 from urc.runtime.output_buffer import STUCK_S, OutputBuffer
 from urc.transports.base import (
@@ -60,6 +60,7 @@ _GRACE_S = 1.0
 """Extra time for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
 _LOGGING_IN = "connected; the on_connect steps are not complete yet"
+_NOTHING_YET = "connected; nothing received yet"
 
 log = logging.getLogger(__name__)
 
@@ -334,7 +335,7 @@ class Link:
         elif self._is_persistent and not self._expects_frames:
             self._report.show("live")
         elif self._report.state != "live":
-            self._report.show("connecting", NOTHING_YET)
+            self._report.show("connecting", _NOTHING_YET, is_ready=True)
 
     def _conclude(self, reason: str) -> None:
         """Set the state and the backoff after a connection has ended."""
@@ -469,7 +470,7 @@ class Link:
         if not self._is_ready:
             self._report.show("connecting", _LOGGING_IN)
         elif self._expects_frames or not self._is_persistent:
-            self._report.show("connecting", NOTHING_YET)
+            self._report.show("connecting", _NOTHING_YET, is_ready=True)
         else:
             self._report.attempts = 0
             self._report.show("live")

@@ -63,6 +63,7 @@ class LinkReport:
         self._clock = clock
         self._since_s = clock.now()
         self._detail = ""
+        self._is_ready = False
         self._is_changed = True
         self._limiter = LogRateLimiter(clock)
         self._telling: Timer | None = None
@@ -77,10 +78,19 @@ class LinkReport:
         """Whether the state would stay the same after another valid frame."""
         return self.state == "live" and not self.attempts and not self._detail
 
-    def show(self, state: LinkState, detail: str = "") -> None:
-        """Set the state. A new state is also logged; a new detail is only published."""
-        if state == self.state and detail == self._detail:
+    def show(self, state: LinkState, detail: str = "", *, is_ready: bool = False) -> None:
+        """Set the state. A new state is also logged; a new detail is only published.
+
+        Args:
+            state: the new state.
+            detail: reason for an abnormal state, in one line.
+            is_ready: whether the login of a connecting link has ended; a live or silent link is
+                always ready.
+        """
+        is_ready = is_ready or state in ("live", "silent")
+        if (state, detail, is_ready) == (self.state, self._detail, self._is_ready):
             return
+        self._is_ready = is_ready
         if state != self.state:
             self.state = state
             self._since_s = self._clock.now()
@@ -142,6 +152,7 @@ class LinkReport:
                 detail=self._detail,
                 attempts=self.attempts,
                 faults=self.faults,
+                is_ready=self._is_ready,
             )
         )
 

@@ -128,6 +128,8 @@ class LinkRow(msgspec.Struct, frozen=True):
     faults: int
     cause: str = ""
     """Name of the cause of a lost connection; "" for an unknown cause."""
+    ready: bool = False
+    """Whether the connection is open and its login has ended, even if no data has arrived yet."""
 
 
 class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):

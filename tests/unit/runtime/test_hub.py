@@ -9,7 +9,6 @@ import pytest
 from urc.model.values import Sample, Signal
 from urc.runtime import hub as hub_module
 from urc.runtime.hub import (
-    NOTHING_YET,
     Hub,
     LinkState,
     LinkStatus,
@@ -36,21 +35,20 @@ def hub() -> Hub:
 
 
 @pytest.mark.parametrize(
-    ("state", "detail", "attempts", "is_opening"),
+    ("state", "is_ready", "attempts", "is_opening"),
     [
-        ("connecting", "", 0, True),
-        ("connecting", "connected; the on_connect steps are not complete yet", 0, True),
-        ("connecting", NOTHING_YET, 0, False),
-        ("connecting", "refused", 1, False),
-        ("live", "", 0, False),
-        ("lost", "refused", 0, False),
+        ("connecting", False, 0, True),
+        ("connecting", True, 0, False),
+        ("connecting", False, 1, False),
+        ("live", True, 0, False),
+        ("lost", False, 0, False),
     ],
 )
 def test_a_link_opens_until_its_login_ends_or_an_attempt_fails(
-    state: LinkState, detail: str, attempts: int, is_opening: bool
+    state: LinkState, is_ready: bool, attempts: int, is_opening: bool
 ) -> None:
     """A program that drives waits for no more than that: many robots never speak first."""
-    link = LinkStatus("wire", state, "tcp x:1", 0.0, detail, attempts)
+    link = LinkStatus("wire", state, "tcp x:1", 0.0, attempts=attempts, is_ready=is_ready)
     assert link.is_opening == is_opening
 
 

@@ -51,7 +51,8 @@ async def test_a_line_that_brings_only_faults_says_which() -> None:
     """A wrong password is told in place of “nothing received yet”."""
     hub = Hub({})
     report = LinkReport("web", "http h:80", hub, FakeClock())
-    report.show("connecting", "connected; nothing received yet")
+    report.show("connecting", "connected; nothing received yet", is_ready=True)
     report.count(Violation("web", "refused", "401 Unauthorized"))
     report.publish()
     assert hub.links["web"].detail == "connected; 401 Unauthorized"
+    assert not hub.links["web"].is_opening, "nobody waits for a connection that is open"

@@ -135,7 +135,8 @@ def test_links_log_replies_and_pongs() -> None:
         "t": "links",
         "links": [
             {"transport": "wire", "state": "lost", "address": "tcp x:1", "since": 2000,
-             "detail": "connection refused", "attempts": 3, "faults": 4, "cause": "refused"}
+             "detail": "connection refused", "attempts": 3, "faults": 4, "cause": "refused",
+             "ready": False}
         ],
     }  # fmt: skip
     assert json.loads(wire.encode_log([LogEntry(1.0, "error", "wire", "no")], 7, 2.0)) == {

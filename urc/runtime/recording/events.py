@@ -61,8 +61,10 @@ def _event(
         if told["state"] not in get_args(LinkState):
             return None
         name, address, detail = topic.removeprefix(LINK), told["address"], told.get("detail", "")
-        counts = [min(int(told.get(each, 0)), _MOST) for each in ("attempts", "faults")]
-        return LinkStatus(name, told["state"], str(address), time_s, str(detail), *counts)
+        attempts, faults = (min(int(told.get(each, 0)), _MOST) for each in ("attempts", "faults"))
+        is_ready = bool(told.get("ready", told["state"] in ("live", "silent")))
+        state, numbers = told["state"], (attempts, faults, is_ready)
+        return LinkStatus(name, state, str(address), time_s, str(detail), *numbers)
     if topic.startswith(WIRE):
         data = str(told["text"]).encode() if "text" in told else bytes.fromhex(told["hex"])
         direction: Any = "sent" if told["direction"] == "sent" else "received"

@@ -203,6 +203,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
                     attempts=link.attempts,
                     faults=link.faults,
                     cause=cause_of(link.detail, link.address) if link.state == "lost" else "",
+                    ready=link.is_ready,
                 )
                 for link in links
             ]

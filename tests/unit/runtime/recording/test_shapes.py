@@ -10,7 +10,15 @@ import pytest
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.audit_entry import AuditEntry
-from urc.runtime.hub import AuditRecord, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
+from urc.runtime.hub import (
+    AuditRecord,
+    LinkState,
+    LinkStatus,
+    LogEntry,
+    MotionRecord,
+    Tapped,
+    Traffic,
+)
 from urc.runtime.recording.events import event_of
 from urc.runtime.recording.shapes import DRIVING, LOG, RecordingEncoder, channels
 from urc.testing.profile import text
@@ -99,7 +107,9 @@ EVENTS: Mapping[str, Tapped] = {
     "mapping": Sample("pose", {"x": 1, "at": (1, 2), "in": {"y": None}}, 1.5),
     "image": Sample("camera", PNG, 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
-    "line": LinkStatus("wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3),
+    "line": LinkStatus(
+        "wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3, is_ready=True
+    ),
     "note": LogEntry(1.5, "warning", "wire", "it hung up"),
     "text on the wire": Traffic(1.5, "wire", "received", b"42\n"),
     "bytes on the wire": Traffic(1.5, "udp", "sent", b"\xff\x00\x81"),
@@ -111,6 +121,17 @@ def test_what_happened_is_made_of_it_again(event: Tapped) -> None:
     topic, time_ns, data = told(event)
     assert time_ns == BORN_NS + 1_500_000_000
     assert event_of(topic, data, 1.5, SIGNALS) == event
+
+
+@pytest.mark.parametrize(("state", "is_ready"), [("live", True), ("connecting", False)])
+def test_an_older_recording_says_by_its_state_whether_a_link_is_ready(
+    state: LinkState, is_ready: bool
+) -> None:
+    """Recordings made before this field existed have no `ready`."""
+    data = json.dumps({"state": state, "address": "tcp x:1"}).encode()
+    link = event_of("/link/wire", data, 1.5, SIGNALS)
+    assert isinstance(link, LinkStatus)
+    assert link.is_ready == is_ready
 
 
 @pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)

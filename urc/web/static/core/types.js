@@ -104,6 +104,7 @@
  * @property {number} attempts
  * @property {number} faults
  * @property {string} cause name of the cause of a lost connection, see connection_causes.js
+ * @property {boolean} ready whether the connection is open and its login has ended, even if no data has arrived yet
  *
  * @typedef {object} Line
  * @property {number} age

@@ -16,8 +16,6 @@ const GRACE_MS = 3000;
 const SHORT_MS = 700;
 /** Reason for a socket that closed itself. */
 const SILENT = "no answer";
-/** Detail of an open connection whose robot has sent nothing yet: it may wait to be asked. */
-const NOTHING_YET = "connected; nothing received yet"; // as in urc/runtime/hub.py
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
 
@@ -172,7 +170,7 @@ export function lossOf(store, socket, onDemand = []) {
 export function waitsIn(store, onDemand) {
   if (!store.isUp) return true;
   const links = [...store.links.values()].filter(({ transport }) => !onDemand.includes(transport));
-  return links.some(({ state, detail }) => state === "connecting" && detail !== NOTHING_YET);
+  return links.some(({ state, ready }) => state === "connecting" && !ready);
 }
 
 /** @param {Link} link */

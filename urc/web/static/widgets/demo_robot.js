@@ -51,6 +51,7 @@ const LINE = {
   attempts: 0,
   faults: 0,
   cause: "",
+  ready: true,
 };
 /** @type {Lease} */
 const FREE = {
