@@ -253,7 +253,15 @@ class Rig:
             return 0
         return len(self.robots.since(index, began_ns))
 
-    def _judge(self, death: str, index: int, began_ns: int, until_stop: int, number: int) -> Trial:
+    def _judge(
+        self,
+        death: str,
+        index: int,
+        began_ns: int,
+        until_stop: int,
+        number: int,
+        watcher: Robots | None = None,
+    ) -> Trial:
         heard = self.robots.since(index, began_ns)
         moved = [place for place, one in enumerate(heard) if one.text != "M 0"]
         stop = next((one for one in heard[moved[-1] + 1 :] if one.text == "M 0"), None) if (
@@ -265,16 +273,22 @@ class Rig:
             return Trial(death, float("inf"), fault, 0.0, has_moved=bool(moved))
         sent_ns = int(heard[moved[-1]].text[2:]) * 1000
         fault = "" if moved[-1] < until_stop else "the robot moved again after the stop"
-        late_ms = self.late_ms(sent_ns, stop.time_ns + 20_000_000)
+        late_ms = self.late_ms(sent_ns, stop.time_ns + 20_000_000, watcher)
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
 
-    def late_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay of the processes involved in a stop, in milliseconds."""
+    def late_ms(self, from_ns: int, until_ns: int, watcher: Robots | None = None) -> float:
+        """Return the largest delay of the processes involved in a stop, in milliseconds.
+
+        Args:
+            from_ns: monotonic time at which the stop became due, in nanoseconds.
+            until_ns: monotonic time at which the robot had received the stop, in nanoseconds.
+            watcher: the processes' watcher; by default that of the present server.
+        """
         left_s = (until_ns + LOOK_NS - time.monotonic_ns()) / 1e9
         if left_s > 0:  # later, all waits until then are reported
             time.sleep(left_s)
         others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
-        kept_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
+        kept_ms = (watcher or self._watcher).waited_ms(from_ns, until_ns + LOOK_NS)
         return self.robots.latest_ms(from_ns, until_ns) + max(others, kept_ms)
 
 

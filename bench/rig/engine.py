@@ -31,14 +31,12 @@ class EngineRig(Rig):
         told = len(self.server.lines)
         self._strike(death)
         heard = {index: self._await_stop(index, began_ns) for index in pages}
-        watcher = self._watcher
+        watcher = self._watcher  # of the processes that failed: `_mend` may start others
         self._mend(death, told)
-        renewed, self._watcher = self._watcher, watcher
         trials = [
-            self._judge(death, index, began_ns, heard[index], number)
+            self._judge(death, index, began_ns, heard[index], number, watcher)
             for index, number in pages.items()
         ]
-        self._watcher = renewed
         for number in pages.values():
             self.operators.kill(number)
         return trials
