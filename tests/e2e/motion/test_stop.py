@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Page, Route
+from playwright.async_api import Page, Route, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
@@ -14,6 +14,7 @@ from tests.e2e.motion.driving import LEFT, STOP, calmly_driven, centre, fresh, m
 pytestmark = pytest.mark.anyio
 
 NOTE = "[data-stop-note]"
+RESET = "[data-verb='reset']"
 DONE = "✓ sent ✓ confirmed ✓ latched"
 
 
@@ -120,6 +121,26 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
         await until_text(driver, note, "◆ Reset STOP first.")
         await driver.mouse.up()
         assert robot.after(count) == []
+
+
+async def test_the_bar_names_the_reason_of_a_latched_stop_once(new_page: PageMaker) -> None:
+    """Controls keep the reason for screen readers only; a press on one of them points at Reset."""
+    async with calmly_driven() as (_robot, address):
+        page = await opened(new_page, address)
+        note, reset = page.locator("[data-cell='0'] .joystick-note"), page.locator(RESET)
+        await page.click(STOP)
+        await expect(page.locator("[data-latched-next]")).to_have_text("Reset to drive again")
+        await expect(page.locator("[data-who]")).to_be_empty()
+        await expect(note).to_have_text("◆ Reset STOP first.")
+        await expect(note).to_be_hidden()
+        await expect(reset).not_to_have_attribute("data-pointed", "")
+        await push(page)
+        await expect(reset).to_have_attribute("data-pointed", "")
+        await page.mouse.up()
+        await expect(reset).not_to_have_attribute("data-pointed", "")
+        await reset.click()
+        await expect(page.locator("[data-cell='0']")).not_to_have_attribute("data-stopped", "")
+        await until_text(page, "[data-who]", "Nobody drives")
 
 
 async def test_stop_goes_by_a_request_when_the_socket_is_blocked(new_page: PageMaker) -> None:

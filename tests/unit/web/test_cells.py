@@ -44,5 +44,5 @@ def test_a_button_warns_of_a_slide(level: Literal["normal", "hazardous"]) -> Non
     asked = commands[command]._replace(confirm=Confirm(level, "The drone will fall."))
     driver = state.profile.driver._replace(commands=commands | {command: asked})
     cell = widget_cell(0, state.use, state.profile._replace(driver=driver))
-    assert ("then slide to agree" in cell.html) == (level == "hazardous")
+    assert ("slide to confirm" in cell.html) == (level == "hazardous")
     assert ("data-hazardous" in cell.html) == (level == "hazardous")

@@ -56,6 +56,13 @@ def test_the_connection_comes_first_and_the_rest_last() -> None:
     }
 
 
+def test_an_address_is_in_the_connection_even_if_no_transport_uses_it() -> None:
+    """The transports of an emulated robot have other addresses."""
+    emulated = PROFILE._replace(driver=Driver({"wire": TransportSpec("wire", "tcp", {"port": 1})}))
+    names = [one.name for one in groups_of(emulated)[CONNECTION]]
+    assert names == ["host", "port", "serial"]
+
+
 def test_no_group_is_empty() -> None:
     assert groups_of(PROFILE._replace(settings={})) == {}
     only = {"topic": SETTINGS["topic"]}

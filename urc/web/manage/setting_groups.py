@@ -39,8 +39,8 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
 
-    A setting without a declared group belongs to `CONNECTION` if a transport uses it or the
-    operator must fill it in.
+    A setting without a declared group belongs to `CONNECTION` if it is an address, if a transport
+    uses it, or if the operator must fill it in. The transports of an emulated robot use no address.
     """
     used = {
         name for spec in profile.driver.transports.values() for name in _used(dict(spec.options))
@@ -50,7 +50,11 @@ def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     for setting in profile.settings.values():
         if setting.group:
             groups.setdefault(setting.group, []).append(setting)
-        elif setting.name in used or setting.is_missing(setting.default):
+        elif (
+            setting.type in ("host", "port")
+            or setting.name in used
+            or setting.is_missing(setting.default)
+        ):
             groups[CONNECTION].append(setting)
         else:
             further.append(setting)

@@ -14,6 +14,8 @@ import { said, t } from "../core/words.js";
 
 /** @type {Verb[]} */
 const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
+/** Duration of the ring around Reset after a press on a stopped control. */
+const POINTED_MS = 1500;
 /** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
 const BEFORE_DRIVING = new Set(["reset", "take", "ask", "force"]);
 
@@ -31,6 +33,8 @@ export class Controls {
     this.input = input;
     /** Whether the next Tab from a held control moves the focus to Reset. */
     this.isResetNext = false;
+    /** Timer of the ring around Reset. @type {ReturnType<typeof setTimeout> | undefined} */
+    this.pointing = undefined;
     this.who = part(el, "[data-who]");
     this.latched = part(root, "[data-latched]");
     this.latchedText = part(root, "[data-latched-text]");
@@ -49,6 +53,17 @@ export class Controls {
     this.stop.removeAttribute("data-early-stop"); // armed: early_stop.js leaves it alone
     stop.follow((state) => this.showStop(state));
     addEventListener("keydown", (event) => this.tabToReset(event));
+    root.addEventListener("pointerdown", ({ target }) => {
+      if (target instanceof Element && target.closest("[data-stopped]")) this.pointAtReset();
+    });
+  }
+
+  /** Draw a ring around Reset for a moment: a press elsewhere has no effect before it. */
+  pointAtReset() {
+    const reset = this.buttons[0]?.[1];
+    reset?.toggleAttribute("data-pointed", true);
+    clearTimeout(this.pointing);
+    this.pointing = setTimeout(() => reset?.toggleAttribute("data-pointed", false), POINTED_MS);
   }
 
   /**
@@ -132,6 +147,7 @@ export class Controls {
     if (isMine) return t("● You drive");
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });
+    if (lease.latched) return ""; // the bar says it
     return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
   }
 

@@ -172,11 +172,16 @@ export class Input {
     return isGated && !isOpen ? t("hold the dead-man control first") : "";
   }
 
+  /** Reason of a latched STOP, in words; "" while none is latched. The bar names the operator. */
+  stopReason() {
+    return this.drive.lease?.latched ? t("Reset STOP first.") : "";
+  }
+
   /** Reason why this page may not move the robot now. */
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
-    if (lease.latched) return t("Reset STOP first."); // the bar names the operator
+    if (lease.latched) return this.stopReason();
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return "";

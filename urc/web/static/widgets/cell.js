@@ -36,7 +36,7 @@
  * @property {(wish: import("../core/types.js").PendingValue) => void} drive
  * @property {() => void} wake requests an animation frame
  * @property {() => void} again requests an animation frame only for widgets
- * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "stopReason" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
  * @property {import("../alarms/demo_alarms.js").AlarmDoor} alarms
@@ -273,6 +273,7 @@ export class Cell {
     const isOutputNews = this.seenOutlets !== outlook;
     this.edition = store.edition;
     this.seenOutlets = outlook;
+    if (isOutputNews) this.markStopped(outlets);
     for (const bound of this.inputs) {
       const { input, signals, seen } = bound;
       const each = signals.map((_, place) => this.reading(bound, place, store, nowMs));
@@ -283,6 +284,17 @@ export class Cell {
       bound.alarms = alarmsOf(signals, store);
     }
     this.measured(nowMs, () => this.call(readings, changed, outlets, isOutputNews));
+  }
+
+  /**
+   * Mark a widget that waits for the reset of STOP: the bar names the reason once for all of them.
+   *
+   * @param {Record<string, Outlet>} outlets
+   */
+  markStopped(outlets) {
+    const stop = this.doors.input.stopReason();
+    const waits = stop !== "" && Object.values(outlets).some(({ reason }) => reason === stop);
+    this.el.toggleAttribute("data-stopped", waits);
   }
 
   /**
