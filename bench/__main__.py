@@ -69,7 +69,7 @@ PROGRAMS = {
 def main() -> int:
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__)
     parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(NAMES)}")
-    parser.add_argument("--full", action="store_true", help="more rounds")
+    parser.add_argument("--full", action="store_true", help="run more rounds")
     parser.add_argument(
         "--write-docs",
         action="store_true",
@@ -92,7 +92,7 @@ def main() -> int:
 
 
 def bring_programs(names: Sequence[str]) -> set[str]:
-    """Install the programs for these benchmarks; return the benchmarks that still lack one."""
+    """Install programs for these benchmarks; return the benchmarks that still lack a program."""
     wanted = {program for name in names for program in PROGRAMS.get(name, ())}
     brought = bring([need for need in NEEDS if need.name in wanted])
     if any(need.is_of_npm for need in brought.left_out):
@@ -103,9 +103,9 @@ def bring_programs(names: Sequence[str]) -> set[str]:
     missing = {need.name for need in brought.left_out}
     left_out = {name for name in names if missing.intersection(PROGRAMS.get(name, ()))}
     for name in sorted(left_out):
-        remedy = f"to install it: {brought.remedy}"
+        remedy = f"to install: {brought.remedy}"
         lacks = ", ".join(sorted(missing.intersection(PROGRAMS[name])))
-        print(f"bench: {name} skipped: no {lacks}; {remedy}", file=sys.stderr)
+        print(f"bench: {name} skipped: missing {lacks}; {remedy}", file=sys.stderr)
     return left_out
 
 

@@ -150,7 +150,7 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
     most = 1000 / LEAST_FPS
     middle = periods[len(periods) // 2]
     return Result(
-        name=f"{name}: time between frames / {LEAST_FPS} a second",
+        name=f"{name}: time between frames / 1/{LEAST_FPS} s",
         ratio=round(middle / most, 3),
         goal=1.0,
         baseline_ms=round(most, 2),

@@ -144,7 +144,7 @@ def _result(rows: Sequence[Costs], other: str) -> Result:
     ratios = [after / base for base, after in zip(theirs, ours, strict=True)]
     middle = statistics.median(theirs)
     return Result(
-        name=f"the page of a TurtleBot, processor time of the browser: {OURS} / {other}",
+        name=f"TurtleBot page, processor time of the browser: {OURS} / {other}",
         ratio=round(statistics.median(ratios), 3),
         goal=GOAL,
         baseline_ms=round(middle * 1000, 1),

@@ -1,4 +1,4 @@
-"""Frame counters that held motion over UDP shares with polls, a keepalive and another control.
+"""Frame counters shared by held motion over UDP, polls, a keepalive and another control.
 
 Gestures of 5 to 60 s run in parallel. The receiving socket checks that counters increase without
 gaps, and that the last frame is a stop. An interrupted run of the benchmark can be continued.

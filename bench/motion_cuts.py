@@ -52,7 +52,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return random cuts: each cut's length in seconds, and the fraction before the release."""
+    """Return random cuts: the length in seconds, and the share of the cut before the release."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)

@@ -76,7 +76,7 @@ def _told(trouble: str, rows: Sequence[Mapping[str, object]], wanted: int) -> Re
         print(json.dumps({"broken": f"motion_foxglove_{trouble}", **one._asdict()}), flush=True)
     worst = max(newest / HEARD_MS, stop / limit) if len(said) >= wanted and not bad else inf
     return Result(
-        name=f"motion_foxglove: {len(said)} x {trouble} of the server: worst / limit",
+        name=f"motion_foxglove: {len(said)} trials of “{trouble}” on the server: worst / limit",
         ratio=round(worst, 3),
         goal=1.0,
         baseline_ms=limit,

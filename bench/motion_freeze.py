@@ -70,7 +70,7 @@ def _told(rows: Sequence[Mapping[str, object]], wanted: int) -> Sequence[Result]
     worst = max(newest / HEARD_MS, stop / STOP_MS) if len(said) >= wanted and not bad else inf
     return [
         Result(
-            name=f"motion after {len(said)} freezes of the counterpart: worst / limit",
+            name=f"motion after {len(said)} freezes of the robot's program: worst / limit",
             ratio=round(worst, 3),
             goal=1.0,
             baseline_ms=STOP_MS,

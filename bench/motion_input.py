@@ -97,8 +97,8 @@ class Scene(NamedTuple):
     one: Opened
     robots: Robots
     witness: Robots
-    """Measures its own late wake-ups, and how long the server, guard and browser wait for a
-    processor."""
+    """The program that measures its own late wake-ups, and the waits of the server, guard and
+    browser for a processor."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

@@ -76,7 +76,7 @@ def _is_still(rig: Rig, index: int) -> bool:
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
     """Drive every robot; return the minutes of motion, the stops, and the excused stops.
 
-    A stop is excused if the machine had a delay just before the stop.
+    A stop is excused if the machine was delayed just before the stop.
     """
     until_s = time.monotonic() + seconds
     pages = {index: rig.drive(index, has_spare=has_spare) for index in rig.indexes}

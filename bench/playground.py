@@ -1,7 +1,7 @@
-"""The playground in a real Chromium, from a static web server, with no other host in reach.
+"""The playground in a real Chromium, from a static web server, without access to other hosts.
 
-The page checks every broken document of the tests. The report must be that of `urc validate`, in
-line, column, severity, code and message. Then each round starts the emulated TurtleBot in a new
+The page checks every broken document of the tests. The reports must match those of `urc validate`
+in line, column, severity, code and message. Then each round starts the emulated TurtleBot in a new
 browser profile, and drives it. A round measures the time from the click to the first camera image.
 While the stick is held, it measures the times between the dashboard's animation frames. An
 interrupted run can be continued.
@@ -40,7 +40,7 @@ BETWEEN_FRAMES_MS: Final = 20
 SAMPLE: Final = 24
 """Number of documents without `--full`."""
 AT_ONCE: Final = 8
-"""Documents that are checked before their results are stored."""
+"""Number of documents that are checked before their results are stored."""
 ROUNDS, ROUNDS_IF_FULL = 2, 7
 DRIVE_S: Final = 12.0
 HAND_HZ: Final = 50
@@ -130,12 +130,12 @@ async def _compare(browser: Browser, address: str, left: Sequence[str], kept: Ke
 
 
 def _comparable(report: Mapping[str, Any]) -> list[tuple[object, ...]]:
-    """Return the compared parts of each problem; a check without a report is unlike any other."""
+    """Return the parts of each problem to compare, or the output of a check without a report."""
     return shown_report(dict(report)) if "problems" in report else [("no report", str(report))]
 
 
 async def _command(document: str) -> dict[str, Any]:
-    """Return the JSON report of the command, in a process."""
+    """Run `urc validate` in a separate process, and return its JSON report."""
     command = (sys.executable, "-m", "urc.cli.main", "validate", "--format", "json", document)
     process = await asyncio.create_subprocess_exec(
         *command, cwd=BROKEN, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
@@ -167,7 +167,7 @@ async def _round(browser: Browser, address: str) -> dict[str, object]:
         between = sorted(await _drive(page))
     held_s = sum(between) / 1000
     if held_s < LEAST_SHARE * DRIVE_S:
-        raise SystemExit(f"bench: the robot was driven for {held_s:.1f} s of {DRIVE_S:g} s only")
+        raise SystemExit(f"bench: the robot was driven for only {held_s:.1f} s of {DRIVE_S:g} s")
     return {
         "first_picture_ms": round(first_ms),
         "p50_ms": at_share(between, 0.5),
@@ -203,7 +203,7 @@ async def _drive(page: Page) -> list[float]:
     if await place.inner_text() == before:
         raise SystemExit("bench: the robot did not move")
     if not await frame.locator(".camera[data-state=live]").count():
-        raise SystemExit("bench: the camera's images ended during the drive")
+        raise SystemExit("bench: the camera's images stopped during the drive")
     found: list[float] = await page.evaluate("() => window.benchBetween")
     return found
 
@@ -234,7 +234,7 @@ def _told(rows: Rows) -> Sequence[Result]:
     )
     return [
         Result(
-            name=f"playground: reports unlike the command's, of {len(documents)}",
+            name=f"playground: reports that differ from the command's, of {len(documents)}",
             ratio=float(len(unlike)),
             goal=0.0,
             baseline_ms=0.0,

@@ -1,4 +1,4 @@
-"""How long reading a ROS message takes, and a check of random messages against the library rosbags.
+"""Time to read a ROS message, and a comparison of random messages with the library rosbags.
 
 URC reads five fields of an Odometry message; rosbags always reads the whole message. With
 ``--full``, URC reads 10 000 random messages of each type in both byte orders. The values must equal

@@ -1,4 +1,4 @@
-"""How long commands take as complete processes, compared with common tools."""
+"""Run time of complete commands, compared with common tools."""
 
 import platform
 import shutil
@@ -19,7 +19,7 @@ SCHEMA = ROOT / "schemas" / "robot.schema.json"
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Measure how long `urc --version` and `urc validate` take."""
+    """Measure the run times of `urc --version` and `urc validate`."""
     with tempfile.TemporaryDirectory() as folder:
         return _run(write_profiles(Path(folder), PROFILES), full=full)
 

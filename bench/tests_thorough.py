@@ -41,7 +41,7 @@ def run(*, full: bool) -> Sequence[Result]:
     tell({"figure": "tests_thorough", "tests": len(rows), "failed": failed})
     return [
         Result(
-            name=f"thorough tests: failed of {len(rows)}",
+            name=f"thorough tests: failed steps of {len(rows)}",
             ratio=float(len(failed)),
             goal=0.0,
             baseline_ms=0.0,

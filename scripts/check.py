@@ -1,9 +1,9 @@
 """The command `./dev test`: run lint, type checks and all tests, then print a summary.
 
 `./dev test quick` skips the tests with real servers and browsers, and needs only Node. The quick
-steps run in parallel, before all other steps. The tests for stopping leave most processors idle, so
-they run in parallel with the other end-to-end tests. A failed step does not stop later steps. The
-exit code is 0 if all steps pass, otherwise 1. If a required program is missing, its tests are
+steps run in parallel, before all other steps. The motion tests leave most of the processors idle,
+so they run in parallel with the other end-to-end tests. A failed step does not stop later steps.
+The exit code is 0 if all steps pass, otherwise 1. If a required program is missing, its tests are
 skipped and listed; with ``CI=true``, a skipped test is a failure.
 """
 
@@ -44,7 +44,8 @@ class Step:
     command: tuple[str, ...]
     timeout_s: float = HANGS_AFTER_S
     is_yielding: bool = False
-    """Whether the step runs with a lower priority, so that it does not delay a measuring step."""
+    """Whether the step runs with a lower priority, so that it does not delay steps that
+    measure times."""
     is_measuring: bool = False
     """Whether the step measures times, so that its session has priority over all others."""
 
@@ -58,7 +59,7 @@ class Outcome:
     """Reason for the failure; "" if the step passed."""
     seconds: float
     failed_tests: tuple[str, ...] = ()
-    """A line of pytest for each failed test: its name and its error."""
+    """pytest's line for each failed test, with the test's name and error."""
 
 
 STATIC = (
@@ -70,7 +71,7 @@ STATIC = (
 )
 PYTEST = (PYTHON, "-m", "pytest")
 PYTEST_COLUMNS = "250"
-"""Width of pytest's output, in characters; pytest shortens the error of a failed test to it."""
+"""Width of pytest's output, in characters; pytest truncates the errors of failed tests to it."""
 
 
 _HALF_OF_UNIT = (
@@ -132,7 +133,7 @@ def main() -> int:
         outcomes += run([(step,) for step in quick], environment, at_once=2 * PROCESSORS)
         if not is_quick:
             names = ", ".join(step.name for steps in SLOW for step in steps)
-            print(f"\n== running, with output at the end of each: {names}", flush=True)
+            print(f"\n== running; each step's output appears when it ends: {names}", flush=True)
             outcomes += run(SLOW, environment)
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
@@ -177,7 +178,7 @@ def run(
     environment: Mapping[str, str],
     at_once: int = PROCESSORS,
 ) -> list[Outcome]:
-    """Run sequences of steps, `at_once` in parallel; kill all processes left by the steps.
+    """Run sequences of steps, at most `at_once` in parallel; kill all processes left by the steps.
 
     Each step shows its output when it ends.
     """
@@ -267,7 +268,7 @@ async def _end_group(process: asyncio.subprocess.Process) -> None:
 def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, seconds: float) -> int:
     """Print a line for each step, the skipped and failed tests, and the result.
 
-    The failed tests are at the end, because many records of a run keep only its last lines.
+    The failed tests are at the end, because many logs of a run keep only the last lines.
     Return the exit code.
     """
     print(f"\n== summary, after {seconds:.0f} s", flush=True)

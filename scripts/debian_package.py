@@ -2,7 +2,7 @@
 
 This script must run on the package's target Debian release, because the package contains a virtual
 environment of that release's Python. The script needs the packages `debhelper`, `dpkg-dev` and
-`python3-venv`, and no network.
+`python3-venv`, but no network.
 
     python -m scripts.debian_package RELEASE WHEELS
 """

@@ -28,10 +28,10 @@ _MODULES = "The wheel contains files of these packages in `urc_vendor/`, with th
 _PACKAGES = """\
 The wheel does not contain these packages. \
 An installation of URC needs them; `./dev demo` installs exactly these versions. \
-Packages marked with “extra” are needed for cameras and laser scanners of emulated robots only.
+Packages marked with “extra” are needed only for cameras and laser scanners of emulated robots.
 """
 _PLAYGROUND = """\
-The playground of the site contains these packages, besides the browser modules above. \
+The site's playground contains these packages in addition to the browser modules above. \
 Its folder `playground/licences/` contains their licence texts and notices.
 """
 

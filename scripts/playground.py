@@ -47,7 +47,7 @@ PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
 CACHE = ROOT / "build" / "playground"
-"""The compiled files of the last build, by the hash of their sources."""
+"""Folder of the last build's compiled files, whose names are hashes of the sources."""
 WHEELS = CACHE / "wheels"
 """Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800
@@ -168,7 +168,7 @@ def _kept_wheel(package: str, version: str, locked: str) -> Path | None:
 
 
 def _download(package: str, locked: str) -> Path:
-    """Download a package's browser build with a locked hash, and keep it for later builds."""
+    """Download a package's browser build with a locked hash, and cache it for later builds."""
     with tempfile.TemporaryDirectory(prefix="urc-playground-") as folder:
         wanted = Path(folder, "wanted.txt")
         wanted.write_text(locked, "utf-8")
@@ -184,10 +184,10 @@ def _download(package: str, locked: str) -> Path:
 
 
 def _compile(work: Path) -> None:
-    """Compile all Python files, or take the bytecode of a build with the same files.
+    """Compile all Python files, or reuse the bytecode of a build with the same files.
 
-    The bytecode of a file depends on the files that the same process has compiled before. Therefore
-    all files are compiled or none, so that each build has the same bytes.
+    The bytecode of a file depends on the files that the same process has compiled before. To
+    produce the same bytes in each build, the function compiles either all files or none.
     """
     sources = sorted(work.rglob("*.py"))
     total = hashlib.sha256((PYODIDE / "package.json").read_bytes())
@@ -226,7 +226,8 @@ def _run(command: list[str], fault: str) -> None:
 def _pack(folder: Path, archive: Path) -> None:
     """Write a tar archive in gzip that has the same bytes in every build.
 
-    Its name must not end with ".gz": some web servers would let the browser unpack it.
+    The archive's name must not end with ".gz", because some web servers would make the browser
+    decompress the archive.
     """
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as packed:
@@ -271,7 +272,7 @@ def _copy_tree_of(source: Path, target: Path, kinds: tuple[str, ...]) -> None:
 def write_list(folder: Path) -> str:
     """Write the SHA-256 of all files and their version into the service worker; return the version.
 
-    The service worker keeps these files for use offline.
+    The service worker caches these files for offline use.
     """
     worker = folder / "sw.js"
     files = {

@@ -1,7 +1,7 @@
-"""The licences of everything that the playground contains, in its folder `licences/`.
+"""Write the licences of all software in the playground to its folder `licences/`.
 
-The folder has the text of each licence, and a page with the names, versions and licences. The page
-of the documentation, `docs/licences.md`, has the same list.
+The folder contains the text of each licence, and a page with the names, versions and licences. The
+documentation page `docs/licences.md` contains the same list.
 """
 
 import re
@@ -93,7 +93,7 @@ def parts() -> list[Part]:
 
 
 def contents() -> list[Shipped]:
-    """Return everything that the playground contains, with the versions from the lock files."""
+    """Return all software in the playground, with the versions from the lock files."""
     return [
         Shipped("URC", __version__, "MIT", "urc.txt"),
         *(Shipped(one.name, one.version, one.licence, "pyodide.txt") for one in [_pyodide()]),
@@ -149,7 +149,7 @@ def _row(one: Shipped) -> str:
 
 def _parts_text(listed: Sequence[Part]) -> str:
     """Return the notice of each part, followed by the text of each licence once."""
-    lines = ["Software in the files of Pyodide, besides Pyodide itself:", ""]
+    lines = ["Other software in Pyodide's files:", ""]
     for one in listed:
         lines += [
             f"{one.name} {one.version}".strip(),

@@ -3,7 +3,7 @@
 Sphinx reads docs/ and writes .site/html. Warnings are errors: for example, a broken reference, a
 page without a table of contents entry, or a heading that skips a level. Sphinx needs no network.
 If npm has installed Pyodide, the site contains the playground; its first build downloads one
-package and keeps it.
+package and caches it.
 """
 
 import shutil

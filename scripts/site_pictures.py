@@ -32,7 +32,7 @@ __all__ = ["main"]
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 LOOP = DOCS / "_static" / "drive.webp"
 STILL = DOCS / "_static" / "drive-still.webp"
-"""A still picture from the film, for people who prefer no motion."""
+"""A still picture from the film, for people who prefer reduced motion."""
 STILL_QUALITY = 70
 SCREEN = (1120, 700)
 LOOP_SIZE = (960, 600)

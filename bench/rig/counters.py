@@ -178,7 +178,7 @@ async def _follow(session: Session, controller: MotionController) -> None:
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
-    """Return the first gap in the counters, or the first motion with no later stop, or ""."""
+    """Return the gesture, with the first error in its frames."""
     motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
     places: dict[int, int] = {}
     for port, number, words in heard:

@@ -180,7 +180,7 @@ class CutRig:
         Args:
             index: the robot's index in the rig.
             seconds: duration of the cut.
-            share: in every second cut, the fraction of the cut before the control's release.
+            share: share of the cut before the control's release, in every second cut.
         """
         for _ in range(ATTEMPTS - 1):
             try:

@@ -189,7 +189,8 @@ class Robots(Program):
         self.waits: dict[tuple[int, int], list[tuple[int, float]]] = {}
         """Waits for a processor: end times, and durations in ms.
 
-        The key is the process that waited, and the watched process: itself or its parent.
+        The key contains the process that waited and the watched process, which is the same process
+        or its parent.
         """
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
@@ -220,7 +221,7 @@ class Robots(Program):
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
         """Return the largest delay in the robots' process between two times, in milliseconds.
 
-        A delay counts if it overlaps the span, wherever it ends.
+        A delay counts if any part of it is within the span.
         """
         with self.changed:
             found = [late for at, late in self.late if _overlaps(at, late, from_ns, until_ns)]

@@ -39,7 +39,7 @@ class RevocationRig(Rig):
     """A rig whose pages belong to people, devices and programs."""
 
     def __init__(self, folder: Path, *, robot_count: int = 20) -> None:
-        """Start everything; `folder` also contains the server's data."""
+        """Start all programs; `folder` also contains the server's data."""
         super().__init__(folder, robot_count=robot_count)
         self._store = AccessStore(folder / "data")
         self._count = 0

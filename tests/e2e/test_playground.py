@@ -1,4 +1,4 @@
-"""The playground in a real browser, from static files under a path, with no other host in reach."""
+"""The playground in a real browser, from static files under a path, without other hosts."""
 
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator

@@ -155,7 +155,7 @@ def test_a_benchmark_without_its_program_is_left_out_by_name(
     said = capsys.readouterr()
     assert said.out == ""
     remedy = Brought(left_out=browser).remedy
-    line = f"bench: browser_peers skipped: no chromium; to install it: {remedy}"
+    line = f"bench: browser_peers skipped: missing chromium; to install: {remedy}"
     assert said.err.splitlines() == [line]
 
 
@@ -182,7 +182,7 @@ def test_a_benchmark_without_npm_is_left_out(
     monkeypatch.setattr(bench, "bring", lambda _: Brought(left_out=[missing]))
     monkeypatch.setattr(bench, "install_checkers", fail)
     assert bench.bring_programs(["browser_roslibjs"]) == {"browser_roslibjs"}
-    assert "no roslib; to install it: npm ci --ignore-scripts" in capsys.readouterr().err
+    assert "missing roslib; to install: npm ci --ignore-scripts" in capsys.readouterr().err
 
 
 def browsers(*, is_whole_there: bool) -> list[Need]:

@@ -33,14 +33,14 @@ def test_nothing_is_missing_when_all_is_filled_in(root: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "before", "after", "said"),
     [
-        ("pyproject.toml", "Issues", "Homepage", "has no address for Issues"),
+        ("pyproject.toml", "Issues", "Homepage", "has no URL for Issues"),
         ("packaging/debian/control", "urc.example", "urc.invalid", "ann@urc.invalid is not a real"),
         ("CHANGELOG.md", " - 2026-11-29", "", "the heading of 0.1.0 has no date"),
         (
             "docs/install/index.md",
             "# Install\n",
             "URC is not yet on the Python package index.\n",
-            "says that URC is not yet on the Python package index",
+            "states that URC is not yet on the Python package index",
         ),
     ],
 )
