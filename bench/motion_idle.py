@@ -1,9 +1,9 @@
 """Data sent to robots at rest after a stop, on every kind of transport in parallel.
 
 Each robot is driven once and released. The robot's page stays in control and continues to receive
-heartbeats. After the stop and its repetitions, no byte may arrive, because zero commands would
-disturb another controller of the robot. Real programs communicate over a relay between two network
-namespaces. Without root and /dev/net/tun, the benchmark is skipped with a message.
+heartbeats. After the stop and its repetitions, no byte may arrive, because zero-speed commands
+would disturb another controller of the robot. Real programs communicate over a relay between two
+network namespaces. Without root and /dev/net/tun, the benchmark is skipped with a message.
 """
 
 import json

@@ -119,7 +119,7 @@ def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
         print(f"{path}: {rule}: {counted[path, rule]} hits, {allowed[path, rule]} in the baseline")
     fewer = (allowed - counted).total()
     remedy = "; python -m scripts.prose --update lowers the baseline" if fewer and not over else ""
-    print(f"prose: {len(found)} hits, {fewer} fewer than the baseline allows in some files{remedy}")
+    print(f"prose: {len(found)} hits; the baseline allows {fewer} more in some files{remedy}")
     return 1 if over else 0
 
 
