@@ -92,7 +92,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 async def _round(ours: str, pages: str, robot: int, look_s: float) -> Costs:
-    """Return the cost of each of the three pages."""
+    """Return the processor time and the image rate of each of the three pages."""
     async with running_browser(is_whole=True) as browser:
         async with opened(browser, ours, script=COUNT) as one:
             await one.page.wait_for_function(LIVE, arg=SHOWS)

@@ -60,7 +60,7 @@ class Naive:
         self.app: ASGIApp = Starlette(routes=[WebSocketRoute("/ws", self.page)])
 
     async def page(self, line: WebSocket) -> None:
-        """Send one page's queue."""
+        """Send the values in the page's queue."""
         queue: asyncio.Queue[str] = asyncio.Queue()
         await line.accept()
         self.queues.add(queue)
@@ -103,7 +103,7 @@ def run(*, full: bool) -> Sequence[Result]:
     found = [
         _result("frames that a healthy page missed", missed, MISSED_GOAL, ours.ticks, ours.healthy),
         _result(
-            "age at the slow page / unbounded queue",
+            "age of the slow page's data / age with an unbounded queue",
             ours.age_ms / base.age_ms,
             AGE_GOAL,
             base.age_ms,

@@ -1,9 +1,9 @@
 """Time from losing an operator until the robot receives the stop, by kind of loss.
 
 Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
-time is measured from the last effective tick to the first byte of the stop. With root, a relay
-between network namespaces adds two link failures. Without root, these failures are skipped with a
-message.
+time is measured from the last effective tick to the first byte of the stop. With root access, a
+relay between network namespaces adds two kinds of link failure. Without root access, both are
+skipped with a message.
 """
 
 import json

@@ -91,7 +91,7 @@ def _fits(window: Window) -> None:
     size = window.resize(*NARROW)
     until(lambda: window.evaluate("innerWidth") == size[0], f"{size[0]} px wide")
     content, shown = window.evaluate(WIDTHS)
-    assert content <= shown, f"{content} px wide on {shown} px"
+    assert content <= shown, f"{content} px wide on a screen of {shown} px"
     window.resize(*DESKTOP)
 
 

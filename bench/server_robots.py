@@ -2,9 +2,9 @@
 
 Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
 receives each change. Robots and pages run in two other processes, which only send or count bytes.
-Additional rows show how the costs grow with the number of robots, signals and pages. They also show
-the share of lines that reach no page. Drivable robots have guards in separate processes, which are
-measured separately.
+Additional rows show how the costs grow with the number of robots, signals and pages. These rows
+also show the share of lines that reach no page. Drivable robots have guards in separate processes,
+which are measured separately.
 """
 
 import json
@@ -184,7 +184,7 @@ def _middle(rows: Sequence[Row]) -> Row:
 def _result(name: str, column: str, goal: float, rows: Sequence[Row]) -> Result:
     shares = [row[column] / goal for row in rows]
     return Result(
-        name=f"100 robots × 20 signals × 20 a second, a page each: {name}",
+        name=f"100 robots × 20 signals × 20 a second, one page each: {name}",
         ratio=round(median(shares), 3),
         goal=1.0,
         baseline_ms=0.0,

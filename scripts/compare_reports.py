@@ -177,11 +177,11 @@ class Comparison:
                 file.flush()
                 old = without_title(migrate(file.name).content.decode())
             new = without_title(after.get(name, ""))
-            self.counts["resolved robots"] += 1
+            self.counts["resolved profiles"] += 1
             if old == new:
-                self.counts["resolved robots equal"] += 1
+                self.counts["resolved profiles equal"] += 1
                 continue
-            self.differs(f"{name}: resolved profile differs", "resolved robots that differ")
+            self.differs(f"{name}: resolved profile differs", "resolved profiles that differ")
             for one, other in zip(old.splitlines(), new.splitlines(), strict=False):
                 if one != other:
                     print(f"  - {one}\n  + {other}")

@@ -309,7 +309,7 @@ NEEDS = (
 
 @dataclass(slots=True)
 class Brought:
-    """Environment variables for the tests after the installation, and the missing programs."""
+    """Result of an installation: environment variables for the tests, and the missing programs."""
 
     environment: dict[str, str] = field(default_factory=dict)
     left_out: list[Need] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Extract the prose from the tree: documentation, docstrings, and strings for people.
+"""Extract the prose from the tree: documentation, docstrings, and user-visible strings.
 
 `scripts/sentences.py` and `scripts/prose.py` use this module, so they share one definition of
 prose. Generated pages (docs/reference, docs/robots, docs/gallery), tests, code blocks and licences

@@ -1,4 +1,4 @@
-"""Check the English in docs, docstrings and strings for people.
+"""Check the English in docs, docstrings and user-visible strings.
 
     python -m scripts.prose                 fail where a file has more hits than its baseline
     python -m scripts.prose docs urc/motion list every hit below these paths

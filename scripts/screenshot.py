@@ -32,7 +32,7 @@ def main() -> int:
         demo.kill()
     size = PICTURE.stat().st_size
     if size > MAX_BYTES:
-        print(f"{PICTURE.name} has {size} bytes; {MAX_BYTES} are allowed", file=sys.stderr)
+        print(f"{PICTURE.name} has {size} bytes; at most {MAX_BYTES} are allowed", file=sys.stderr)
         return 1
     return 0
 

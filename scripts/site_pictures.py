@@ -42,7 +42,7 @@ LEAST_WAY_M = 0.5
 FRAME_S = 0.12
 """Shortest time between two frames of the film, in seconds."""
 STEERING = ((0.0, -0.9, 2.5), (-0.6, -0.7, 1.8), (0.7, -0.6, 2.2), (0.0, -0.8, 1.2))
-"""Positions of the knob, as fractions of the radius to the right and down, with durations in s."""
+"""Positions of the knob (right and down, as fractions of the radius), with durations in seconds."""
 TABLET = (1024, 640)
 COLOURS = 128
 LIVE = "() => document.querySelector('[data-badge]')?.dataset.state === 'good'"
@@ -166,7 +166,7 @@ async def centre(pad: Locator) -> tuple[float, float, float]:
 
 
 def write_loop(frames: list[tuple[float, bytes]]) -> None:
-    """Write the film as an animated WebP in real time."""
+    """Write the film as an animated WebP that plays at its original speed."""
     taken = (Image.open(io.BytesIO(data)).convert("RGB") for _, data in frames)
     pictures = [one.resize(LOOP_SIZE, Image.Resampling.LANCZOS) for one in taken]
     times = [when for when, _ in frames]

@@ -215,7 +215,7 @@ def imported(module: Module, known: set[str]) -> set[str]:
 def every_statement(tree: ast.Module) -> Iterator[ast.stmt]:
     """Yield each statement of a module, including those in classes, functions and blocks.
 
-    Unlike `ast.walk`, it skips expressions, which are nine tenths of a tree.
+    Unlike `ast.walk`, this function skips expressions, which make up nine tenths of a tree.
     """
     waiting: deque[ast.AST] = deque([tree])
     while waiting:

@@ -38,7 +38,7 @@ HOLE = re.compile(r"\{[a-z_]+\}")
 
 
 def sources() -> Iterator[tuple[str, Path]]:
-    """Yield Babel's extraction method and the path of every file with text for people."""
+    """Yield Babel's extraction method and the path of every file with user-visible text."""
     for pattern, method in (
         ("templates/*.j2", "jinja2"),
         ("widgets/*/*.j2", "jinja2"),

@@ -34,7 +34,7 @@ def page(_: ServerConnection, request: Request) -> Response | None:
 
 
 async def stay(line: ServerConnection) -> None:
-    """Keep a page's WebSocket open until it closes."""
+    """Keep a page's WebSocket open until the page closes it."""
     await line.wait_closed()
 
 
