@@ -2,8 +2,8 @@
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
 back. URC uses the same kind of declaration as an ordinary profile. The hand-written code is typical
-of a careful author who does not use URC. It uses one precompiled `struct.Struct` and the standard
-library's CRC, which is written in C.
+of a careful author who does not use URC. This code uses one precompiled `struct.Struct` and the
+standard library's CRC, which is written in C.
 """
 
 import platform

@@ -1,4 +1,4 @@
-"""Rows of a long run, stored so that an interrupted run can continue.
+"""Result rows of a long benchmark, stored so that an interrupted run can continue.
 
 Each benchmark stores rows in one file in the user's cache. A complete run deletes this file. Rows
 from other versions of the code are ignored.

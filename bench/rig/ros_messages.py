@@ -1,8 +1,8 @@
 """Random ROS messages and their bytes, made with the library rosbags.
 
-rosbags, by Ternaris, is independent of URC. It includes a ROS 2 type store, and serializes to CDR
-and to the ROS 1 format. The values of a message are compared as plain data, as URC reads them.
-Non-finite numbers become None, and arrays of ``uint8`` become bytes.
+rosbags, by Ternaris, is independent of URC. The library includes a ROS 2 type store, and serializes
+to CDR and to the ROS 1 format. The values of a message are compared as plain data, as URC reads
+them. Non-finite numbers become None, and arrays of ``uint8`` become bytes.
 """
 
 import math

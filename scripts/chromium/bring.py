@@ -1,8 +1,8 @@
 """Install Chromium from npm, for Linux x64 machines without a browser and without root access.
 
-The npm package is intended for cloud functions. It contains brotli archives of the browser, its
-libraries, fonts and a software renderer. The archives are unpacked once into the user's cache,
-together with a launcher that sets the library and font paths.
+The npm package is intended for cloud functions. The package contains brotli archives of the
+browser, its libraries, fonts and a software renderer. The archives are unpacked once into the
+user's cache, together with a launcher that sets the library and font paths.
 """
 
 import hashlib
