@@ -88,8 +88,8 @@ export default {
         [t("late"), late === null ? DASH : `${Math.round(100 * late)} %`],
         [t("messages"), Number.isFinite(rate.messages) ? `${Math.round(rate.messages)} /s` : DASH],
         [t("data"), Number.isFinite(rate.bytes) ? `${(rate.bytes / 1000).toFixed(1)} kB/s` : DASH],
-        [t("reconnects tried"), String(failures)],
-        [t("clock beside URC's"), skewMs === null ? DASH : `${skewMs > 0 ? "+" : ""}${(skewMs / 1000).toFixed(1)} s`],
+        [t("failed attempts"), String(failures)],
+        [t("clock offset to URC"), skewMs === null ? DASH : `${skewMs > 0 ? "+" : ""}${(skewMs / 1000).toFixed(1)} s`],
         ...links.map((link) => /** @type {[string, string]} */ ([link.transport, lineOf(link)])),
       ];
       if (place.childElementCount !== 2 * rows.length) {

@@ -146,7 +146,7 @@ export class Choice {
       return [question, t("{distance} away", { distance: way })].join(" · ");
     }
     const names = { count: places.length, length: distanceText(lengthOf(places, isLocal)) };
-    if (mode === "sure") return t("Send the robot to {count} places in order, {length}?", names);
+    if (mode === "sure") return t("Send the robot to {count} places in order ({length})?", names);
     if (mode !== "way") return "";
     return places.length === 0 ? t("Tap the places in order.") : t("{count} places, {length}", names);
   }

@@ -142,7 +142,7 @@ class Chart {
     add("+", this.t("Zoom in"), () => this.map.zoomIn());
     add("−", this.t("Zoom out"), () => this.map.zoomOut());
     this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
-    if (hasWay) this.wayButton = add("⤳", this.t("Draw a way"), () => this.toggleWay());
+    if (hasWay) this.wayButton = add("⤳", this.t("Draw a route"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
     this.follow(true);
   }

@@ -72,7 +72,7 @@ export class RobotSequence extends Run {
 
   /** @param {Readonly<Record<string, Outlet>>} outputs */
   take(outputs) {
-    this.reason = outputs["run"]?.reason ?? this.ctx.t("no command is bound to it");
+    this.reason = outputs["run"]?.reason ?? this.ctx.t("no command is bound here");
   }
 
   async start() {
@@ -137,7 +137,7 @@ export class OwnList extends Run {
   /** @param {Readonly<Record<string, Outlet>>} outputs */
   take(outputs) {
     const reasons = this.outputs.map((name) => outputs[name]?.reason ?? "");
-    this.reason = this.outputs.length === 0 ? this.ctx.t("no command is bound to it") : reasons.find(Boolean) ?? "";
+    this.reason = this.outputs.length === 0 ? this.ctx.t("no command is bound here") : reasons.find(Boolean) ?? "";
   }
 
   async start() {

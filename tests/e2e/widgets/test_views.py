@@ -260,7 +260,7 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
         assert abs(float(arguments["latitude"]) - 46.52) < 1e-3  # type: ignore[arg-type]
         assert abs(float(arguments["longitude"]) - 6.57) < 1e-3  # type: ignore[arg-type]
         await until_text(page, ".map-words", "✓ sent")
-        await page.get_by_role("button", name="Draw a way").click()
+        await page.get_by_role("button", name="Draw a route").click()
         x, y = await centre(page, ".map-area")
         for right in (-80, 80):
             await page.mouse.click(x + right, y)

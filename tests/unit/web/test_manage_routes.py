@@ -423,4 +423,4 @@ def test_what_may_stay_empty_does_not_keep_anybody_from_connecting(tmp_path: Pat
     with served(tmp_path, dashboard_profile(settings=settings)) as client:
         assert "Not set yet" not in client.get("/").text
         assert client.get("/robots/puppet/").status_code == 200
-        assert "May stay empty." in client.get("/robots/puppet/settings").text
+        assert "Optional." in client.get("/robots/puppet/settings").text

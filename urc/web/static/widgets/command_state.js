@@ -63,7 +63,7 @@ export class CommandState {
 
   /** @param {Outlet | undefined} outlet the argument of `update` */
   take(outlet) {
-    this.reason = outlet ? outlet.reason : this.t("no command is bound to it");
+    this.reason = outlet ? outlet.reason : this.t("no command is bound here");
     this.isAnswered = outlet?.isAnswered ?? false;
     if (this.reason) this.next = null; // a blocked command is never sent later
     this.show();

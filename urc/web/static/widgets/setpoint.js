@@ -161,8 +161,8 @@ export class Setpoint {
   note() {
     const { wish, giver, ctx } = this;
     const wished = wish.value === null ? "" : this.text(Number(wish.value));
-    const waiting = this.wishState === "waiting" && !this.isOptimistic ? ctx.t("asked for {wish}", { wish: wished }) : "";
-    const missed = wish.isMissed ? ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
+    const waiting = this.wishState === "waiting" && !this.isOptimistic ? ctx.t("requested {wish}", { wish: wished }) : "";
+    const missed = wish.isMissed ? ctx.t("≠ requested {wish}, robot reports otherwise", { wish: wished }) : "";
     const outcome = this.state && giver.phase === "done" ? "" : giver.outcome;
     const hindrance = giver.reason ? `◆ ${giver.reason}` : "";
     const state = this.state ? noteOf(this.state, ctx.t) : "";
