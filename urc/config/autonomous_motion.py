@@ -74,5 +74,5 @@ def refuse_moving(
             part,
             "wrong-command",
             f"{command.name!r} starts autonomous motion, so it must not run automatically",
-            hint="run a command without motion; only an operator may start autonomous motion",
+            hint="run a command that starts no motion; only operators may start autonomous motion",
         )

@@ -79,5 +79,5 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
     }
     widgets = {use.widget: known.get(use.widget) for use in uses.values() if use is not None}
     if not widgets:
-        return InterfaceFit(None, fault="this robot fills no slot of the interface")
+        return InterfaceFit(None, fault="this robot has no widget for any slot of the interface")
     return InterfaceFit(interface, {name: one for name, one in widgets.items() if one is not None})

@@ -89,7 +89,7 @@ def element_of(part: Node, kind: str, problems: Problems) -> str:
         return part.text("items", "number")
     for key in ("items", "size"):
         if key in part.data:
-            text = f"'{key}' has no effect for {kind}"
+            text = f"'{key}' has no effect for type {kind}"
             hint = "write type: array"
             problems.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     return kind
@@ -119,7 +119,7 @@ def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None
                 problems.error(
                     part,
                     "misplaced-key",
-                    f"'{key}' has no effect for {kind}",
+                    f"'{key}' has no effect for type {kind}",
                     at=key,
                     key=True,
                     hint="a range needs the type integer or number",

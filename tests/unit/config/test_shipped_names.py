@@ -109,7 +109,7 @@ def test_a_driver_that_nothing_names_is_asked_for(folder: Folder) -> None:
         (
             "driver: { use: nothing-like-it }\n",
             "no driver named 'nothing-like-it' ships with URC",
-            "the path of a document must end with .yaml; drivers that ship: absolem, ",
+            "the path of a document must end with .yaml; shipped drivers: absolem, ",
         ),
         (
             "interfaces: { default: ros-bas }\n" + WIRE,

@@ -148,7 +148,7 @@ class Expander:
             self.problems.error(
                 part,
                 "incompatible-values",
-                f"the values of {unlike[0]!r} are of different kinds",
+                f"the values of {unlike[0]!r} have different types or keys",
                 at=unlike[0],
                 hint="use only plain values, or only mappings with the same keys",
             )
@@ -194,12 +194,10 @@ class _First:
         self._expander.problems.error(
             Node(self._expander.document, path, None),
             "unknown-variable",
-            f"{name!r} has no {word!r}"
-            if word
-            else f"{name!r} has several values; name one of them",
+            f"{name!r} has no {word!r}" if word else f"{name!r} is a mapping; name one of its keys",
             offset=offset,
             length=len(name) + len(word) + bool(word),
-            hint=did_you_mean(word, first, "it has") if is_mapping else plain,
+            hint=did_you_mean(word, first, "keys") if is_mapping else plain,
         )
 
     def unquoted(self, path: Path, text: str) -> None:
@@ -286,7 +284,7 @@ def expand(document: Document, problems: Problems) -> Document:
             problems.error(
                 Node(document, expander.path, None),
                 "too-many-nodes",
-                f"more than {_NODES_MOST} keys and values after expansion of every 'each'",
+                f"expanding every 'each' gives more than {_NODES_MOST} keys and values",
                 at="each",
             )
         else:

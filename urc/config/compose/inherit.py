@@ -110,7 +110,7 @@ class _Composer:
             return None
         if count_nodes(whole.value) > _NODES_MOST:
             self._problems.error(
-                root, "too-many-nodes", f"more than {_NODES_MOST} keys and values after the merge"
+                root, "too-many-nodes", f"merging gives more than {_NODES_MOST} keys and values"
             )
             return None
         mark = whole.mark.copy()
@@ -178,7 +178,7 @@ class _Composer:
             found = value.problem(
                 (),
                 "include-clash",
-                f"{place} sets this key to another value",
+                f"{place} sets this key to a different value",
                 hint="set the key in the document that includes both",
             )
             self._problems.problems.append(found._replace(path=".".join(map(str, path))))

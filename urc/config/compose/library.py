@@ -81,7 +81,7 @@ class Library:
 
     def _report_name(self, reference: Node, kinds: tuple[str, ...]) -> None:
         known = [name for kind in kinds for name in _names(kind)]
-        hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
+        hint = did_you_mean(reference.data, known, f"shipped {kinds[0]}s")
         if not hint.startswith("did"):
             hint = f"the path of a document must end with .yaml; {hint}"
         self.problems.error(

@@ -107,7 +107,7 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
 
 
 def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
-    """Convert a driver's name to a mapping if `over` adds params or overrides."""
+    """Convert a driver's name to a mapping if `over` adds `params` or `overrides`."""
     if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
         return base
     mark = base.mark.copy({"use": _pinned(base)})

@@ -52,7 +52,7 @@ def fill_params(
             problems.warn(
                 inner,
                 "unused-param",
-                f"nothing uses the param {name!r}",
+                f"nothing uses the parameter {name!r}",
                 key=True,
                 hint=f"write {{params.{name}}} in place of the value",
             )
@@ -85,7 +85,7 @@ def _values(
                 problems.error(
                     use,
                     "missing-param",
-                    f"this driver needs the param {name!r}",
+                    f"this driver needs the parameter {name!r}",
                     key=True,
                     hint=f"write driver: {{ use: …, params: {{ {name}: … }} }}",
                 )
@@ -96,9 +96,9 @@ def _report_unknown(gift: Node, known: Mapping[str, Any] | tuple[()], problems: 
     problems.error(
         gift,
         "unknown-param",
-        f"the driver has no param {gift.name!r}",
+        f"the driver has no parameter {gift.name!r}",
         key=True,
-        hint=did_you_mean(gift.name, known, "params"),
+        hint=did_you_mean(gift.name, known, "parameters"),
     )
 
 
@@ -165,7 +165,7 @@ class _ParameterFiller:
                     self._problems.error(
                         Node(document, (key,), item),
                         "too-large",
-                        "the text is too long after its params are filled in",
+                        "the text is too long after its parameters are filled in",
                         key=True,
                     )
             value[key], marks[key] = tree.value, tree.mark
@@ -184,10 +184,10 @@ class _ParameterFiller:
         self._problems.error(
             Node(self._document, path, None),
             "unknown-param",
-            f"there is no param {word!r}"
+            f"there is no parameter {word!r}"
             if word
-            else "'params' contains all params; name one of them",
-            hint=did_you_mean(word, self._values, "params"),
+            else "'params' contains all parameters; name one of them",
+            hint=did_you_mean(word, self._values, "parameters"),
             **place,
         )
 

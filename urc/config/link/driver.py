@@ -94,7 +94,7 @@ class _Linker:
             self.problems.error(
                 part,
                 "missing-key",
-                f"'{key}' is missing, but the driver has {len(names)} transports",
+                f"'{key}' is required, because the driver has {len(names)} transports",
                 key=True,
                 hint=did_you_mean("", names, "transports"),
             )
@@ -216,7 +216,7 @@ class _Linker:
         if name in self.settings:
             return name, f"write settings.{name}"
         if name == "params":
-            return name, "params are filled in earlier: write {params.NAME} in single braces"
+            return name, "parameters need single braces: {params.NAME}"
         return name, did_you_mean(name, allowed, "names")
 
     def _unknown(

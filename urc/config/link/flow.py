@@ -220,7 +220,7 @@ def _link_counting(linker: Linker, part: Node, transport: str) -> None:
             part,
             "wrong-command",
             f"{command.name!r} {what}, so it cannot keep {transport!r} alive",
-            hint="name commands of this transport",
+            hint="use a command that is sent over this transport",
         )
 
 

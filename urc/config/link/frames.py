@@ -51,7 +51,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
             problems.error(
                 inner,
                 "contains-delimiter",
-                f"{_what(send)} {_shown(mark)} inside, which the framing adds to each frame:"
+                f"{_what(send)} {_shown(mark)} inside, but the framing already adds it:"
                 " the robot would receive two frames",
                 hint="remove this part: the framing adds the start and end of each frame",
             )

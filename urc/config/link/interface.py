@@ -169,7 +169,7 @@ def _bindings(
                 inner,
                 "wrong-type",
                 f"{key!r} is an output and needs the name of a command",
-                hint="only an input for several signals takes a list",
+                hint="only an input for several signals accepts a list",
             )
         else:
             port = widget.outputs[key]
@@ -189,7 +189,7 @@ def _bind_input(
             part,
             "wrong-type",
             f"{port.name!r} is an input and needs the name of a signal",
-            hint="only outputs take a command with its arguments",
+            hint="only outputs accept a command with arguments",
         )
     elif isinstance(part.data, list) and not port.is_multiple:
         problems.error(

@@ -64,7 +64,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
             problems.error(
                 inner,
                 "unknown-argument",
-                f"the value of output {port.name!r} comes first, then the argument of the command",
+                f"write the value of output {port.name!r} first, then the command's argument",
                 key=True,
                 hint=f"swap the two names: {inner.data}: {source}",
             )
@@ -72,16 +72,16 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
             problems.error(
                 inner,
                 "unknown-argument",
-                f"output {port.name!r} of widget {widget.name!r} gives no value {source!r}",
+                f"output {port.name!r} of widget {widget.name!r} has no value {source!r}",
                 key=True,
-                hint=f"it gives: {listed(port.arguments)}" if port.arguments else "",
+                hint=f"values: {listed(port.arguments)}" if port.arguments else "",
             )
         elif inner.data in names:
             problems.error(
                 inner,
                 "given-twice",
-                f"{source!r} goes to {inner.data!r}, which already takes {names[inner.data]!r}",
-                hint="each argument takes one value",
+                f"{source!r} sets {inner.data!r}, but {names[inner.data]!r} already sets it",
+                hint="each argument accepts one value",
             )
         names[inner.data] = source
     fixed = part.named("set")
@@ -92,7 +92,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
                 "given-twice",
                 f"{name!r} is set here, but {names[name]!r} of {port.name!r} also sets it",
                 key=True,
-                hint="each argument takes one value",
+                hint="each argument accepts one value",
             )
     return OutputBinding(names, {name: inner.data for name, inner in fixed.items()})
 
@@ -198,7 +198,7 @@ def _remedy(
 def _giver(argument: Argument) -> str:
     """Return a hint with the names of widgets that provide a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
-    return f"use a widget that gives a value for {argument.name}: {widgets}" if widgets else ""
+    return f"use a widget that provides a value for '{argument.name}': {widgets}" if widgets else ""
 
 
 def _check_nothing(
@@ -210,7 +210,7 @@ def _check_nothing(
     problems: Problems,
 ) -> None:
     """Report an output if none of its values has an effect."""
-    what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
+    what = f"{port.name!r} of widget {widget.name!r} provides {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:
         where = f"but command {command.name!r} takes {listed(command.arguments)}"
@@ -247,7 +247,7 @@ def _misfit(port: WidgetPort, argument: Argument) -> Misfit | None:
         text = f"the value has type {given}, but the argument has type {argument.type}"
         return Misfit("wrong-type", text)
     if port.unit and are_apart(port.unit, argument.unit):
-        text = f"unit {port.unit!r} is given, but the argument is in {argument.unit!r}"
+        text = f"the value is in {port.unit!r}, but the argument is in {argument.unit!r}"
         return Misfit("wrong-unit", text)
     return None
 

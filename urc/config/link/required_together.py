@@ -75,7 +75,7 @@ def _check_groups(
                 "half-bound",
                 f"{mine[0]!r} of widget {widget.name!r} needs {listed(missing)}",
                 key=True,
-                hint=f"bind {listed(missing)} too, or remove {mine[0]}",
+                hint=f"bind {listed(missing)} too, or remove '{mine[0]}'",
             )
 
 
@@ -95,7 +95,7 @@ def _check_instead(
                 "unused-binding",
                 f"{inner.name!r} of widget {widget.name!r} has no effect with {port.name!r}",
                 key=True,
-                hint=f"remove {inner.name}, or do not bind {port.name}",
+                hint=f"remove '{inner.name}', or do not bind '{port.name}'",
             )
 
 

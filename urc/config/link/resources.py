@@ -33,7 +33,7 @@ PICTURE_TYPES: Final = (".svg", ".png", ".jpg", ".jpeg", ".webp", ".gif")
 """File types of a robot's picture, in order of preference."""
 
 MOST_PICTURE_BYTES: Final = 4 << 20
-"""Maximum size of a robot's picture, in bytes; a photo from a phone fits."""
+"""Maximum size of a robot's picture, in bytes: large enough for a photo from a phone."""
 
 MOST_BYTES: Final = 64 << 20
 """Maximum size of one file, in bytes."""
@@ -80,7 +80,7 @@ def find_picture(document: str) -> str:
     """Return the path of the robot's picture; "" without a picture.
 
     The picture has the document's name, and is in the document's folder or in ``pictures`` there.
-    A missing picture is no problem, so a document can be copied without its picture.
+    A missing picture is not an error, so a document can be copied without its picture.
     """
     place = FilePath(document).absolute()
     for folder in (place.parent, place.parent / "pictures"):

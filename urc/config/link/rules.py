@@ -64,7 +64,7 @@ def _value(part: Node, signal: Signal, problems: Problems) -> Reading:
         problems.error(part, "wrong-type", text)
         return None
     if (signal.type == "array") != isinstance(data, list):
-        wanted = f"a list of {signal.items}s" if signal.type == "array" else "one value"
+        wanted = f"a list of {signal.items}s" if signal.type == "array" else "a single value"
         text = f"signal {signal.name!r} is of type {signal.type}: expected {wanted}"
         problems.error(part, "wrong-type", text)
         return None

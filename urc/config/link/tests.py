@@ -146,7 +146,7 @@ def _state(name: str, part: Node, driver: Driver, problems: Problems) -> Expecte
     alarm = part.text("alarm")
     if signal is not None and alarm not in ("", "none") and signal.limits.is_empty:
         text = f"signal {name!r} has no limits"
-        problems.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
+        problems.error(part, "misplaced-key", text, at="alarm", hint="give the signal 'limits'")
     if "value" in part.data and part.text("age") == "never":
         text = "a signal that was never set has no value"
         problems.error(part, "misplaced-key", text, at="value", key=True)
@@ -181,7 +181,7 @@ def _expected(
     if part.data is None or is_part:
         return None
     if (signal.type == "array") != isinstance(part.data, list):
-        wanted = f"a list of {signal.items}s" if signal.type == "array" else "no list"
+        wanted = f"a list of {signal.items}s" if signal.type == "array" else "a single value"
         text = f"signal {name!r} is of type {signal.type}: expected {wanted}"
         problems.error(part, "wrong-type", text)
         return None
@@ -268,7 +268,9 @@ def _check_run(
 ) -> None:
     if run is None:
         if "args" in part.data:
-            problems.error(part, "misplaced-key", "'args' without 'run'", at="args", key=True)
+            problems.error(
+                part, "misplaced-key", "'args' has no effect without 'run'", at="args", key=True
+            )
         return
     command = driver.commands.get(run)
     if command is None:

@@ -91,5 +91,5 @@ def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes 
     try:
         return text.encode(encoding)
     except UnicodeEncodeError:
-        problems.error(part, "bad-delimiter", f"{text!r} does not exist in the encoding {encoding}")
+        problems.error(part, "bad-delimiter", f"{text!r} cannot be encoded as {encoding}")
         return None

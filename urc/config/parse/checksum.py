@@ -113,10 +113,10 @@ def _trailer(part: Node, encoding: str, problems: Problems) -> DeclaredTrailer |
     each = parse_bytes(part.get("each"), encoding, problems) or b""
     for key, bytes_found in (("after", mark), ("each", each)):
         if key in part.data and part.data[key] in ("", []):
-            problems.error(part, "empty-mark", f"'{key}' is empty and marks nothing", at=key)
+            problems.error(part, "empty-mark", f"'{key}' is empty, so it marks nothing", at=key)
             return None
         if bytes_found and isinstance(part.data.get("at", "end"), int):
-            text = f"'at' has no effect with '{key}', which gives the position of the checksum"
+            text = f"'at' has no effect with '{key}', which sets the position of the checksum"
             problems.error(part, "misplaced-key", text, at="at", key=True)
     needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
     for key, needed in needs.items():

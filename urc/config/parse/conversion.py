@@ -29,7 +29,7 @@ def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Co
                 problems.error(
                     part,
                     "misplaced-key",
-                    f"'{key}' has no effect for {kind}",
+                    f"'{key}' has no effect for type {kind}",
                     at=key,
                     key=True,
                     hint="this key needs the type integer or number",
@@ -98,7 +98,7 @@ def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
-            hint="remove 'scale', or set it to the size of one raw step",
+            hint="remove 'scale', or set it to the value of one raw step",
         )
     if scale is None and offset is None:
         return ()

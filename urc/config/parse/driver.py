@@ -214,7 +214,7 @@ def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
         problems.error(
             part,
             "misplaced-key",
-            f"'allow_control' has no effect for {kind}",
+            f"'allow_control' has no effect for type {kind}",
             at="allow_control",
             key=True,
         )

@@ -56,7 +56,7 @@ def _inserted(part: Node, encoding: str, problems: Problems) -> EscapeSpec | Non
     after = parse_bytes(part.must("after"), encoding, problems)
     insert_part = part.get("insert")
     if after == b"":
-        problems.error(part, "empty-mark", "'after' is empty and matches nothing", at="after")
+        problems.error(part, "empty-mark", "'after' is empty, so it matches no bytes", at="after")
     if insert_part is None:
         text = "'insert' is missing: the byte to insert after the sequence"
         problems.error(part, "missing-key", text, at="after", key=True)
@@ -120,10 +120,10 @@ def _table(
 
 
 def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Problems) -> None:
-    """Report a replacement for an escaped byte if the replacement itself needs an escape."""
+    """Report a replacement for an escaped byte if the replacement must be escaped itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
-        text = f"{wrong:02X} replaces an escaped byte, but needs an escape itself"
+        text = f"{wrong:02X} replaces an escaped byte, but must be escaped itself"
         problems.error(part, "overlap", text, at=at)
 
 

@@ -119,7 +119,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
             "not-idempotent",
             "the robot may perform the command twice when a reply is lost",
             at="retries",
-            hint="write idempotent: true if a repetition does no harm, or remove 'retries'",
+            hint="write idempotent: true if the command can safely run twice, or remove 'retries'",
         )
     if retries and command.reply is None:
         problems.error(
@@ -132,7 +132,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         refuse(
             part,
             ("moves", "stop"),
-            "has no effect with 'hold', which declares motion",
+            "has no effect with 'hold', which already declares motion",
             problems,
         )
         _refuse_asides(part.get("reply"), problems)
@@ -174,7 +174,7 @@ def _check_stop(command: Command, part: Node, problems: Problems) -> None:
         problems.error(
             part,
             "misplaced-key",
-            "'role' has no effect with 'stop', because a stop requires no role",
+            "'role' has no effect with 'stop', because STOP requires no role",
             at="role",
             key=True,
             hint="remove 'role', or use a separate command for the stop",
@@ -334,7 +334,7 @@ def _hold(part: Node, command: Command, problems: Problems) -> Hold:
 
 
 def _rest_of(command: Command) -> str:
-    """Return zeros for all arguments that go in both directions, such as speeds; else dots."""
+    """Return sample release values: zeros if 0 is within every argument's range, otherwise dots."""
     ranges = [(one.min, one.max) for one in command.arguments.values()]
     is_both = all(low is not None and high is not None and low < 0 < high for low, high in ranges)
     names = [f"{name}: 0" for name in command.arguments] if is_both else []

@@ -70,7 +70,7 @@ def _digits(part: Node, problems: Problems) -> Digits:
     """Return the digit encoding of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
-        text = "'escape' has no effect with 'decode', because digits need no escape"
+        text = "'escape' has no effect with 'decode', because digits need no escaping"
         problems.error(part, "misplaced-key", text, at="escape", key=True)
     return digits  # type: ignore[no-any-return]  # the schema has the words
 
@@ -120,8 +120,8 @@ def _check_marks(part: Node, problems: Problems) -> None:
             problems.error(
                 inner,
                 "empty-mark",
-                f"'{key}' is empty and marks no frame",
-                hint="give the bytes of the mark, such as '<' or STX",
+                f"'{key}' is empty, so it cannot mark a frame",
+                hint="write the bytes of the mark, such as '<' or STX",
             )
 
 
@@ -305,9 +305,9 @@ def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
     flag, until = part.get("flag"), part.get("until")
     mark = None if until is None else parse_bytes(until, encoding, problems)
     if until is not None and mark == b"":
-        text = "'until' is empty and ends no number"
+        text = "'until' is empty, so it cannot end the length"
         problems.error(
-            until, "empty-mark", text, hint="give the bytes after the number, such as ':'"
+            until, "empty-mark", text, hint="write the bytes after the length, such as ':'"
         )
     return LengthSpec(
         offset=part.integer("offset") or 0,
@@ -345,7 +345,7 @@ def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Proble
         return
     key = "until" if length.until else "counted"
     if length.spelling == "raw":
-        text = f"'{key}' needs a number in digits"
+        text = f"'{key}' requires a length in digits"
         problems.error(part, "misplaced-key", text, at=key, key=True, hint="add 'as: dec'")
     for other in ("bits", "endian", "flag", *(("counted",) if length.until else ())):
         if other in part.data:

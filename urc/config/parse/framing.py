@@ -88,7 +88,7 @@ def _delimiter(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
             rx_part,
             "empty-delimiter",
             "the delimiter is empty and cannot end a frame",
-            hint="give the end of each reply, such as LF or CRLF",
+            hint="write the bytes that end each reply, such as LF or CRLF",
         )
     return {"tx": tx or b"", "rx": rx or b"\n"}
 
@@ -163,7 +163,9 @@ def _switch(part: Node, encoding: str, problems: Problems, catalog: Registries) 
         if first is None:
             continue
         if not first:
-            problems.error(first_part, "empty-mark", "an empty case cannot select a framing")
+            problems.error(
+                first_part, "empty-mark", "'first' is empty, so this case cannot select a framing"
+            )
             continue
         _check_case(first_part, first, spec, cases, problems)
         cases.append((first, spec))
@@ -243,13 +245,13 @@ def _check_pattern(part: Node, problems: Problems) -> None:
             part,
             "misplaced-anchor",
             "'^', '$' and '\\b' have no effect inside a stream",
-            hint="a frame starts where the pattern matches; add the bytes that end a frame",
+            hint="remove the anchors, and end the pattern with the bytes that end a frame",
         )
     elif _is_open(tree):
         problems.error(
             part,
             "open-end",
-            "the pattern has an open end, so the end of a frame is never certain",
+            "the pattern has an open end, so URC cannot tell where a frame ends",
             hint=f"add the end of a frame, such as '{text}\\r\\n'",
         )
 

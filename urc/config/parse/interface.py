@@ -45,7 +45,7 @@ def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
             "misplaced-key",
             f"{background!r} is also in the grid",
             at="background",
-            hint="a background slot is behind the grid, not inside",
+            hint="the background slot is behind the grid, so it must not be in the grid",
         )
     return interface._replace(background=background)
 

@@ -39,7 +39,7 @@ def parse_limits(
     if inner is None:
         return AlarmLimits()
     if kind not in (*_NUMBERS, *_WITH_STATES):
-        problems.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
+        problems.error(inner, "misplaced-key", f"'limits' has no effect for type {kind}", key=True)
         return AlarmLimits()
     if not {*NUMERIC_LIMITS, "states"} & inner.data.keys():
         hint = f"add one of {', '.join(NUMERIC_LIMITS)}, or 'states' for a boolean or text"
@@ -66,7 +66,7 @@ def _numbers(part: Node, kind: str, bounds: _Bounds, problems: Problems) -> dict
     given = [(name, value) for name, value in values.items() if value is not None]
     if kind not in _NUMBERS:
         for name, _ in given:
-            text = f"the limit {name!r} has no effect for {kind}"
+            text = f"the limit {name!r} has no effect for type {kind}"
             hint = "name the values that cause an alarm under 'states'"
             problems.error(part, "misplaced-key", text, at=name, key=True, hint=hint)
         return dict.fromkeys(NUMERIC_LIMITS)
@@ -101,7 +101,7 @@ def _words(
     if not given:
         return {}
     if kind not in _WITH_STATES and not states:
-        text = f"alarm states have no effect for {kind}"
+        text = f"alarm states have no effect for type {kind}"
         hint = f"write limits, such as {', '.join(NUMERIC_LIMITS)}"
         problems.error(part, "misplaced-key", text, at="states", key=True, hint=hint)
         return {}

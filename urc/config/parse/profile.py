@@ -89,7 +89,7 @@ def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Pr
         problems.error(
             part,
             "misplaced-key",
-            f"'choices' has no effect for {kind}",
+            f"'choices' has no effect for type {kind}",
             at="choices",
             key=True,
             hint="write 'type: choice'",

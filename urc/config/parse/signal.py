@@ -31,7 +31,11 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
     precision = part.integer("precision")
     if precision is not None and element != "number":
         problems.error(
-            part, "misplaced-key", f"'precision' has no effect for {kind}", at="precision", key=True
+            part,
+            "misplaced-key",
+            f"'precision' has no effect for type {kind}",
+            at="precision",
+            key=True,
         )
     axes = _axes(part, kind, problems)
     states = parse_states(part, element, problems)
@@ -103,7 +107,7 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
             problems.error(
                 part,
                 "misplaced-key",
-                f"'{key}' has no effect for {kind}",
+                f"'{key}' has no effect for type {kind}",
                 at=key,
                 key=True,
                 hint=f"this key needs 'type: {kinds[0]}'",
@@ -154,7 +158,7 @@ def _deadband(
         return 0.0
     low, high = bounds
     if element not in _NUMBERS:
-        text = f"'deadband' has no effect for {element}"
+        text = f"'deadband' has no effect for type {element}"
         problems.error(part, "misplaced-key", text, at="deadband", key=True)
     elif low is not None and high is not None and band > high - low:
         problems.error(
@@ -169,7 +173,7 @@ def _deadband(
 
 def _debounce_s(part: Node, kind: str, problems: Problems) -> float:
     if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
-        text = f"'debounce' has no effect for {kind}"
+        text = f"'debounce' has no effect for type {kind}"
         problems.error(part, "misplaced-key", text, at="debounce", key=True)
     return problems.duration(part, "debounce", 0.0, most=3600)
 

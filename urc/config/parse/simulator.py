@@ -53,7 +53,7 @@ def parse_world(part: Node, problems: Problems) -> WorldSpec:
     """Return the world at `part`, with unresolved names."""
     if "body" not in part.data:
         text = "this world lacks 'body'"
-        hint = "write body: { type: differential }, or another kind"
+        hint = "write body: { type: differential }, or another type"
         problems.error(part, "missing-key", text, key=True, hint=hint)
         return WorldSpec()
     body = _filled(BodySpec(), part, "body")
@@ -133,7 +133,7 @@ def _check_body(part: Node, body: BodySpec, problems: Problems) -> None:
     for key in part.data:
         kinds = BODY_KEYS.get(key)
         if kinds is not None and body.type not in kinds:
-            text = f"'{key}' has no effect for {body.type}, only for {' and '.join(kinds)}"
+            text = f"'{key}' has no effect for type {body.type}, only for {' and '.join(kinds)}"
             problems.error(part, "misplaced-key", text, at=key, key=True)
 
 
@@ -291,7 +291,7 @@ def _not_one_trigger(part: Node, triggers: list[str], problems: Problems) -> Non
     problems.error(
         part,
         "misplaced-key",
-        f"{both} are two triggers of one rule",
+        f"{both} cannot be used together: a rule has one trigger",
         at=triggers[1],
         key=True,
         hint="write two rules",

@@ -56,7 +56,7 @@ def parse_steps(part: Node, context: StepContext, problems: Problems) -> tuple[s
         problems.error(
             part,
             "too-many-steps",
-            f"with all rounds of 'repeat', the sequence has {most} steps; the limit is"
+            f"with all repetitions of 'repeat', the sequence has {most} steps; the limit is"
             f" {sequence.MAX_STEPS_DONE}",
             hint="make 'times' smaller",
         )
@@ -133,8 +133,8 @@ def _expect(
     transport = part.text("from", context.transport)
     framing = None
     if isinstance(inner.data, dict):
-        refuse(inner, _OF_REQUESTS, "has no effect for a step", problems)
-        refuse(inner, ("timeout",), "must be next to 'expect', not inside", problems)
+        refuse(inner, _OF_REQUESTS, "has no effect in a step", problems)
+        refuse(inner, ("timeout",), "must be next to 'expect', not inside it", problems)
         framing, forms = parse_own_framing(inner, problems, context.forms)
         stage = parse_stage(inner, problems, forms)
     else:
@@ -170,7 +170,7 @@ def _wait(
     part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.Step | None:
     if not isinstance(inner.data, dict):
-        refuse(part, ("else",), "has no effect for a plain wait", problems)
+        refuse(part, ("else",), "has no effect for a wait without a condition", problems)
         return sequence.WaitStep(problems.duration(part, "wait", 0.0, most=sequence.MAX_STEP_S))
     condition = problems.expression(inner.must("until"))
     otherwise, text = _else(part, context, problems)
@@ -186,7 +186,7 @@ def _repeat(
         problems.error(
             part,
             "missing-key",
-            "'times' is missing: the number of rounds has no limit",
+            "'times' is missing: the number of repetitions has no limit",
             key=True,
             hint="write times: 10, and until: CONDITION to end earlier",
         )

@@ -148,7 +148,7 @@ def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
         problems.warn(
             part.must("offline").must("retry"),
             "retry-too-early",
-            f"an offline part is polled more often than an online part"
+            f"an offline device is polled more often than a working device"
             f" (every {shown_duration(poll.every_s)})",
             hint="make 'retry' longer than 'every'",
         )

@@ -311,7 +311,7 @@ def _check_empty(
                 place,
                 "matches-empty",
                 f"{name!r} may be empty here, but empty text is not a number",
-                hint="write + instead of *, or not_available: [''] if empty means 'not known'",
+                hint="write + instead of *, or not_available: [''] if empty means 'not available'",
                 **where,
             )
 

@@ -151,7 +151,7 @@ def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
             "long-lease",
             f"the robot keeps moving for {shown_duration(hold.lease_s)} after the connection to"
             " its operator is lost",
-            hint=f"{shown_duration(0.25)} is usual, and {shown_duration(LONG_LEASE_S)} is long",
+            hint=f"{shown_duration(0.25)} is usual; {shown_duration(LONG_LEASE_S)} is already long",
         )
 
 
@@ -173,7 +173,7 @@ def _check_baud(
     problems.error(
         part.must("repeat"),
         "line-too-slow",
-        f"{what} {bits_per_s:.0f} bit/s or more, but the line carries only {baud:g}",
+        f"{what} {bits_per_s:.0f} bit/s or more, but the serial line carries only {baud:g}",
         hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms or slower",
     )
 
@@ -181,7 +181,7 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Warn about held commands that use an MQTT broker without a last will."""
+    """Warn about held commands that use an MQTT broker without a will."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
@@ -196,7 +196,7 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest period in ms after all periods are scaled equally to fit the line."""
+    """Return the shortest period in ms after scaling all periods equally to fit the serial line."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 

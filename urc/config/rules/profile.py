@@ -62,7 +62,7 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
                 "never-set",
                 f"nothing sets the signal {name!r}",
                 key=True,
-                hint=f"set the signal by (?P<{name}>…) in a 'regex', {{{name}}} in a 'pattern',"
+                hint=f"set the signal with (?P<{name}>…) in a 'regex', {{{name}}} in a 'pattern',"
                 f" 'u16be {name}' in a 'struct', or a formula under 'value'",
             )
     for name, part in sources.driver.named("transports").items():

@@ -63,7 +63,7 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn about two transports that listen on the same port of this machine."""
+    """Warn about two transports that listen on the same port of this computer."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
         options = driver.transports[name].options
@@ -77,7 +77,7 @@ def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
             problems.warn(
                 inner.must(key),
                 "same-port",
-                f"{seen[place]!r} also listens on {place[1]}, but only one transport can",
+                f"{seen[place]!r} also listens on port {place[1]}, but only one transport can",
                 hint="give each transport its own port, or use one transport and distinguish the"
                 " messages",
             )
@@ -112,7 +112,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
         return
     repeat_s = command.hold.repeat_s
     for limit_s, what in (
-        (spec.min_gap_s if command.priority != "realtime" else 0.0, "the line's 'min_gap'"),
+        (spec.min_gap_s if command.priority != "realtime" else 0.0, "the transport's 'min_gap'"),
         (1 / command.rate_per_s if command.rate_per_s else 0.0, "its 'rate_limit'"),
     ):
         if limit_s > repeat_s * 1.001:  # Tolerance for rounding: 1/20 s and 50 ms are equal.
@@ -139,14 +139,14 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Pr
         return
     timeouts = part.get("timeouts")
     for place, key, limit_s, what in (
-        (timeouts, "idle", spec.timeouts.idle_s, "is closed"),
+        (timeouts, "idle", spec.timeouts.idle_s, "closes"),
         (part, "stale_after", spec.stale_after_s, "counts as silent"),
     ):
         if place is not None and limit_s is not None and limit_s <= min(periods):
             problems.warn(
                 place.must(key),
                 "slow-keepalive",
-                f"the line {what} after {shown_duration(limit_s)}, but the robot is polled every"
-                f" {shown_duration(min(periods))}",
+                f"the connection {what} after {shown_duration(limit_s)}, but the robot is polled"
+                f" every {shown_duration(min(periods))}",
                 hint="allow at least two periods, to tolerate the loss of one reply",
             )

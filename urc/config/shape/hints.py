@@ -83,7 +83,7 @@ _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
     ("reply_to", "leaves"): "polls run automatically in these steps; put the replies under 'feed'",
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
-    " only an output takes 'command'",
+    " only an output has 'command'",
 }
 """Hints, by misplaced key and by a valid key in the same mapping."""
 
@@ -246,7 +246,7 @@ def type_hint(
         return f'quote it: "{_written(document, path) or value}"'
     if isinstance(value, str):
         if _is_filled_in(document, path):
-            return 'only a text that consists of a name in braces becomes a value: "{i}"'
+            return 'only text that consists of a single name in braces becomes a value: "{i}"'
         if _NUMBERS & set(types):
             if _looks_like_number(value):
                 return f"remove the quotes: {value}"

@@ -36,13 +36,13 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
     if part.name == "request" and ("url" in part.data) == ("path" in part.data):
         both = "url" in part.data
         text = "'path' and 'url' cannot be used together" if both else "'path' is missing"
-        hint = "write 'path', or 'url' for an address from the robot itself"
+        hint = "write 'path', or 'url' for an address that the robot reported"
         problems.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None
     url = attributes.get("url")
     if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
         text = "'url' must consist of one field from the robot, such as _next"
-        hint = "put arguments and settings into 'path' or 'query', which stay on this server"
+        hint = "put arguments and settings into 'path' or 'query', which cannot change the server"
         problems.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
     stamped = part.get("stamped") if part.name == "publish" else None

@@ -15,7 +15,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
         part.data.encode(context.encoding)
     except UnicodeEncodeError as error:
         wrong = error.object[error.start]
-        text = f"{wrong!r} does not exist in the encoding {context.encoding}"
+        text = f"{wrong!r} cannot be encoded as {context.encoding}"
         problems.error(part, "not-in-encoding", text, offset=error.start)
         return None
     return ReadSpec("equals", {"text": part.data})

@@ -18,7 +18,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
             "many-frames",
             "several frames of one command are sent together, but each frame is a separate"
             " message on this transport",
-            hint="write a command for each frame, or declare a 'framing' if the line is a stream",
+            hint="write a command for each frame; on a byte stream, declare a 'framing' instead",
         )
         return None
     frames: list[WriteSpec] = []

@@ -46,7 +46,7 @@ def _path(part: Node, problems: Problems) -> object:
         return jmespath.compile(text)
     except JMESPathError as error:
         offset = getattr(error, "lex_position", None) or 0
-        hint = "it starts at the top, without '$': battery.level" if text.startswith("$") else ""
+        hint = "paths start without '$', such as battery.level" if text.startswith("$") else ""
         problems.error(
             part, "bad-path", f"{text!r} is not a JMESPath expression", offset=offset, hint=hint
         )

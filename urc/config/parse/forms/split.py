@@ -23,7 +23,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
         if name.endswith(_MORE) and name != _MORE and inner is items[-1]:
             name, tail = name.removesuffix(_MORE), name.removesuffix(_MORE)
         if name.endswith(_MORE):
-            text = "'...' must be at the end"
+            text = "'...' is allowed only in the last name"
             problems.error(inner, "bad-name", text)
             is_good = False
         elif name in names and name:

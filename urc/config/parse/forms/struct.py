@@ -81,8 +81,8 @@ def _check_size(
             )
             problems.error(part, "does-not-fit", text, hint=hint)
     elif least + around > framing.max_bytes:
-        text = f"the items take {least} bytes, but a frame on this line has {framing.max_bytes}"
-        problems.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
+        text = f"the items take {least} bytes, but the framing allows {framing.max_bytes}"
+        problems.error(part, "does-not-fit", text + " at most", hint="increase its 'max'")
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:

@@ -58,7 +58,7 @@ def _path(part: Node, problems: Problems) -> XmlPath | None:
             problems.error(
                 part,
                 "bad-path",
-                f"{piece!r} is not a step of a path",
+                f"{piece!r} is not a valid step of a path",
                 offset=offset,
                 length=max(1, len(piece)),
                 hint="write root/element/@attribute, root/element[2] or root/element[@name='x']",

@@ -1,8 +1,8 @@
 """Parser for the items of a struct or a reusable type: list → `Item` values.
 
-An `ItemParser` reads the items of one scope; expressions can refer to all ids of their scope. The
-table `_KEYS` contains the keys of each kind of item. The module `numbers` checks numbers, constants
-and enums.
+An `ItemParser` reads the items of one scope; an expression can refer to earlier ids in its scope.
+The table `_KEYS` contains the keys of each kind of item. The module `numbers` checks numbers,
+constants and enums.
 """
 
 from collections.abc import Mapping
@@ -222,7 +222,9 @@ class ItemParser:
     def _array(self, part: Node, item: Item) -> Item | None:
         if not item.id and item.kind not in ("struct", "packed"):
             text = "an array needs an 'id'"
-            self.problems.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
+            self.problems.error(
+                part, "missing-key", text, key=True, hint="write { size: … } to skip bytes"
+            )
             return None
         if item.const is not None:
             text = "'const' has no effect for an array"
@@ -248,7 +250,7 @@ class ItemParser:
         if prefix is not None:
             if prefix.kind in ("integer", "varint") and not prefix.is_signed:
                 return Extent("prefix", prefix=prefix)
-            text = f"a size must be a whole number without a sign, found {part.data!r}"
+            text = f"a size needs an unsigned whole-number type, found {part.data!r}"
             self.problems.error(part, "bad-item", text)
             return None
         expression = self.scope.expression(part)
@@ -293,7 +295,7 @@ class ItemParser:
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
             text = f"{key!r} is not a value of {subject.id!r}"
-            hint = f"its words: {', '.join(words)}" if words else "the item has no words"
+            hint = f"words: {', '.join(words)}" if words else "the item has no words"
             self.problems.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]

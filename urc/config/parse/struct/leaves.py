@@ -74,7 +74,7 @@ class LeafParser:
         named = part.must("type")
         number = number_of(named.data)
         if number is None or number.kind != "integer" or number.is_signed or number.is_coded:
-            text = f"bits need an unsigned whole number, found {named.data!r}"
+            text = f"bit fields need an unsigned whole-number type, found {named.data!r}"
             self.problems.error(named, "bad-item", text, hint="such as u8 or u16be")
             return None
         parts = [self._bit(inner) for inner in part.listed("bits")]
