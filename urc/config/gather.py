@@ -159,7 +159,7 @@ def _follow(reference: Node, kind: str, library: Library, given: Node | None = N
             reference,
             "partial-document",
             f"{prepared.file} is a partial {kind}",
-            hint="name a document that includes or extends it",
+            hint="use a document that includes or extends it",
         )
         return None
     return Node(prepared, (), prepared.data)

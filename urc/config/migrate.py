@@ -145,7 +145,7 @@ def _both(document: Document, path: Path, old: str, new: str) -> ProblemsError:
             document.problem(
                 (*path, old),
                 "duplicate-key",
-                f"'{old}' is an old name of '{new}', and this mapping has both",
+                f"'{old}' is the old name of '{new}', and this mapping has both",
                 hint="remove one of the two keys",
                 key=True,
             )

@@ -214,7 +214,7 @@ def test_a_demo_of_a_widget_is_migrated(tmp_path: Path) -> None:
 def test_both_names_of_a_key_are_a_problem(tmp_path: Path) -> None:
     """Renaming would write one key twice."""
     text = HEADS["interface"] + "grids: { landscape: a }\nlayouts: { landscape: b }\n"
-    with pytest.raises(ProblemsError, match="'grids' is an old name of 'layouts'"):
+    with pytest.raises(ProblemsError, match="'grids' is the old name of 'layouts'"):
         migrated(tmp_path, text)
 
 

@@ -62,7 +62,7 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
         home = FilePath(part.document.source_of(part.path).file).absolute().parent
         place = home / part.data
         if fault:
-            hint = "name a file in this document's folder or a subfolder"
+            hint = "specify a file in this document's folder or a subfolder"
             problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
         elif not place.is_file():
             problems.error(part, "no-such-file", f"there is no file {part.data!r}")
@@ -135,7 +135,7 @@ def link_pages(options: Node, widget: Widget, problems: Problems) -> dict[str, t
         url = str(part.data)
         fault = _page_fault(url) if url else ""
         if fault:
-            hint = "write it as http://robot.local:8080/status"
+            hint = "write a URL such as http://robot.local:8080/status"
             problems.error(part, "page-not-shown", f"{url[:80]!r} {fault}", hint=hint)
         found[name] = (*found.get(name, ()), *((url,) if url and not fault else ()))
     return found

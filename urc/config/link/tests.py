@@ -70,7 +70,7 @@ def _check_transports(part: Node, driver: Driver, problems: Problems) -> None:
         for name, inner in part.named(key).items():
             _check_transport(name, inner, driver, problems, key=True)
             for one in inner.items() if isinstance(inner.data, list) else [inner]:
-                _check_verb(one, verbs, f"is never {'fed' if key == 'feed' else key}", problems)
+                _check_verb(one, verbs, f"cannot be {'fed' if key == 'feed' else key}", problems)
 
 
 def _check_verb(part: Node, verbs: tuple[str, ...], why_not: str, problems: Problems) -> None:

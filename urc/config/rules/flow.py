@@ -66,7 +66,7 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
         problems.warn(
             part.must("on_close"),
             "long-on-close",
-            f"the waits of these steps take {shown_duration(waits_s)}, but the limit is"
+            f"these steps may wait {shown_duration(waits_s)}, but the limit is"
             f" {shown_duration(_GOOD_BYE_S)} in total",
             key=True,
         )

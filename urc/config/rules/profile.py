@@ -163,7 +163,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
             "short-poll-timeout",
             f"the next request is due after {shown_duration(poll.every_s)}, but a reply may take"
             f" {shown_duration(seconds)}",
-            hint=f"shorten the timeout in {_place(where, part)}, or poll more slowly",
+            hint=f"shorten the timeout in {_place(where, part)}, or poll less often",
         )
 
 

@@ -28,7 +28,7 @@ def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
                 "too-many-polls",
                 f"the command is polled {1 / poll.every_s:g} times a second, but {poll.run!r} may"
                 f" be sent only {rate:g} times",
-                hint="poll more slowly, or raise the command's 'rate_limit'",
+                hint="poll less often, or increase the command's 'rate_limit'",
             )
     _check_counted(part, driver, problems)
     _check_ports(part, driver, problems)

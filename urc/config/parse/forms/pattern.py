@@ -15,7 +15,7 @@ _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 _FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
-"""Characters that the text after a field must not start with, by kind of field."""
+"""Characters that must not directly follow a field, by kind of field."""
 
 
 class _PatternFault(Exception):
