@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return all commands, with `moves` set for sequences that run a moving or held command."""
+    """Return all commands, with `moves` set for each sequence that starts motion."""
     found = dict(commands)
 
     def does(step: object) -> bool:
@@ -68,7 +68,7 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report a command if it starts autonomous motion and `part` would run it automatically."""
+    """Report a command that starts autonomous motion but that `part` would run automatically."""
     if runs_what_moves(command, arguments):
         problems.error(
             part,

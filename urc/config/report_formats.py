@@ -24,7 +24,7 @@ _MESSAGE: Final = str.maketrans(_DATA)
 
 
 def to_github(problem: Problem) -> str:
-    """Return the problem as a workflow command in one line."""
+    """Return the problem as a workflow command on one line."""
     properties = {
         "file": _slashed(problem.file),
         "line": str(problem.line),

@@ -94,7 +94,7 @@ def link_requirements(linker: Linker, part: Node, command: Command) -> None:
 
 
 def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
-    """Report a command that needs two people if `part` would run it automatically."""
+    """Report a command that needs two people but that `part` would run automatically."""
     if _needs_two(command):
         linker.problems.error(
             part,
