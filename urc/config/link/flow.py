@@ -80,7 +80,7 @@ def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -
             continue
         kind = argument.items if argument.type == "array" else argument.type
         if kind not in ("integer", "number") or argument.choices:
-            what = "has choices" if argument.choices else f"is {kind}"
+            what = "has choices" if argument.choices else f"has the type {kind}"
             text = f"argument {name!r} {what}, so its value cannot change gradually"
             hint = "limit only numeric arguments without choices"
             problems.error(inner, "wrong-type", text, key=True, hint=hint)

@@ -201,7 +201,7 @@ def _check_text(
 ) -> None:
     value = _read(text, argument)
     if value is None:
-        code, wrong = "wrong-type", f"takes {argument.type}"
+        code, wrong = "wrong-type", f"has the type {argument.type}"
     elif argument.choices and value not in argument.choices:
         code, wrong = "unknown-word", "has other choices"
     elif not isinstance(value, str) and _is_outside(value, argument):
@@ -212,7 +212,7 @@ def _check_text(
     problems.error(
         part,
         code,
-        f"command {command!r} cannot take {text!r}: its argument {argument.name!r} {wrong}",
+        f"command {command!r} does not accept {text!r}: its argument {argument.name!r} {wrong}",
         hint=did_you_mean(text, choices, "choices") if choices else "",
     )
 

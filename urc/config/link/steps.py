@@ -185,8 +185,8 @@ class _Walk:
             self._linker.problems.error(
                 part,
                 "no-connection",
-                f"{transport!r} opens a connection for each request, so it has no connection"
-                " between two steps",
+                f"{transport!r} opens a connection for each request, so no connection"
+                " stays open between two steps",
                 hint="run a command with a reply, or make the connection persistent",
             )
 

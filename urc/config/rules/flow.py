@@ -116,7 +116,7 @@ def _check_stages(
             part.must("stages"),
             "stages-block-line",
             f"while this command waits up to {shown_duration(longest_s)} for a later stage, the"
-            f" poll every {shown_duration(min(periods))} also waits",
+            f" poll that runs every {shown_duration(min(periods))} also waits",
             key=True,
             hint="write queue: { in_flight: 2 } if the robot can reply in between",
         )
