@@ -1,4 +1,4 @@
-"""Access control for pages: browsers with a key are admitted; all others get the sign-in page.
+"""Access control for pages: visitors with a role are admitted; others get the sign-in page.
 
 Layer 5. The module's ASGI middleware runs inside the page policy. A visitor without a role reaches
 only routes with the right `ANYONE`, such as STOP and the sign-in page's files.
@@ -34,7 +34,7 @@ __all__ = ["AccessMiddleware"]
 SAID = "sign in, or open the address that URC printed when it started"
 """Refusal message for programs and sockets; `words.js` translates it."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
-"""Paths of the frames' files, without the secret prefix."""
+"""Paths of the files that widget frames load, without the secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
 _LONGEST_AGENT = 200
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}

@@ -34,12 +34,12 @@ _SCHEMES: Final = {
         "in": "cookie",
         "name": "urc-sign-in",
         "description": "The sign-in of a browser; the cookie's name ends with an identifier."
-        " A request that changes something also needs the Origin header of this server.",
+        " A request that changes data also needs an Origin header that names this server.",
     },
 }
 _ABOUT: Final = (
     "Programs send `Authorization: Bearer TOKEN` with each request. Times are in seconds. The"
-    " WebSocket `/ws` also streams a robot's values, and is better for motion."
+    " WebSocket `/ws` also streams a robot's values, and is preferable for motion."
 )
 _IN_PATH: Final = {
     "name": "Name of the robot, as in its document.",

@@ -59,10 +59,10 @@ def read_notify_options(file: str) -> NotifyOptions:
     given = OptionsFile(file, KEYS)
     ways = [key for key in ("command", "url", "url_file") if key in given.data]
     if len(ways) != 1:
-        raise given.fault((), "expected one of 'command', 'url' and 'url_file'", "missing-key")
+        raise given.fault((), "expected exactly one of command, url and url_file", "missing-key")
     is_command = ways == ["command"]
     if is_command and "secret_file" in given.data:
-        text = "a command reads its secrets itself; 'secret_file' is for a URL"
+        text = "'secret_file' is only for a URL; a command reads its own secrets"
         raise given.fault(("secret_file",), text, is_key=True)
     priority = given.text("priority", "medium")
     if priority not in get_args(AlarmPriority):
@@ -82,7 +82,7 @@ def _command(given: OptionsFile) -> tuple[str, ...]:
     words: list[Any] = given.list_of("command")
     is_text = all(isinstance(one, str) and "\0" not in one for one in words)
     if not is_text or not words or not words[0] or len(words) > _MOST_WORDS:
-        text = f"expected a list of 1 to {_MOST_WORDS} texts: the program and its arguments"
+        text = f"expected a list of 1 to {_MOST_WORDS} strings: the program and its arguments"
         raise given.fault(("command",), text, "wrong-type")
     return tuple(words)
 

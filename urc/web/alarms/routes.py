@@ -169,9 +169,9 @@ class AlarmCalls:
     def _acting(self, request: Request) -> tuple[str, RobotService]:
         name, service = service_of(self._services(), request)
         if service.robot.playback is not None:
-            raise ApiError(409, "this is the playback of a recording", "recorded")
+            raise ApiError(409, "the alarms of a playback cannot be changed", "recorded")
         if not visitor_of(request).may_give(""):
-            raise ApiError(403, "this token is only for single commands", "forbidden")
+            raise ApiError(403, "this token permits only single commands", "forbidden")
         return name, service
 
     def _actor(self, request: Request) -> AlarmActor:
@@ -205,7 +205,7 @@ def _query(request: Request, service: RobotService, signals: Mapping[str, Signal
         raise ApiError(400, str(error).replace("'what'", "'kinds'")) from None
     for kind in asked.what:
         if kind not in _KINDS:
-            raise ApiError(400, f"{kind!r} is not a kind of event; kinds: {', '.join(_KINDS)}")
+            raise ApiError(400, f"unknown event kind {kind!r}; known kinds: {', '.join(_KINDS)}")
     text = asked.text.casefold()
     titled = [name for name, one in signals.items() if text and text in _title(one).casefold()]
     return AlarmQuery(

@@ -1,6 +1,6 @@
-"""JSON messages of the HTTP API for alarms, in snake case.
+"""JSON messages of the HTTP API for alarms; the keys are in snake case.
 
-Layer 5. Pure. Times are in UTC seconds since 1970; 0 means that no time is set.
+Layer 5. Pure. Times are in seconds since 1970 (UTC); 0 means that no time is set.
 """
 
 from typing import Annotated, Final
@@ -61,7 +61,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     group: int
     """Number of the alarm's burst."""
     raised: int
-    """Number that the alarm received when last raised; an acknowledgement must repeat it."""
+    """Number assigned when the alarm was last raised; an acknowledgement must repeat it."""
     times: int
     """Number of activations since the alarm was last normal."""
     began_at: float
@@ -164,7 +164,7 @@ class AcknowledgeAsked(AlarmMessage, frozen=True):
     """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """Each alarm's `raised` number, by signal; alarms raised again since then are skipped."""
+    """`raised` number of each signal's alarm; an alarm that has been raised again is skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):

@@ -1,7 +1,7 @@
 """The table of all HTTP API calls: path, right, body, reply and errors.
 
 Layer 5. Both the routes and the OpenAPI document are generated from this table, so they cannot
-differ. Only this module creates API routes, and each call states its right.
+differ. Only this module creates API routes, and each call declares the right that it requires.
 """
 
 from collections.abc import Mapping
@@ -90,7 +90,7 @@ class Call(NamedTuple):
     right: Right
     summary: str
     answer: type | None
-    """Type of the JSON answer; None if the answer is a file or a stream."""
+    """Type of the JSON response; None if the response is a file or a stream."""
     body: type | None = None
     """Type of the request body: bytes, or the type of a JSON body; None if there is no body."""
     method: Literal["GET", "POST"] = "GET"
@@ -99,7 +99,7 @@ class Call(NamedTuple):
     errors: tuple[int, ...] = ()
     """Failure statuses in addition to those that result from the right, path and body."""
     media: tuple[str, ...] = (JSON,)
-    """Media types of the answer."""
+    """Media types of the response."""
     is_body_needed: bool = True
 
 
@@ -115,7 +115,7 @@ _FILTERS: Final = (
     Query("last", "Maximum number of entries, at most 1000.", "integer"),
 )
 _NO_ROBOT: Final = (409, 429)
-"""Failures: URC cannot connect to the robot, or too many clients use the robot."""
+"""Failure statuses: URC cannot connect to the robot (409), or too many clients use it (429)."""
 
 CALLS: Final[tuple[Call, ...]] = (
     Call("health", "/healthz", ANYONE, "The health and version of the server.", HealthStatus),
@@ -126,7 +126,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "document",
         f"{_ROBOT}/document",
         MAINTAIN,
-        "The document of a robot as one YAML text, without setting values.",
+        "The document of a robot as one YAML file, without setting values.",
         None,
         errors=(409,),
         media=("application/yaml",),
@@ -135,7 +135,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "signals",
         f"{_ROBOT}/signals",
         WATCH,
-        "The latest values of signals. The call connects the robot if necessary.",
+        "The latest values of signals. URC connects to the robot if necessary.",
         SignalValues,
         query=(_NAMES,),
         errors=_NO_ROBOT,
@@ -145,7 +145,7 @@ CALLS: Final[tuple[Call, ...]] = (
         f"{_ROBOT}/signals/{{signal}}",
         WATCH,
         "The latest value of one signal. An image is sent as a file; the header x-urc-age-ms"
-        " contains its age.",
+        " contains its age in milliseconds.",
         SignalValue,
         errors=_NO_ROBOT,
         media=(
@@ -158,8 +158,8 @@ CALLS: Final[tuple[Call, ...]] = (
         f"{_ROBOT}/stream",
         WATCH,
         "Server-Sent Events: “values” contains changed signals, “connections” contains the states"
-        " of the connections, and “end” contains the reason for the end. A slow reader misses"
-        " values.",
+        " of the connections, and “end” contains the reason why the stream ended. A slow reader"
+        " misses values.",
         None,
         query=(_NAMES,),
         errors=_NO_ROBOT,
@@ -169,7 +169,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "command",
         f"{_ROBOT}/commands/{{command}}",
         DRIVE,
-        "Run a command or sequence, and return its reply. The command may need a higher role.",
+        "Run a command or sequence, and return its reply. Some commands require a higher role.",
         CommandAnswer,
         CommandAsked,
         "POST",
@@ -180,7 +180,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "lease",
         f"{_ROBOT}/lease",
         DRIVE,
-        "Take, ask for, hand over or leave the controls of a robot, or reset STOP. A session ends"
+        "Take, request, hand over or give up control of a robot, or reset STOP. A session ends"
         " 10 s after its last request.",
         LeaseAnswer,
         LeaseAsked,
@@ -192,7 +192,7 @@ CALLS: Final[tuple[Call, ...]] = (
         f"{_ROBOT}/motion",
         DRIVE,
         "Send the newest input of a held command. A pause longer than the lease stops the robot."
-        " The WebSocket is better for motion.",
+        " Prefer the WebSocket for motion.",
         MotionAnswer,
         MotionAsked,
         "POST",
@@ -226,8 +226,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms",
         f"{_ROBOT}/alarms",
         WATCH,
-        "The alarms of a robot that are not normal, the most urgent first. The call does not"
-        " connect the robot.",
+        "The alarms of a robot outside the normal state, most urgent first. The call does not"
+        " connect to the robot.",
         RobotAlarmList,
     ),
     Call(
@@ -246,7 +246,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_acknowledge",
         f"{_ROBOT}/alarms/acknowledge",
         DRIVE,
-        "Acknowledge the alarms that you saw. An alarm that was raised again since then is"
+        "Acknowledge the alarms that you saw. An alarm that has been raised again since then is"
         " skipped.",
         AlarmAction,
         AcknowledgeAsked,
@@ -287,7 +287,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "audit",
         "/api/v1/audit",
         MAINTAIN_ANYWHERE,
-        "Search the audit log, newest entry first. You see the entries of the robots that you"
+        "Search the audit log, newest entry first. You see the entries about the robots that you"
         " maintain.",
         AuditResult,
         query=_FILTERS,
@@ -437,7 +437,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_add",
         "/api/v1/packages/add",
         MAINTAIN_SERVER_FRESH,
-        "Start a job for the package at a path in a repository or on this machine.",
+        "Start a job that adds the package at a path in a repository or on this machine.",
         JobNews,
         Add,
         "POST",
@@ -448,7 +448,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_upload",
         "/api/v1/packages/upload",
         MAINTAIN_SERVER_FRESH,
-        "Start a job for an uploaded package, bundle or interface.yaml in the request body.",
+        "Start a job that adds the package, bundle or interface.yaml in the request body.",
         JobNews,
         bytes,
         "POST",
@@ -481,7 +481,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_remove",
         "/api/v1/packages/remove",
         MAINTAIN_SERVER_FRESH,
-        "Remove a package; without “yes”, only list the packages that would be removed.",
+        "Remove a package; unless “yes” is true, only list the packages that would be removed.",
         RemovedPackages,
         InstallRequest,
         "POST",
@@ -491,7 +491,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "job_agree",
         "/api/v1/job/agree",
         MAINTAIN_SERVER_FRESH,
-        "Install the planned package after its approval.",
+        "Approve the planned package and install it.",
         JobNews,
         JobDecision,
         "POST",

@@ -76,7 +76,7 @@ class EventStream:
         self._seen = 0
         """Hub revision of the last sent event."""
         self._links = -1
-        """Number of link state changes so far when the newest connection states were sent."""
+        """Number of link state changes when the connection states were last sent."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send events until the stream ends."""

@@ -175,7 +175,7 @@ class RecordingCalls:
         if running is not None and running.state.active:
             raise ApiError(409, "a program is already recording this robot", "recording")
         if service.robot.playback is not None:
-            raise ApiError(409, "this is the playback of a recording", "recorded")
+            raise ApiError(409, "a playback cannot be recorded", "recorded")
         running = self._running[name] = _Running()
         stack = ExitStack()
         try:

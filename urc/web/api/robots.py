@@ -1,6 +1,6 @@
 """The HTTP API for robots: descriptions, signals, commands, and motion under a lease.
 
-Layer 5. The routes decode requests and encode answers. The module `sessions` drives robots,
+Layer 5. The routes decode requests and encode responses. The module `sessions` drives robots,
 `command_runner` runs commands, and `event_stream` sends signals.
 """
 
@@ -300,7 +300,7 @@ class RobotCalls:
     def _admit(self, peer: SocketPeer, service: RobotService) -> None:
         self._limits.count(peer.who, service.clock.now())
         if service.robot.playback is not None:
-            raise ApiError(409, "this is the playback of a recording", "recorded")
+            raise ApiError(409, "a playback accepts no commands", "recorded")
 
     def _session(self, request: Request, service: RobotService, secret: str) -> ProgramSession:
         return self.sessions.find(secret, service, visitor_of(request).identity)

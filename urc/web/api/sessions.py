@@ -125,7 +125,7 @@ class ProgramSession:
             if notice.kind == "refused":
                 return notice.message
         lease = self.service.controls.controller.lease
-        late = "the input is too old, or not newer than the previous input; send the newest beat"
+        late = "the input is too old, or not newer than the last input; send the newest heartbeat"
         return lease.refusal(self.operator.client.id, asked.epoch) or late
 
     def notices(self) -> tuple[MotionNotice, ...]:

@@ -13,7 +13,7 @@ __all__ = ["delivered_stop", "press_stop"]
 
 
 def press_stop(name: str, service: RobotService, who: Operator, recorder: ServerRecorder) -> None:
-    """Stop a robot and latch its STOP, before the function returns.
+    """Stop a robot and latch its STOP before returning.
 
     Args:
         name: name of the robot in URLs.

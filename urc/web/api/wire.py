@@ -1,4 +1,4 @@
-"""JSON messages of the HTTP API for robots, in snake case.
+"""JSON messages of the HTTP API for robots; the keys are in snake case.
 
 Layer 5. Pure. Times are in seconds.
 """
@@ -182,7 +182,7 @@ class CommandInfo(ApiMessage, frozen=True):
     stops: bool
     """Whether STOP sends the command."""
     sequence: bool
-    """Whether URC runs several steps for the command."""
+    """Whether the command is a sequence of steps."""
     hold: HoldInfo | None
     """Timing of a held command, which needs motion requests; null for other commands."""
     confirm: ConfirmInfo | None
@@ -222,7 +222,7 @@ class RobotInfo(ApiMessage, frozen=True):
 
     robot: RobotSummary
     missing: tuple[str, ...]
-    """Names of required settings without a value; URC connects only if all of them have values."""
+    """Names of required settings without a value; URC connects only if there are none."""
     connections: tuple[ConnectionInfo, ...]
     confirmed: bool
     """Whether the robot has received the last stop."""
@@ -267,7 +267,7 @@ class CommandAsked(ApiMessage, frozen=True):
     """Number of STOP presses last known to the program; the command is refused after a newer
     STOP."""
     session: _Word = ""
-    """Session secret from the lease answer; "" if the program has no lease."""
+    """Session secret from the lease response; "" if the program has no lease."""
 
 
 class CommandAnswer(ApiMessage, frozen=True):
@@ -287,12 +287,12 @@ class LeaseAsked(ApiMessage, frozen=True):
     session: _Word = ""
     """Secret of an open session; "" opens a new session."""
     stops: int | None = None
-    """Number of STOP presses, as stated in the last answer. A reset is refused if STOP has been
+    """Number of STOP presses, as stated in the last response. A reset is refused if STOP has been
     pressed again since then; null means the current number."""
 
 
 class MotionNotice(ApiMessage, frozen=True):
-    """A notice about the controls since the last answer."""
+    """A notice about the controls since the last response."""
 
     kind: Literal["refused", "stopped"]
     about: str
@@ -325,18 +325,18 @@ class LeaseAnswer(ApiMessage, frozen=True):
     idle_s: float
     """How long the session stays open after the last request."""
     notices: tuple[MotionNotice, ...] = ()
-    """Notices since the last answer."""
+    """Notices since the last response."""
 
 
 class MotionAsked(ApiMessage, frozen=True):
     """The newest input for a held command. A pause longer than the lease stops the robot."""
 
     session: _Word
-    """Session secret from the lease answer."""
+    """Session secret from the lease response."""
     command: _Word
     """Name of a held command."""
     epoch: _Count
-    """Number of the lease, from the lease answer."""
+    """Number of the lease, from the lease response."""
     number: _Count
     """Number of this input; each new input for the command needs a higher number than the last."""
     beat: _Count
@@ -357,7 +357,7 @@ class MotionAnswer(ApiMessage, frozen=True):
     queued: bool
     """Whether the input is delayed by a few milliseconds because inputs arrive too fast."""
     notices: tuple[MotionNotice, ...] = ()
-    """Notices since the last answer."""
+    """Notices since the last response."""
 
 
 class RecordingInfo(ApiMessage, frozen=True):

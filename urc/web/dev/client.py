@@ -169,7 +169,7 @@ class DevClient:
                     self._push(note_row(one))
             if tap.dropped > dropped:
                 lost, dropped = tap.dropped - dropped, tap.dropped
-                text = f"rows of traffic lost, because the server cannot keep up: {lost}"
+                text = f"traffic rows lost because the server cannot keep up: {lost}"
                 self._push(note_row(self._log_entry(text)))
 
     def _log_entry(self, text: str) -> LogEntry:

@@ -156,7 +156,7 @@ def _in_words(step: sequence.Step) -> str:
         case sequence.SetStep(values):
             return f"sets {', '.join(values)}"
         case sequence.IfStep(condition):
-            return f"continues if {condition.source}, else runs the steps under 'else'"
+            return f"continues if {condition.source}; otherwise runs the steps under 'else'"
         case sequence.FailStep():
             return "ends without success"
         case sequence.RunStep(command) | sequence.SendStep(command):

@@ -104,5 +104,5 @@ def _fill_bytes(row: TrafficRow, data: bytes) -> None:
 
 
 def grouped(number: int) -> str:
-    """Return a number with a narrow space between thousands: ``12 345``."""
+    """Return a number with narrow spaces as thousands separators: ``12 345``."""
     return f"{number:,}".replace(",", "\u202f")

@@ -109,7 +109,7 @@ class DevStart:
             self._take(name, robot)
         except (UrcError, OSError) as error:
             return told(422, str(error).strip().partition("\n")[0])
-        return answer(ReloadResult(t("read anew"), f"/robots/{quote(name, safe='')}/"))
+        return answer(ReloadResult(t("reloaded"), f"/robots/{quote(name, safe='')}/"))
 
     def _read(self, name: str) -> Robot:
         return self._remake[name](open_document(self._fleet.robots[name].profile.file))
@@ -119,7 +119,7 @@ def no_dev_start() -> list[ProtectedRoute]:
     """Return a route for servers without ``--dev``, which explains how to enable the page."""
 
     async def tell(_: Request) -> Response:
-        raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))
+        raise HTTPException(404, t("This page is disabled. Start URC with --dev to enable it."))
 
     return [ProtectedRoute("/dev", tell, SIGNED_IN)]
 

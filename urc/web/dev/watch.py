@@ -116,7 +116,7 @@ class ProfileWatch:
             self._report("broken", "cannot be used; the previous version keeps running")
         elif found.profile.name != name:
             self._next = None
-            text = f"has the new name {found.profile.name!r}; {name!r} keeps running: restart URC"
+            text = f"has the new name {found.profile.name!r}; {name!r} runs until URC restarts"
             self._report("broken", text)
         else:
             self._next = found.profile

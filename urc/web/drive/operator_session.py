@@ -50,7 +50,7 @@ class OperatorSession:
         self.on_role: set[Callable[[], None]] = set()
         """Callbacks for changes of the role in `client`."""
         self.notices: dict[str, str] = {}
-        """Newest notice about each control or verb, by name."""
+        """Newest notice about each control or lease request, by name."""
         self.seen = -1
         """Number of the newest lease sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}

@@ -76,7 +76,7 @@ class SocketFlow:
     # Called by the protocol
 
     def connected(self, transport: asyncio.Transport) -> None:
-        """Store the transport; request a callback for when the kernel accepts no more bytes."""
+        """Store the transport; request a callback when the kernel accepts no more bytes."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 

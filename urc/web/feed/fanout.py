@@ -34,9 +34,9 @@ class FanoutPosition(NamedTuple):
     revision: int = 0
     """Hub revision of the client's newest values."""
     links: int = 0
-    """Number of link state changes up to the client's newest link states."""
+    """Number of link state changes covered by the client's link states."""
     progress: int = 0
-    """Number of sequence progress changes up to the client's newest sequence states."""
+    """Number of sequence progress changes covered by the client's sequence states."""
     notes: int = 0
     """Number of log lines sent to the client or dropped."""
     joined: int = 0
@@ -100,7 +100,7 @@ class Fanout:
         """Hub revision at the last flush. Newer values wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
-        """Hub revision of the encoded `_updates`."""
+        """Hub revision for which `_updates` were encoded."""
         self._due: Timer | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None

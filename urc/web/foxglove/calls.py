@@ -78,7 +78,7 @@ class FoxgloveCalls:
         return as_json(values)
 
     def press_stop(self, offer: Offer) -> None:
-        """Stop a robot and latch its STOP, before the method returns; raise `ApiError`."""
+        """Stop a robot and latch its STOP before returning; raise `ApiError` if it cannot move."""
         press_stop(offer.name, offer.service, self._visitor(offer.name), self._recorder)
 
     async def delivered_stop(self, offer: Offer) -> bytes:

@@ -1,8 +1,9 @@
-"""One client of the Foxglove server: channels and services in, subscriptions and calls out.
+"""One client of the Foxglove server, with its subscriptions and service calls.
 
 Layer 5. One task reads, another writes, and each robot with subscriptions has a task that keeps the
-robot connected. The writer sends messages while the kernel accepts them. Meanwhile, newer readings
-replace older ones. A client that reads nothing for `STALL_S` seconds is disconnected.
+robot connected. The writer sends messages while the kernel accepts them. While the writer waits,
+old readings are dropped in favour of new ones. A client that reads nothing for `STALL_S` seconds is
+disconnected.
 """
 
 import asyncio
@@ -29,8 +30,8 @@ from urc.wire import foxglove as wire
 __all__ = ["CALLS_AT_ONCE", "MESSAGES_PER_S", "MOST_FAULTS", "FoxgloveClient"]
 
 MESSAGES_PER_S: Final = 500
-"""Maximum rate of messages from a client; a higher rate closes the socket. A viewer subscribes to
-each of its topics with a message of its own."""
+"""Maximum rate of messages from a client; a higher rate closes the socket. A viewer sends a
+separate message for each topic that it subscribes to."""
 MOST_FAULTS: Final = 32
 """Number of invalid messages that closes the socket."""
 CALLS_AT_ONCE: Final = 16
@@ -39,7 +40,7 @@ MOST_ENDED: Final = 4096
 """Maximum number of stored subscriptions that ended together with their channels."""
 STALL_S: Final = 15.0
 RETRY_S: Final = 1.0
-"""Interval between attempts to open a robot's session, and between looks for other robots."""
+"""Interval between attempts to open a session, and between checks for changed robots."""
 GOODBYE_S: Final = 2.0
 _BURST: Final = 64
 """Maximum number of messages that are sent before other tasks run."""
@@ -66,10 +67,10 @@ class FoxgloveClient:
         Args:
             line: the accepted socket.
             flow: flow control of the socket.
-            offers: what the server offers to the visitor.
-            calls: the execution of the visitor's calls.
+            offers: the robots, channels and services that are offered to the visitor.
+            calls: object that runs the visitor's calls.
             clock: the clock.
-            session: identifier of this start of the server.
+            session: identifier that changes each time the server starts.
         """
         self._line = line
         self._flow = flow
@@ -80,7 +81,7 @@ class FoxgloveClient:
         self._outbox = Outbox(self._news.set, clock.now)
         self._outbox.announce([wire.encode_server_info("URC", __version__, session)])
         self._subscriptions: dict[int, tuple[Offer, int]] = {}
-        """Robot and channel, by the client's id of the subscription."""
+        """Robot and channel, by the client's subscription id."""
         self._ended: dict[int, None] = {}
         """Subscriptions that ended with their channels; the client may still unsubscribe them."""
         self._running: set[asyncio.Task[None]] = set()
@@ -112,7 +113,7 @@ class FoxgloveClient:
             self._flow.abort()
 
     def recheck(self) -> None:
-        """Apply a change of the visitor's rights, or of the served robots."""
+        """Apply changes to the visitor's rights or to the served robots."""
         if self._closing:
             return
         if not self._offers.is_let_in:
@@ -124,7 +125,7 @@ class FoxgloveClient:
         self._outbox.announce(changes.texts)
 
     async def _watch(self) -> None:
-        """Look for added, removed and changed robots until cancelled."""
+        """Check for added, removed and changed robots until cancelled."""
         while True:
             await self._clock.sleep(RETRY_S)
             if self._offers.is_outdated:
@@ -158,7 +159,7 @@ class FoxgloveClient:
                 await self._news.wait()
 
     def _send(self) -> bool:
-        """Send messages while the kernel accepts them; return whether messages may be left."""
+        """Send messages while the kernel accepts them; return whether messages may remain."""
         frames = self._outbox.frames(has_messages=not self._closing)
         for _ in range(_BURST):
             if not self._flow.is_free():
@@ -209,7 +210,7 @@ class FoxgloveClient:
         self._count_all(faults)
 
     def _subscribed(self, subscription: int, channel: int) -> str:
-        """Begin one subscription; return the fault in the request, or ""."""
+        """Start one subscription; return the error in the request, or ""."""
         if subscription in self._subscriptions:
             return f"the subscription {subscription} already exists"
         found = self._offers.channels.get(channel)
@@ -280,7 +281,7 @@ class FoxgloveClient:
         return found is not None and found[1].command == STOP
 
     def _stop(self, said: wire.ServiceCall) -> None:
-        """Press STOP now; the answer follows when the robot has received it."""
+        """Press STOP now; respond when the robot has received it or a short wait has ended."""
         offer, _ = self._offers.services[said.service]
         try:
             self._calls.press_stop(offer)
@@ -326,7 +327,7 @@ class FoxgloveClient:
 
     def _answer(self, data: bytes, *, is_text: bool) -> None:
         if not self._outbox.answer(data, is_text=is_text):
-            self._close(CLOSE_TOO_FAST, "the client does not read its answers")
+            self._close(CLOSE_TOO_FAST, "the client does not read its responses")
 
     def _close(self, code: int, reason: str) -> None:
         """Close the socket as soon as the reason is sent."""

@@ -1,7 +1,7 @@
 """The channels and services that the server offers to one visitor, by the visitor's current rights.
 
-Layer 5. Pure, except for the tasks that the client adds. Channels and services have ids from one
-counter, so an id is never used again.
+Layer 5. Pure, except for the tasks that the client adds. Channel and service ids come from one
+counter, so no id is ever reused.
 """
 
 import asyncio
@@ -31,9 +31,9 @@ class RobotContents(NamedTuple):
 
 
 class RobotCatalogue:
-    """The contents of all robots, made once for all clients.
+    """The topics and services of all robots, created once for all clients.
 
-    Making the contents of a hundred robots takes longer than driven robots may wait.
+    Creating them for a hundred robots takes longer than a driven robot can wait.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class RobotCatalogue:
         self._known: WeakKeyDictionary[RobotService, RobotContents] = WeakKeyDictionary()
 
     def of(self, name: str, service: RobotService) -> RobotContents:
-        """Return the contents of a robot's current version; the playback has no services."""
+        """Return the topics and services of a robot's version; a playback has no services."""
         robot, known = service.robot, self._known.get(service)
         if known is None or known.robot is not robot:
             is_played = robot.playback is not None
@@ -54,7 +54,7 @@ class RobotCatalogue:
 
 
 class OfferSource(NamedTuple):
-    """The robots, seen by one visitor."""
+    """The robots, with one visitor's rights."""
 
     services: Callable[[], Mapping[str, RobotService]]
     """Function that returns the robots, keyed by their names in URLs."""
@@ -63,11 +63,11 @@ class OfferSource(NamedTuple):
     is_let_in: Callable[[], bool]
     """Function that returns whether the visitor has any role."""
     peer: Callable[[str, RobotService], SocketPeer]
-    """Function that returns the visitor with the rights for a robot."""
+    """Function that returns the visitor with their rights for a robot."""
     messages: Callable[[Hub, str, RobotService], HubMessages]
     """Function that returns the messages of a hub, shared by all clients."""
     catalogue: RobotCatalogue
-    """The contents of the robots, shared by all clients."""
+    """The robots' topics and services, shared by all clients."""
 
 
 class Offer:
@@ -92,7 +92,7 @@ class Offer:
         self.services: dict[str, int] = {}
         """Ids of the services, keyed by command."""
         self.allowed: frozenset[str] | None = None
-        """The commands that the visitor may run, and STOP; none until the services are offered."""
+        """STOP and the commands that the visitor may run; None until the services are offered."""
 
     @property
     def role(self) -> Role | None:
@@ -110,7 +110,7 @@ class Changes(NamedTuple):
 
 
 class Offers:
-    """Everything that is offered to one visitor."""
+    """The robots, channels and services that are offered to one visitor."""
 
     def __init__(self, source: OfferSource) -> None:
         """Start without offers; `update` adds them."""
@@ -147,7 +147,7 @@ class Offers:
         return self._source.messages(hub, offer.name, offer.service)
 
     def update(self, ready: Callable[[str, RobotFeed], None]) -> Changes:
-        """Compare the offers with the robots and the visitor's rights, and apply the differences.
+        """Update the offers to match the robots and the visitor's rights; return the changes.
 
         Args:
             ready: function that is called with a robot's name and its feed when a message of the

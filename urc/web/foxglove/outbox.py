@@ -1,7 +1,7 @@
-"""Everything that waits to be sent to one Foxglove client, in the order of sending.
+"""The frames to be sent to one Foxglove client, in order.
 
-Layer 5. Pure. Announcements come first, then answers, then statuses, then the messages of the
-robots, which take turns. Each kind is bounded.
+Layer 5. Pure. Announcements are sent first, then responses, then statuses, then the robots'
+messages, one robot at a time in turn. The number of frames of each kind is limited.
 """
 
 from collections import deque
@@ -15,7 +15,7 @@ from urc.wire import foxglove as wire
 __all__ = ["DROPPED_EVERY_S", "MOST_ANSWERS", "Outbox"]
 
 MOST_ANSWERS: Final = 32
-"""Maximum number of answers that wait to be read; a further answer closes the socket."""
+"""Maximum number of unsent responses; one more response closes the socket."""
 DROPPED_EVERY_S: Final = 10.0
 """Minimum time between two reports of dropped messages, in seconds."""
 
@@ -39,7 +39,7 @@ class Outbox:
         self._warned: dict[str, str] = {}
         """Text of each robot's status, until the status is withdrawn."""
         self._ready: dict[str, RobotFeed] = {}
-        """Robots with waiting messages; the first is next."""
+        """Robots with unsent messages; the first robot is next."""
         self._dropped = 0
         self._told_dropped = 0
         self._told_dropped_s = float("-inf")
@@ -54,7 +54,7 @@ class Outbox:
             self._wake()
 
     def answer(self, data: bytes, *, is_text: bool) -> bool:
-        """Add an answer to a call; return whether there is room for it."""
+        """Add the response to a call; return False if too many responses are unsent."""
         if len(self._answers) >= MOST_ANSWERS:
             return False
         self._answers.append((data, is_text))
@@ -80,12 +80,12 @@ class Outbox:
             self._wake()
 
     def ready(self, robot: str, feed: RobotFeed) -> None:
-        """Note that a message of a robot is ready."""
+        """Record that a message of a robot is ready."""
         self._ready.setdefault(robot, feed)
         self._wake()
 
     def forget(self, robot: str, feed: RobotFeed) -> None:
-        """Drop the waiting messages of a robot that is no longer offered."""
+        """Drop the unsent messages of a robot that is no longer offered."""
         self._ready.pop(robot, None)
         self._dropped += feed.take_dropped()
         self.end_warning(robot)
@@ -93,7 +93,7 @@ class Outbox:
     # What is sent
 
     def frames(self, *, has_messages: bool) -> Iterator[bytes]:
-        """Remove and yield WebSocket frames; `has_messages` includes messages of the robots."""
+        """Remove and yield WebSocket frames; `has_messages` includes the robots' messages."""
         while (frame := self._next(has_messages=has_messages)) is not None:
             yield frame
             self._report_dropped()
@@ -117,9 +117,9 @@ class Outbox:
         return None
 
     def _report_dropped(self) -> None:
-        """Tell the client how many messages it has missed, from time to time."""
+        """Report the number of dropped messages, at most once per `DROPPED_EVERY_S`."""
         now_s = self._now()
         if self._dropped > self._told_dropped and now_s >= self._told_dropped_s + DROPPED_EVERY_S:
             self._told_dropped, self._told_dropped_s = self._dropped, now_s
-            text = f"{self._dropped} messages were dropped, because this client reads too slowly"
+            text = f"{self._dropped} messages were dropped because this client reads too slowly"
             self.tell("dropped", text)

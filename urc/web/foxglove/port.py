@@ -1,4 +1,4 @@
-"""A port of its own for the Foxglove server, for viewers that expect an address without a path.
+"""A separate port for the Foxglove server, for viewers that expect an address without a path.
 
 Layer 5. The port belongs to the dashboard's server, so its sign-in, certificates and limits apply.
 Only the path differs: on this port, each WebSocket is a Foxglove client.
@@ -16,7 +16,7 @@ _TEXT = "This port is for viewers that speak the Foxglove WebSocket protocol.\n"
 
 
 class FoxglovePort:
-    """One further port of a server, and the middleware that recognises its requests."""
+    """An additional port of a server, with the middleware that recognises the port's requests."""
 
     def __init__(self, wanted: int) -> None:
         """Choose the port.
@@ -35,7 +35,7 @@ class FoxglovePort:
         self.port = port
 
     def around(self, app: ASGIApp) -> ASGIApp:
-        """Return an application that serves Foxglove clients on this port and `app` on others."""
+        """Return an application that serves Foxglove on this port and `app` on all others."""
 
         async def serve(scope: Scope, receive: Receive, send: Send) -> None:
             if scope["type"] == "lifespan" or (scope.get("server") or ("", 0))[1] != self.port:

@@ -1,6 +1,6 @@
-"""One client's subscriptions to one robot's topics, with the messages that wait to be sent.
+"""One client's subscriptions to one robot's topics, with the unsent messages.
 
-Layer 5. The waiting messages are bounded: a few readings of each signal, the newest image and the
+Layer 5. The unsent messages are limited to a few readings of each signal, the newest image and the
 newest state of each connection. If a client reads too slowly, older readings are dropped and
 counted. Other clients are not affected.
 """
@@ -18,7 +18,7 @@ from urc.wire.foxglove import encode_message_head
 __all__ = ["FIRST_NOTES", "MOST_WAITING", "RobotFeed"]
 
 MOST_WAITING: Final = 16
-"""Maximum number of waiting readings per signal; of images, only the newest waits."""
+"""Maximum number of unsent readings per signal; for an image signal, only the newest is kept."""
 FIRST_NOTES: Final = 50
 """Number of earlier log entries that a new subscription receives."""
 
@@ -32,16 +32,16 @@ class RobotFeed:
         self._ids: dict[TopicSource, int] = {}
         """The client's subscription ids."""
         self._waiting: dict[TopicSource, deque[Sample | TopicMessage]] = {}
-        """Readings and messages that wait to be sent, keyed by subscribed signal or place."""
+        """Unsent readings and messages, keyed by subscribed signal or slot."""
         self._sources: dict[str, list[TopicSource]] = {}
-        """Subscribed signals and places, keyed by signal that changes them."""
+        """Subscribed signals and slots, keyed by the signal that changes them."""
         self._ready: dict[TopicSource, None] = {}
-        """Sources with waiting messages; the first is the next to be sent."""
+        """Sources with unsent messages; the first source is next."""
         self._seen_notes = 0
         self._seen_links: dict[str, LinkStatus] = {}
-        """Newest state of each subscribed connection that was sent."""
+        """Last state sent for each subscribed connection."""
         self._links_count = 0
-        """Number of changes of connections that were noted."""
+        """Number of connection changes that have been checked."""
         self._dropped = 0
         self._hub: Hub | None = None
         self._messages: HubMessages | None = None
@@ -56,11 +56,11 @@ class RobotFeed:
         return source in self._ids
 
     def subscribe(self, source: TopicSource, subscription: int, signal: Signal | None) -> None:
-        """Begin to collect messages; the newest known value is the first message.
+        """Start collecting messages; the newest known value is the first message.
 
         Args:
             source: origin of the messages.
-            subscription: the client's id of the subscription.
+            subscription: the client's subscription id.
             signal: the signal, if the source is a signal.
         """
         self._ids[source] = subscription
@@ -72,7 +72,7 @@ class RobotFeed:
             self._begin(source, self._hub)
 
     def unsubscribe(self, source: TopicSource) -> None:
-        """Drop a subscription and its waiting messages."""
+        """Drop a subscription and its unsent messages."""
         self._ids.pop(source, None)
         self._ready.pop(source, None)
         self._waiting.pop(source, None)
@@ -116,7 +116,7 @@ class RobotFeed:
     # -- events of the hub
 
     def _sort(self) -> None:
-        """Find the subscribed signals and places that each signal changes."""
+        """Find the subscribed signals and slots that each signal changes."""
         self._sources = {}
         for source in self._waiting:
             names = {source.name}
@@ -126,7 +126,7 @@ class RobotFeed:
                 self._sources.setdefault(name, []).append(source)
 
     def _arrived(self, samples: Sequence[Sample]) -> None:
-        """Collect the subscribed signals' readings, and the places that they change."""
+        """Collect the readings of subscribed signals, and the messages of changed slots."""
         places: dict[TopicSource, None] = {}
         for sample in samples:
             for source in self._sources.get(sample.signal, ()):
@@ -150,7 +150,7 @@ class RobotFeed:
                 self._push(source, message)
 
     def _changed(self) -> None:
-        """Note a new log entry or a new state of a connection."""
+        """Queue a new log entry or a new connection state."""
         hub = self._hub
         if hub is None:
             return
@@ -162,7 +162,7 @@ class RobotFeed:
                 self._look(source, hub)
 
     def _look(self, source: TopicSource, hub: Hub) -> None:
-        """Note the state of a connection if it is new."""
+        """Queue the state of a connection if it is new."""
         if source.kind == "link":
             status = hub.links.get(source.name)
             if status is not None and status is not self._seen_links.get(source.name):

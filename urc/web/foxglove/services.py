@@ -1,8 +1,8 @@
 """A robot's commands as Foxglove services.
 
-Layer 5. Pure. Held commands are not offered, because a call cannot say that the operator has let
-go. STOP is a service of every robot that can move. Its name is in capitals, so no command can have
-the same name.
+Layer 5. Pure. Held commands are not offered, because a call cannot report that the operator has
+released the control. STOP is a service of every robot that can move. Its name is in capitals, so no
+command can have the same name.
 """
 
 import json
@@ -21,7 +21,7 @@ __all__ = ["CONFIRMED", "STOP", "BadRequest", "RobotServiceType", "request_of", 
 
 STOP: Final = "STOP"
 CONFIRMED: Final = "_confirmed"
-"""Field of a request that states that a person has confirmed the command. No argument can have this
+"""Request field that states whether a person has confirmed the command. No argument can have this
 name, because the names of arguments begin with a letter."""
 
 _arguments: Final = msgspec.json.Decoder(dict[str, Any])
@@ -47,7 +47,7 @@ class RobotServiceType(NamedTuple):
 def robot_services(robot: str, driver: Driver) -> tuple[RobotServiceType, ...]:
     """Return the services of a robot, whose name in URLs is `robot`, for a visitor with all roles.
 
-    A visitor is offered `STOP` and the commands that the visitor may run.
+    Each visitor is offered `STOP` and only the commands that the visitor may run.
     """
     found = [
         _service(robot, one, driver)
@@ -66,7 +66,7 @@ def request_of(data: bytes) -> tuple[Arguments, bool]:
     """Return a request's arguments and whether a person has confirmed the command.
 
     Args:
-        data: JSON text; no text means no arguments.
+        data: JSON text; empty text means no arguments.
 
     Raises:
         BadRequest: the text is not a JSON object of plain arguments.

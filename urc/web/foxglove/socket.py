@@ -118,7 +118,7 @@ class TokenInAddress:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Call the application; the rest of the application never sees the token's parameter."""
+        """Call the application, with the token in a header instead of the query."""
         if scope["type"] == "websocket" and scope["path"] == PATH:
             scope = _with_token(scope)
         await self._app(scope, receive, send)

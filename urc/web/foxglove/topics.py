@@ -94,15 +94,15 @@ class HubMessages:
         self._utc_ns = utc_ns
         self._newest: dict[str, tuple[Sample, TopicMessage]] = {}
         self._newest_places: dict[str, tuple[int, TopicMessage | None]] = {}
-        """Hub revision and message of each place."""
+        """Hub revision and newest message of each slot."""
 
     def signals_of(self, slot: str) -> Collection[str]:
-        """Return the signals that change a place."""
+        """Return the signals that change the message of a slot."""
         place = self._places.get(slot)
         return place.inputs.values() if place is not None else ()
 
     def of_place(self, slot: str, hub: Hub) -> TopicMessage | None:
-        """Return the newest message of a place; None without a value."""
+        """Return the newest message of a slot; None without a value."""
         known = self._newest_places.get(slot)
         if known is not None and known[0] == hub.revision:
             return known[1]

@@ -230,19 +230,19 @@ class ManageRoutes:
 
     @_api
     async def install(self, request: Request) -> Response:
-        """Start a job to download a named package and list its permissions."""
+        """Start a job that downloads a named package and lists its permissions."""
         said = await body_of(request, InstallRequest)
         return self._begun(parse_requirement(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Start a job for the package at a path in a repository or on this machine."""
+        """Start a job that adds the package at a path in a repository or on this machine."""
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
     @_api
     async def upload(self, request: Request) -> Response:
-        """Start a job for the uploaded package, bundle or interface in the request body."""
+        """Start a job that adds the package, bundle or interface in the request body."""
         if request.headers.get("content-type") != "application/octet-stream":
             raise ApiError(415, "expected a body of type application/octet-stream")
         name = request.query_params.get("name", "")[:200]
@@ -254,7 +254,7 @@ class ManageRoutes:
 
     @_api
     async def update(self, request: Request) -> Response:
-        """Start a job to download the newest version of a package and list the changes."""
+        """Start a job that downloads the newest version of a package and lists the changes."""
         said = await body_of(request, InstallRequest)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
 
