@@ -394,7 +394,7 @@ async def test_a_reset_holds_against_a_widget_that_stops_by_itself(
         new_page.allow(page, is_told)
         await page.goto(f"{address}robots/puppet/")
         remark = page.locator(f"{cell(page, 'nervous', uses)} .urc-remark")
-        await expect(remark).to_contain_text("pressed STOP by itself", timeout=SLOW_MS)
+        await expect(remark).to_contain_text("pressed STOP, not you", timeout=SLOW_MS)
         stop = page.locator(STOP)
         await expect(stop).not_to_have_attribute("data-phase", "", timeout=SLOW_MS)
         await page.get_by_role("button", name="Reset").click()

@@ -108,7 +108,7 @@ async def test_connection_to_a_repository(
         if is_on:
             place = page.locator(f"[data-repository='{url}']")
             await expect(place.get_by_role("heading")).to_have_text("Lab")
-            await expect(place).to_contain_text("● 5 versions of packages")
+            await expect(place).to_contain_text("● 5 package versions")
             await expect(row(page, "available", "drivers/rover")).to_contain_text("rover 1.0.0")
             await page.get_by_label("Search").fill("no such thing")
             await expect(page.locator("[data-count]")).to_have_text("0 found")

@@ -222,7 +222,7 @@ class RobotInfo(ApiMessage, frozen=True):
 
     robot: RobotSummary
     missing: tuple[str, ...]
-    """Names of required settings without a value; URC connects only if there are none."""
+    """Names of required settings without a value; URC connects only after all of them are set."""
     connections: tuple[ConnectionInfo, ...]
     confirmed: bool
     """Whether the robot has received the last stop."""

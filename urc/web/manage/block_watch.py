@@ -1,6 +1,7 @@
-"""A watch over the block lists that stops and disables robots with blocked packages.
+"""A watcher of the block lists, which stops and disables robots with blocked packages.
 
-Layer 5. Imports on the command line and this watch's hourly requests change the lists.
+Layer 5. The lists change through imports on the command line and through this watcher's hourly
+requests.
 """
 
 import asyncio
@@ -27,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 class BlockWatch:
-    """The watch over the block lists for one dashboard."""
+    """The watcher of the block lists for one dashboard."""
 
     def __init__(
         self,
@@ -54,7 +55,7 @@ class BlockWatch:
         self._own_interfaces = own_interfaces
         self._ask = ask
         self._disabled: dict[str, Robot] = {}
-        """Robots disabled by this watch, by name."""
+        """Robots disabled by this watcher, by name."""
 
     async def run(self, changed: Callable[[], Awaitable[None]]) -> None:
         """Watch until cancelled.
@@ -80,7 +81,7 @@ class BlockWatch:
             seen = stamp
 
     async def enforce(self) -> None:
-        """Stop and disable robots with a blocked package; enable disabled robots without one.
+        """Stop and disable robots with a blocked package; enable them again after unblocking.
 
         Raises:
             UrcError: the lists cannot be read. No robot was changed.

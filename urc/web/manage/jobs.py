@@ -33,7 +33,7 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Maximum number of changes to the frames sent to the robot that are reported."""
+"""Maximum number of reported changes to the frames that are sent to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
 """Maximum number of abandoned threads that are still waiting for a server."""
@@ -53,7 +53,7 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """The package's uses of this machine's resources without a setting."""
+    """Accesses of the package to this machine that no setting controls."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
@@ -192,7 +192,8 @@ class Jobs:
 
         Args:
             number: number of the job.
-            takes_risks: whether the user also approved the package's own access to this machine.
+            takes_risks: whether the user also approved the accesses to this machine that no setting
+                controls.
             unsigned: names of unsigned packages that the user accepts.
 
         Raises:
@@ -205,7 +206,7 @@ class Jobs:
             raise Busy("no job is waiting for approval: start a new job")
         if planned.risks and not takes_risks:
             raise PackageError(
-                f"{planned.plan.lock} has its own access to this machine: approve this access too"
+                f"{planned.plan.lock} accesses this machine beyond its settings: approve this too"
             )
         plan = planned.plan._replace(waived=frozenset(unsigned))
         if lacks := [one for one in planned.unsigned if one not in plan.waived]:

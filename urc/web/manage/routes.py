@@ -84,7 +84,7 @@ def manage_page(
             t("Drivers"),
             t(
                 "A driver connects URC to one kind of robot."
-                " Its widgets and interfaces come with it."
+                " Its widgets and interfaces are installed with it."
             ),
         ),
         "interfaces": (
@@ -226,7 +226,7 @@ class ManageRoutes:
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
         self._record(request, "repository remove", [said.url])
-        return answer(ResultLine(t("forgotten; installed packages stay")))
+        return answer(ResultLine(t("removed; installed packages remain")))
 
     @_api
     async def install(self, request: Request) -> Response:
@@ -279,7 +279,7 @@ class ManageRoutes:
         self._record(request, "remove", gone or [said.package])
         line = t("removed {names}", names=", ".join(gone))
         if not gone:
-            line = t("removed; its files stay, because another package needs them")
+            line = t("removed; its files remain, because another package needs them")
         return answer(RemovedPackages(tuple(gone), line))
 
     @_api

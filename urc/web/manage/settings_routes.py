@@ -219,7 +219,7 @@ class SettingsRoutes:
             try:
                 while not trying.done():
                     if _epoch(service) != epoch:
-                        raise Busy(t("STOP was pressed meanwhile: try again"))
+                        raise Busy(t("STOP was pressed during the test: try again"))
                     await asyncio.wait((trying,), timeout=_LOOK_S)
             finally:
                 trying.cancel()

@@ -67,7 +67,7 @@ def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
             data = opened.read(_BYTES + 1)
     except OSError as error:
         if path.is_dir():
-            raise PackageError(f"{path}: folder without {MANIFEST} or interface.yaml") from None
+            raise PackageError(f"{path}: found neither {MANIFEST} nor interface.yaml") from None
         raise PackageError(f"{path}: {error.strerror or error}") from None
     source = _wrapped(bare.name, data, installed)
     source.is_folder = True  # the user chose the file on this machine, so it is the user's own

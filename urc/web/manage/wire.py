@@ -81,7 +81,7 @@ class JobDecision(ManageMessage, frozen=True):
 
     number: int
     takes_risks: bool = False
-    """Whether the user also approved the package's own access to this machine."""
+    """Whether the user also approved the accesses to this machine that no setting controls."""
     unsigned: Annotated[tuple[_Short, ...], msgspec.Meta(max_length=128)] = ()
     """Unsigned packages that the user accepts, such as ``widgets/dial``."""
 
@@ -106,8 +106,8 @@ class JobNews(ManageMessage, frozen=True):
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """The package's access to this machine without a setting; for an update, only additional
-    access."""
+    """Accesses to this machine that no setting controls; for an update, only additional
+    accesses."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""

@@ -34,7 +34,7 @@ from urc.web.words import t
 
 __all__ = ["AccountRoutes"]
 
-LINK_OVER = "this link is unknown or has ended"
+LINK_OVER = "this link is unknown or has expired"
 
 
 class AccountRoutes:
@@ -70,7 +70,7 @@ class AccountRoutes:
         who = self._control.identify(said.code)
         if who == NOBODY or who.way != "link":
             self._sign_ins.failed(request, "link", AccessError(LINK_OVER))
-            raise ApiError(403, t("This link is unknown or has ended."))
+            raise ApiError(403, t("This link is unknown or has expired."))
         (grant,) = self._control.directory.principals[who.principal].grants
         done = answer(GuestResult(f"/robots/{grant.scope}/"))
         self._sign_ins.admit(request, done, said.code)

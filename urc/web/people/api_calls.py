@@ -89,7 +89,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "people/invite",
         ADMINISTER_FRESH,
-        "Make a link for a person to choose a passphrase.",
+        "Create a link for a person to choose a passphrase.",
         told.SecretLink,
         told.PrincipalChoice,
     ),
@@ -124,7 +124,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "devices/pair",
         ADMINISTER_FRESH,
-        "Make a code that pairs one device.",
+        "Create a code that pairs one device.",
         told.PairingCode,
         told.PairingRequest,
     ),
@@ -138,7 +138,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "guests/add",
         ADMINISTER_FRESH,
-        "Make a link for guests to watch one robot.",
+        "Create a link for guests to watch one robot.",
         told.SecretLink,
         told.GuestRequest,
     ),
@@ -154,7 +154,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "account/devices/pair",
         SIGNED_IN_FRESH,
-        "Make a code that pairs one of your devices.",
+        "Create a code that pairs one of your devices.",
         told.PairingCode,
     ),
     PeopleCall(

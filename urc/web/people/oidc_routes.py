@@ -41,7 +41,7 @@ class ProviderPage:
 
 
 class OidcRoutes:
-    """The routes for signing in with a provider; without one, both routes refuse requests."""
+    """The routes for signing in with a provider; without a provider, both refuse requests."""
 
     def __init__(self, sign_ins: BrowserSignIns, provider: OidcSignIn | None) -> None:
         """Create the routes.

@@ -53,7 +53,7 @@ class Pairings:
                 one.begun = begun
 
     def state(self, name: str, now: float) -> PairingState:
-        """Return the state of a pairing; an unknown pairing counts as over."""
+        """Return the state of a pairing; an unknown pairing has the state ``over``."""
         one = self._known.get(name)
         if one is not None and one.begun is not None:
             device = one.begun.principal

@@ -1,4 +1,4 @@
-"""Requests and responses for the pages for sign-in and for visitors' own passkeys.
+"""Requests and responses for signing in with passkeys and for managing one's own passkeys.
 
 Layer 5. Pure.
 """

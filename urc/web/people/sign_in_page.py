@@ -51,7 +51,7 @@ class AccessPage:
     url: str
     """Path of the requested page; "" if the browser may not open it yet."""
     is_old: bool
-    """Whether the request had an invalid key; the page reports an invalid key first."""
+    """Whether the request had an invalid key, which the page then reports first."""
     path: str
     """Path and query of the page that opens after the sign-in. A browser that followed a link from
     another site sends no cookie. It sends the cookie once the user follows a link from this page to

@@ -1,7 +1,7 @@
 """The sign-in methods of one server and their routes.
 
-Layer 5. The start key, pairing and passphrases need no options. A provider and proxies need
-options.
+Layer 5. The start key, pairing and passphrases need no options; an identity provider and trusted
+proxies do.
 """
 
 from typing import NamedTuple

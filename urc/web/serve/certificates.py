@@ -92,7 +92,7 @@ class LocalCertificate:
         if authority.left_out:
             left_out = ", ".join(authority.left_out)
             notes.append(
-                f"the authority's limits exclude {left_out}; to make a new authority, use"
+                f"the authority's limits exclude {left_out}; to create a new one, use"
                 " --allow-host with this name"
             )
         return LoadedCertificate(
@@ -139,7 +139,7 @@ class GivenCertificate:
             text = f"--tls-key: {self._key} has a passphrase; expected a key without one"
             raise UrcError(text) from None
         except ssl.SSLError as error:
-            reason = error.reason or "the files do not belong together"
+            reason = error.reason or "the certificate and the key do not match"
             text = f"--tls-cert: cannot use {self._chain} with {self._key}: {reason}"
             raise UrcError(text) from error
         except (OSError, ValueError) as error:

@@ -1,8 +1,8 @@
 """A parser for WebSocket frames that each contain one whole text message, as almost all ticks do.
 
 Layer 5, pure. The parser only reads the bytes. The WebSocket library processes everything else in
-the same bytes: fragments, control frames and protocol errors. Of other frames, this module only
-counts the bytes to find the start of the next frame.
+the same bytes: fragments, control frames and protocol errors. For other frames, this module only
+counts the bytes, to find the start of the next frame.
 """
 
 from typing import Final

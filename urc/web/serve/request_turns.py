@@ -1,4 +1,4 @@
-"""Turns for all visitors' requests, so that a crowd does not delay a page's ticks.
+"""Turns for all visitors' requests, so that many requests do not delay a page's ticks.
 
 Layer 5. The event loop runs everything that is ready before it reads sockets again. Hundreds of
 requests that arrive together would therefore delay a tick by more than the duration of a lease.

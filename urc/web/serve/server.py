@@ -43,7 +43,7 @@ BACKLOG = 128
 
 
 class FurtherPort(Protocol):
-    """A further port of the server, which the application recognises."""
+    """An additional port of the server, which the application recognises."""
 
     wanted: int
     """TCP port; 0 lets the system choose one."""
@@ -81,7 +81,7 @@ async def serve(
         certificates: certificates for HTTPS; None for plain HTTP.
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
         handshakes: limits on unfinished handshakes; None for the default limits.
-        further: further ports on the same address.
+        further: additional ports on the same address.
 
     Raises:
         UrcError: the server cannot listen on the address.

@@ -17,7 +17,7 @@ __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
 """Maximum number of unfinished handshakes. Above the limit, the address with the most handshakes
-loses its oldest handshake without a whole message, or else its oldest handshake."""
+loses one: the oldest that has sent no whole message, or else the oldest."""
 HANDSHAKE_S = 5.0
 """Time limit from opening a connection to the end of its handshake, in seconds."""
 SHARE = 0.25

@@ -80,7 +80,7 @@ class WidgetContext:
     """Readable name of each output's command, by output name. Unbound outputs are omitted, so that
     a widget can omit their controls."""
     hazardous: tuple[str, ...] = ()
-    """Outputs whose command always asks a question that is answered with a slide."""
+    """Outputs whose command always requires a slide to confirm."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:

@@ -40,7 +40,7 @@ TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
 REST_COLUMNS = 3
 REST = "-rest"
-"""End of ``data-page`` while a small screen shows the slots that its grid lacks."""
+"""Suffix of ``data-page`` while a small screen shows the slots that its grid lacks."""
 LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
@@ -289,8 +289,8 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
     """Return the row sizes over a background.
 
     Next to a slot with several rows, such as a stick, only the first row grows. The widgets next to
-    the tall slot are therefore close together. On a low screen, rows that contain only shrinking
-    footprints, such as views, shrink.
+    the tall slot are therefore close together. On a phone in landscape, rows that contain only
+    shrinking footprints, such as views, shrink.
     """
     firm = _used((slot.row, slot.row_span) for slot in grid.slots if _is_firm(slot, canvas))
     lower = _used((slot.row + 1, slot.row_span - 1) for slot in grid.slots)
@@ -315,7 +315,7 @@ def _kinds(row: int, grid: Layout, canvas: _Canvas) -> set[str]:
 
 
 def _is_firm(slot: Slot, canvas: _Canvas) -> bool:
-    """Return whether a widget keeps its height on a low screen."""
+    """Return whether a widget keeps its height on a phone in landscape."""
     return canvas.footprints.get(slot.name, "") not in _SHRINKING
 
 

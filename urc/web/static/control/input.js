@@ -54,7 +54,7 @@ export class Input {
   watch() {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
     addEventListener("blur", all(t("the window lost focus")));
-    addEventListener("pagehide", all(t("the page was left")));
+    addEventListener("pagehide", all(t("you left the page")));
     // A rotation resizes the window, too, and some browsers report that first.
     let { angle } = screen.orientation ?? {};
     addEventListener("resize", () => {

@@ -37,7 +37,7 @@ const CAUSES = {
     cause: mark("URC has no permission to open {place}."),
     step: mark("Add the user that runs URC to the device's group."),
   },
-  "sign-in": { cause: mark("{place} refuses the sign-in."), step: mark("Check user name, password and key.") },
+  "sign-in": { cause: mark("{place} refuses the sign-in."), step: mark("Check the user name, password and key.") },
   tls: {
     cause: mark("URC cannot verify {place} over TLS."),
     step: mark("Check the certificate, and whether the port uses TLS."),
@@ -49,7 +49,7 @@ const CAUSES = {
   },
   login: {
     cause: mark("{place} does not answer the sign-in."),
-    step: mark("Check user name and password, and the kind of robot."),
+    step: mark("Check the user name and password, and the kind of robot."),
   },
   silent: {
     cause: mark("{place} accepts the connection, but sends nothing."),

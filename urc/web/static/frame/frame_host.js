@@ -272,7 +272,7 @@ export class FrameHost extends Cell {
     if (!isByHand && this.hasStopped) return;
     if (!this.stops.take(performance.now())) return;
     this.hasStopped = !isByHand;
-    if (!isByHand) this.remark(t("■ this widget pressed STOP by itself"));
+    if (!isByHand) this.remark(t("■ this widget pressed STOP, not you"));
     this.doors.stop.press();
   }
 

@@ -353,7 +353,7 @@ function giveUpCommands() {
 }
 
 backSafely(part(root, "[data-back]"), {
-  letGo: () => input.letGo(t("the page was left")),
+  letGo: () => input.letGo(t("you left the page")),
   isMine: () => drive.isMine,
   leave: () => void drive.say("leave"),
   close: () => socket.close(),

@@ -125,7 +125,7 @@ export function installedRow(one, act, remove) {
     line(one.fault && `▲ ${one.fault}`, "urc-bad"),
     ...one.withdrawn.map((text) => made("p", { class: "urc-bad" }, `▲ ${text}`)),
     line(one.fits.length ? t("offered on: {names}", { names: one.fits.join(", ") }) : ""),
-    line(one.kind === "interface" && !one.fits.length ? t("◆ fits none of the robots here") : "", "urc-caution"),
+    line(one.kind === "interface" && !one.fits.length ? t("◆ fits no robot on this server") : "", "urc-caution"),
     line(one.brings.length ? t("came with: {names}", { names: one.brings.join(", ") }) : ""),
     made(
       "div",
@@ -172,9 +172,9 @@ export function availableRow(one, act) {
 /** @param {Place} one @param {Act} act */
 export function placeRow(one, act) {
   const state = !one.fault
-    ? t("● {count} versions of packages", { count: one.count })
+    ? t("● {count} package versions", { count: one.count })
     : one.isKept
-      ? t("◆ not reached; its last index is used: {count} versions of packages", { count: one.count })
+      ? t("◆ unreachable; its last index is used: {count} package versions", { count: one.count })
       : t("▲ not reached");
   const kind = !one.fault ? "" : one.isKept ? "urc-caution" : "urc-bad";
   return made(
