@@ -260,7 +260,7 @@ async def test_a_right_that_ends_stops_the_robot(ended: str, tmp_path: Path) -> 
 async def test_a_robot_that_is_not_served_is_told(tmp_path: Path) -> None:
     """By the server's words."""
     async with carted(tmp_path) as (_, file), served_robot(file) as address:
-        with pytest.raises(ConnectionLost, match="no robot of that name is served here"):
+        with pytest.raises(ConnectionLost, match="this server has no robot with that name"):
             async with urc.client.open(address, "nix", token=KEY):
                 pytest.fail("it opened")
 

@@ -33,7 +33,7 @@ _SCHEMES: Final = {
         "type": "apiKey",
         "in": "cookie",
         "name": "urc-sign-in",
-        "description": "The sign-in of a browser; the cookie's name ends with an identifier."
+        "description": "The sign-in cookie of a browser; its name ends with an identifier."
         " A request that changes data also needs an Origin header that names this server.",
     },
 }

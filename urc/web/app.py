@@ -97,7 +97,7 @@ __all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
 _PAGE = {"cache-control": "no-store"}
 _LATE_S = 2.0
 """Interval between audit entries with counts of repeated events, in seconds."""
-_NO_ROBOT = "no robot of that name is served here"
+_NO_ROBOT = "this server has no robot with that name"
 
 
 @dataclass(frozen=True, slots=True)
@@ -433,7 +433,7 @@ class _Routes:
         kept = request.cookies.get(KEPT, "")
         interface = chosen(robot.profile, query.get("interface"), kept)
         if interface is None:
-            raise HTTPException(404, words.t("This robot has no interface of that name."))
+            raise HTTPException(404, words.t("This robot has no interface with that name."))
         visitor = visitor_of(request)
         is_dev = self.dev is not None and visitor.may(LOCAL)
         asked = RobotPageRequest(
@@ -504,7 +504,7 @@ class _Routes:
             await websocket.close(wire.CLOSE_NOT_LET_IN, WATCH.refusal)
             return name, None
         if service is None:
-            await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
+            await websocket.close(wire.CLOSE_NO_ROBOT, "this server has no robot with that name")
         return name, service
 
 

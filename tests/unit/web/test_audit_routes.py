@@ -211,7 +211,7 @@ def test_unknown_robot_has_no_timeline(client: TestClient) -> None:
     answer = client.get("/api/v1/robots/nobody/timeline")
     assert (answer.status_code, answer.json()["message"]) == (
         404,
-        "no robot of that name is served here",
+        "this server has no robot with that name",
     )
 
 

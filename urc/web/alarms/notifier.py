@@ -83,7 +83,7 @@ class AlarmNotifier:
 
     @property
     def count(self) -> NotifyCount:
-        """The counts of notifications so far."""
+        """The counts of notifications since the server started."""
         return NotifyCount(*(self._counts[one] for one in NotifyCount._fields))
 
     def queue(

@@ -36,7 +36,7 @@ class NotifyOptions:
     priority: AlarmPriority = "medium"
     """Lowest alarm priority that causes a notification."""
     has_returned: bool = False
-    """Whether to send notifications about returns to normal as well."""
+    """Whether to also send a notification when an alarm returns to normal."""
     timeout_s: float = 10.0
     """Longest duration of one attempt, in seconds."""
     tries: int = 3

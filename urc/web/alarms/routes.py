@@ -107,7 +107,7 @@ class AlarmCalls:
 
     @answers_errors
     async def alarms(self, request: Request) -> Response:
-        """Return all alarms of a robot outside the normal state."""
+        """Return a robot's alarms outside the normal state."""
         name, service = service_of(self._services(), request)
         alarms = service.alarms
         records = sorted(alarms.list.records.values(), key=by_urgency)
@@ -118,7 +118,7 @@ class AlarmCalls:
 
     @answers_errors
     async def history(self, request: Request) -> Response:
-        """Return the newest events of a robot's alarms, newest first."""
+        """Return the latest events of a robot's alarms, newest first."""
         _, service = service_of(self._services(), request)
         if self._store is None or service.robot.playback is not None:
             return answer(AlarmHistory((), has_more=False, fault="", lost=0))

@@ -48,7 +48,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     active: bool
     """Whether the value is abnormal, or the last known value was abnormal."""
     known: bool
-    """Whether the present value is known."""
+    """Whether the current value is known."""
     value: str
     """Value at the last change, as text."""
     unit: str
@@ -114,7 +114,7 @@ class AlarmOverview(AlarmMessage, frozen=True):
 
 
 class RobotAlarmList(AlarmMessage, frozen=True):
-    """All alarms of a robot outside the normal state, most urgent first."""
+    """A robot's alarms outside the normal state, most urgent first."""
 
     time: float
     """Current time on the server."""

@@ -1,4 +1,4 @@
-"""The table of all HTTP API calls: path, right, body, reply and errors.
+"""The table of all HTTP API calls: path, right, body, response and errors.
 
 Layer 5. Both the routes and the OpenAPI document are generated from this table, so they cannot
 differ. Only this module creates API routes, and each call declares the right that it requires.
@@ -226,7 +226,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms",
         f"{_ROBOT}/alarms",
         WATCH,
-        "The alarms of a robot outside the normal state, most urgent first. The call does not"
+        "A robot's alarms outside the normal state, most urgent first. The call does not"
         " connect to the robot.",
         RobotAlarmList,
     ),
@@ -257,8 +257,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "alarms_shelve",
         f"{_ROBOT}/alarms/shelve",
         DRIVE,
-        "Shelve alarms for at most 24 hours. At the end of this period, an active alarm is raised"
-        " again.",
+        "Shelve alarms for at most 24 hours. When shelving ends, an active alarm is raised again.",
         AlarmAction,
         ShelveAsked,
         "POST",
@@ -297,7 +296,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "audit_export",
         "/api/v1/audit/export",
         MAINTAIN_ANYWHERE,
-        "All visible entries of the audit log as JSON lines, oldest entry first.",
+        "All audit log entries that you may see, as JSON lines, oldest entry first.",
         None,
         errors=(404,),
         media=("application/jsonl",),
@@ -365,7 +364,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "settings",
         f"{_ROBOT}/settings",
         MAINTAIN_FRESH,
-        "Test the settings with the robot, then store and use them immediately.",
+        "Test the settings with the robot, then store and apply them.",
         SettingsAnswer,
         SettingsAsked,
         "POST",
@@ -375,7 +374,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "dev_start",
         f"{_ROBOT}/dev/start",
         LOCAL,
-        "Reload the documents of a robot; needs --dev.",
+        "Reload the documents of a robot; requires --dev.",
         ReloadResult,
         method="POST",
         errors=(409, 422),
@@ -501,7 +500,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "job_cancel",
         "/api/v1/job/cancel",
         MAINTAIN_SERVER,
-        "Cancel the job before it changes anything.",
+        "Cancel the job, unless its installation has started.",
         JobNews,
         JobDecision,
         "POST",

@@ -42,7 +42,7 @@ def summary(
         name: the robot's name in paths.
         service: the robot.
         role: the visitor's role for the robot.
-        times: times of the robot's last use and last data.
+        times: when the robot was last used and last sent data.
     """
     profile = service.robot.profile
     links = _links(service).values()
@@ -82,7 +82,7 @@ def robot_info(
         service: the robot.
         role: the visitor's role for the robot.
         may_give: function that returns whether the visitor's token permits a command.
-        times: times of the robot's last use and last data.
+        times: when the robot was last used and last sent data.
     """
     profile = service.robot.profile
     controller, links = service.controls.controller, _links(service)

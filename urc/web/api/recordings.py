@@ -133,10 +133,10 @@ class RecordingCalls:
         name = request.path_params["file"]
         match = _NAME.fullmatch(name)
         if self._folder is None or match is None or not self._may_read(request, match["robot"]):
-            raise ApiError(404, "there is no recording of that name", "unknown-recording")
+            raise ApiError(404, "there is no recording with that name", "unknown-recording")
         path = self._folder / name
         if not await asyncio.to_thread(_is_plain_file, path):
-            raise ApiError(404, "there is no recording of that name", "unknown-recording")
+            raise ApiError(404, "there is no recording with that name", "unknown-recording")
         if request.headers.get("range", _FROM_START).startswith(_FROM_START):
             actor = actor_of(request)
             self._audit.recording(actor, match["robot"], "downloaded", name)

@@ -266,7 +266,7 @@ def _entered(service: RobotService, live: LiveSession, peer: SocketPeer) -> Prog
 
 
 def _notice(text: str) -> MotionNotice | None:
-    """Convert a page message to a notice; return None for messages of other kinds."""
+    """Convert a page message to a notice; return None for other messages."""
     said = msgspec.json.decode(text, type=dict[str, object])
     if said.get("t") == "refused":
         about = said.get("command") or said.get("about")

@@ -1,4 +1,4 @@
-"""STOP from a program or a page without its WebSocket.
+"""STOP from a program, or from a page that has lost its WebSocket.
 
 Layer 5. HTTP and the Foxglove server share this code.
 """

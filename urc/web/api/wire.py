@@ -164,7 +164,7 @@ class HoldInfo(ApiMessage, frozen=True):
     lease_s: float
     """Time from the last motion request until the robot stops."""
     release: dict[str, Any]
-    """Arguments that stop the robot."""
+    """Argument values that stop the robot."""
 
 
 class CommandInfo(ApiMessage, frozen=True):

@@ -113,7 +113,7 @@ class AuditRoutes:
         """Return the newest entries of one robot, newest first."""
         name = request.path_params["name"]
         if name not in self._robots():
-            return told(404, "no robot of that name is served here")
+            return told(404, "this server has no robot with that name")
         return await self._answer(lambda: query_of({**request.query_params, "robot": name}, None))
 
     async def export(self, request: Request) -> Response:

@@ -118,7 +118,7 @@ class Dev:
         await websocket.accept()
         watch = self._watches.get(websocket.path_params["name"])
         if watch is None:
-            await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
+            await websocket.close(wire.CLOSE_NO_ROBOT, "this server has no robot with that name")
         elif self._open >= CLIENTS:
             await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} developer pages are already open")
         else:

@@ -100,7 +100,7 @@ class DevStart:
         """Reload all documents and return the URL of the robot."""
         name = request.path_params["name"]
         if name not in self._remake or name not in self._fleet.robots:
-            return told(404, "no robot of that name is served here")
+            return told(404, "this server has no robot with that name")
         driver = self._fleet.driven_by(name)
         if driver:
             return told(409, f"{name} is being driven ({driver}): release the controls first")

@@ -24,7 +24,7 @@ __all__ = [
 
 
 class ClientSocket(Protocol):
-    """The interface of a client's accepted WebSocket."""
+    """A client's accepted WebSocket, as the dashboard uses it."""
 
     async def receive(self) -> Message:
         """Return the next ASGI message."""
@@ -129,7 +129,7 @@ class SocketFlow:
 
 
 class TokenBucket:
-    """A token bucket for messages, with a capacity of one second."""
+    """A token bucket for messages, with a capacity of one second's messages."""
 
     def __init__(self, rate_hz: float, now_s: float) -> None:
         self._rate_hz = rate_hz
@@ -148,7 +148,7 @@ class TokenBucket:
 
 
 class PeerRights(Protocol):
-    """The current rights of a socket's peer with regard to the socket's robot."""
+    """The current rights of a socket's peer for the socket's robot."""
 
     def role(self) -> Role | None:
         """Return the current role; None if the peer no longer has any right."""

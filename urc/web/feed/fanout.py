@@ -123,7 +123,7 @@ class Fanout:
                 self._due.cancel()
 
     def _changed(self) -> None:
-        """Schedule a flush for a later turn of the loop, as soon as the rate permits."""
+        """Schedule a flush for a later iteration of the event loop, as soon as the rate permits."""
         if self._due is not None or self._loop is None:
             return
         free_s = self._pacer.free_s

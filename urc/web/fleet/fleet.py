@@ -145,7 +145,7 @@ def service_of(services: Mapping[str, RobotService], request: Request) -> tuple[
     name = request.path_params["name"]
     service = services.get(name)
     if service is None:
-        raise ApiError(404, "no robot of that name is served here", "unknown-robot")
+        raise ApiError(404, "this server has no robot with that name", "unknown-robot")
     return name, service
 
 

@@ -1,4 +1,4 @@
-"""A factory for a dashboard's robots, from documents, settings and installed packages.
+"""A factory that creates a dashboard's robots from documents, settings and installed packages.
 
 Layer 5. The factory reads files and stores settings, but opens no sessions for served robots.
 Reading files takes time, so the factory is called in a thread.
@@ -86,8 +86,8 @@ class RobotFactory:
         """First destination of each robot, by package or robot name. Settings given when the server
         started are valid only for that destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """Cache of manifests, by the digest and the state of the archive. The cache exists because
-        pages often need all manifests."""
+        """Cached manifests, keyed by the digest and the state of the archive; pages often need all
+        manifests."""
 
     def _roots(self) -> frozenset[str]:
         try:

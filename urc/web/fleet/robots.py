@@ -107,7 +107,7 @@ log = logging.getLogger(__name__)
 
 
 class SessionLike(MotionSession, Protocol):
-    """The dashboard's interface to an open profile."""
+    """An open session, as the dashboard uses it."""
 
     @property
     def hub(self) -> Hub:

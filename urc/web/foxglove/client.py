@@ -33,7 +33,7 @@ MESSAGES_PER_S: Final = 500
 """Maximum rate of messages from a client; a higher rate closes the socket. A viewer sends a
 separate message for each topic that it subscribes to."""
 MOST_FAULTS: Final = 32
-"""Number of invalid messages that closes the socket."""
+"""Number of invalid messages after which the socket is closed."""
 CALLS_AT_ONCE: Final = 16
 """Maximum number of a client's running calls."""
 MOST_ENDED: Final = 4096

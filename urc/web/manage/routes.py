@@ -296,7 +296,7 @@ class ManageRoutes:
 
     @_api
     async def cancel(self, request: Request) -> Response:
-        """Cancel the job before it changes anything."""
+        """Cancel the job, unless its installation has started."""
         said = await body_of(request, JobDecision)
         return answer(self._manager.jobs.cancel(said.number).news())
 

@@ -133,7 +133,7 @@ class SettingsRoutes:
     async def _save(self, name: str, said: SettingsAsked, actor: Actor) -> SettingsAnswer:
         manager, factory = self._manager, self._manager.factory
         if name not in manager.fleet.robots and name not in manager.fleet.broken:
-            raise ApiError(404, "no robot of that name is served here")
+            raise ApiError(404, "this server has no robot with that name")
         manager.check_idle(name, is_correction=True)
         before = await asyncio.to_thread(self._kept, name)
         bare = await asyncio.to_thread(self._document, name, said.version)

@@ -155,7 +155,7 @@ class Installed(ManageMessage, frozen=True):
     newer: str
     """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Earlier version that can be restored; "" without one."""
+    """Earlier version that can be restored; "" if there is no such version."""
     url: str
     """URL of the package's page; "" if it has no page."""
     settings_url: str

@@ -108,7 +108,7 @@ EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hos
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Maximum number of widgets on one page."""
-NO_WIDGET = mark("There is no widget of that name.")
+NO_WIDGET = mark("There is no widget with that name.")
 
 log = logging.getLogger(__name__)
 

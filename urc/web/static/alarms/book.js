@@ -18,7 +18,7 @@
  * @property {number} began
  * @property {string} value Value at the last change, as text.
  * @property {boolean} active
- * @property {boolean} known Whether the present value is known.
+ * @property {boolean} known Whether the current value is known.
  * @property {number} times Number of activations.
  * @property {number} returned
  * @property {number} acknowledged
