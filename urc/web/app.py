@@ -113,8 +113,8 @@ class DashboardOptions:
     data: Path | None = None
     """Folder for the latches and the audit log; with None, neither is stored."""
     audit: AuditLog | None = None
-    """Open audit log of the folder, closed when the application ends; with None, the application
-    opens the log."""
+    """The folder's audit log, already open; the application closes it at the end. With None, the
+    application opens the log."""
     tiles: Path | None = None
     """Folder with map tiles, ``z/x/y.png``; None if the server has no tiles."""
     remake: Mapping[str, Remake] | None = None
@@ -132,7 +132,7 @@ class DashboardOptions:
     sign_in: SignInOptions = field(default_factory=SignInOptions)
     """Options of the sign-in methods."""
     notifier: AlarmNotifier | None = None
-    """Receiver of all robots' new alarms; None sends no notifications."""
+    """Receiver of all robots' new alarms; with None, no notifications are sent."""
 
 
 _DEFAULT: Final = DashboardOptions()
@@ -326,7 +326,7 @@ class _Routes:
         return FoxgloveServer(lambda: self.services, run, followed, self.recorder)
 
     def stoppable(self) -> list[Stoppable]:
-        """Return all robots that can move and that STOP can therefore stop."""
+        """Return all robots that can move, for the STOP buttons of the sign-in page."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()

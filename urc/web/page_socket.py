@@ -117,7 +117,7 @@ class BrowserClient:
             controls.remove_page(self._operator)
 
     async def _opened(self) -> LiveSession | None:
-        """Return the robot's open session; None if the page leaves or sends too much first."""
+        """Return the robot's open session; None if the page disconnects or sends too much first."""
         opening = asyncio.ensure_future(self._service.live())
         reading = asyncio.ensure_future(self._read_early())
         # A page that leaves while the session is still opening must not count as a client.
@@ -133,7 +133,7 @@ class BrowserClient:
         return None
 
     async def _read_early(self) -> str:
-        """Read while the session opens; return why the page must close, or "" if the page left.
+        """Read while the session opens; return why the page must close, or "" if it disconnected.
 
         STOP is handled immediately and cancels waiting requests about the lease, so that an earlier
         reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All other

@@ -1,1 +1,1 @@
-"""The HTTP API of alarms."""
+"""The HTTP API for alarms."""

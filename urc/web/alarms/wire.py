@@ -46,7 +46,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     priority: AlarmPriority
     state: AlarmState
     active: bool
-    """Whether the value is abnormal, or the last known value was abnormal."""
+    """Whether the value is abnormal; for an unknown value, whether the last known value was."""
     known: bool
     """Whether the current value is known."""
     value: str
@@ -91,7 +91,7 @@ class AlarmCount(AlarmMessage, frozen=True):
     known: bool
     """Whether all annunciated alarms have known values."""
     monitored: bool
-    """Whether the robot stays connected for its alarms."""
+    """Whether the robot stays connected to monitor its alarms."""
 
 
 class NotificationCount(AlarmMessage, frozen=True):
@@ -138,7 +138,7 @@ class AlarmHistoryEvent(AlarmMessage, frozen=True):
     condition: str
     priority: str
     value: str
-    """Value at the event, as text."""
+    """Value at the time of the event, as text."""
     state: str
     """State of the alarm after the event."""
     who: str

@@ -169,7 +169,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "command",
         f"{_ROBOT}/commands/{{command}}",
         DRIVE,
-        "Run a command or sequence, and return its reply. Some commands require a higher role.",
+        "Run a command or sequence, and return its reply. Some commands require a higher role than"
+        " drive.",
         CommandAnswer,
         CommandAsked,
         "POST",
@@ -202,7 +203,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "stop",
         f"{_ROBOT}/stop",
         ANYONE,
-        "Stop a robot and latch its STOP. Resetting STOP needs the role drive.",
+        "Stop a robot and latch its STOP. Resetting STOP requires the role drive.",
         StopResult,
         method="POST",
         errors=(409, 429),
@@ -286,8 +287,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "audit",
         "/api/v1/audit",
         MAINTAIN_ANYWHERE,
-        "Search the audit log, newest entry first. You see the entries about the robots that you"
-        " maintain.",
+        "Search the audit log, newest entry first. Only entries about robots that you maintain are"
+        " returned.",
         AuditResult,
         query=_FILTERS,
         errors=(400, 404),
@@ -436,7 +437,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "packages_add",
         "/api/v1/packages/add",
         MAINTAIN_SERVER_FRESH,
-        "Start a job that adds the package at a path in a repository or on this machine.",
+        "Start a job that adds the package at a path in a repository or on the server.",
         JobNews,
         Add,
         "POST",

@@ -1,7 +1,7 @@
 """A robot's document as one YAML file, without this machine's paths.
 
-Layer 5. A document contains no setting values and therefore no secrets from settings. Reading the
-source files blocks, so call `document_of` in a thread.
+Layer 5. A document contains no setting values and therefore no secrets from settings. Call
+`document_of` in a thread, because it blocks while it reads the source files.
 """
 
 from pathlib import PurePath

@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class EventStream:
-    """A response that ends when the reader disconnects or loses its right, or the session ends."""
+    """A response that ends with the session, or when the reader disconnects or loses its right."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class EventStream:
         Args:
             live: the open session.
             signals: names of the signals to send.
-            clock: clock of the readings.
+            clock: clock for the ages of the readings.
             may_read: function that returns whether the visitor may still read.
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.

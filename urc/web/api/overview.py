@@ -23,10 +23,11 @@ _NUMBERS: Final = ("integer", "number")
 
 
 def battery_signal(profile: Profile) -> str:
-    """Return the signal with the robot's state of charge; "" if there is no such signal.
+    """Return the name of the battery signal; "" if there is no such signal.
 
-    If a battery widget shows a signal as its level, the function returns this signal. Otherwise, it
-    returns a numeric signal in percent or volts with a usual name, such as ``battery``.
+    If a battery widget shows a signal as its level, the function returns this signal's name.
+    Otherwise, it returns a usual name, such as ``battery``, of a numeric signal in percent or
+    volts.
     """
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
@@ -83,7 +84,7 @@ def in_order(robots: Iterable[RobotSummary]) -> tuple[RobotSummary, ...]:
 
 
 def _rank(robot: RobotSummary) -> tuple[int, int, float]:
-    """Return a robot's rank; connected robots keep their positions while they are in use."""
+    """Return a robot's rank; a connected robot's rank does not depend on its last use."""
     severity = {"high": 0, "medium": 1, "low": 2}.get(robot.alarms.worst, 3)
     is_away = not robot.connected
     return severity, int(is_away), -(robot.used_at or 0.0) if is_away else 0.0

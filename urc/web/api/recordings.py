@@ -1,7 +1,7 @@
 """Recordings over HTTP: files in the server's folder and recordings started by programs.
 
-Layer 5. Programs specify a file name in the folder, never a path. Reading the folder blocks, so the
-module reads it in a thread. A recording ends on request, when the robot's session ends, or after
+Layer 5. Programs specify a file name in the folder, never a path. The module reads the folder in a
+thread, because reading blocks. A recording ends on request, when the robot's session ends, or after
 `LONGEST_S`.
 """
 

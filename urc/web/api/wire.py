@@ -75,7 +75,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
     """The current alarms of a robot."""
 
     count: int = 0
-    """Number of annunciated alarms: all but the normal, shelved and suppressed ones."""
+    """Number of annunciated alarms: all except normal, shelved and suppressed alarms."""
     worst: str = ""
     """Highest priority of all alarms; "" if there are no alarms."""
 
@@ -120,7 +120,7 @@ class RobotList(ApiMessage, frozen=True):
 
 
 class ConfirmInfo(ApiMessage, frozen=True):
-    """A question that a person must confirm before a command is sent."""
+    """A confirmation question, which a person must answer before a command is sent."""
 
     text: str
     """Text of the question."""
@@ -186,7 +186,7 @@ class CommandInfo(ApiMessage, frozen=True):
     hold: HoldInfo | None
     """Timing of a held command, which needs motion requests; null for other commands."""
     confirm: ConfirmInfo | None
-    """Question that a person must confirm; null if there is no question."""
+    """Confirmation question; null if the command needs no confirmation."""
     arguments: tuple[ArgumentInfo, ...]
 
 
@@ -262,7 +262,7 @@ class CommandAsked(ApiMessage, frozen=True):
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
     """Longest wait for the reply; null means 30 s for a command and 600 s for a sequence."""
     confirmed: bool = False
-    """Whether a person has confirmed the command's question."""
+    """Whether a person has confirmed the command."""
     stops: _Count | None = None
     """Number of STOP presses last known to the program; the command is refused after a newer
     STOP."""
@@ -296,7 +296,7 @@ class MotionNotice(ApiMessage, frozen=True):
 
     kind: Literal["refused", "stopped"]
     about: str
-    """Name of the held command or request."""
+    """Name of the held command or request that the notice is about."""
     message: str
     """Reason, as one line of text."""
 
@@ -364,7 +364,7 @@ class RecordingInfo(ApiMessage, frozen=True):
     """A recording file."""
 
     file: str
-    """File name in paths."""
+    """Name of the file, as used in paths."""
     robot: str
     """Name of the recorded robot."""
     began: str

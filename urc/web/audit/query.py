@@ -22,7 +22,7 @@ class BadQuery(UrcError):
 
 
 def query_of(given: Mapping[str, str], robots: frozenset[str] | None) -> AuditQuery:
-    """Return the audit query of a request.
+    """Return the audit log query that a request contains.
 
     Args:
         given: the query parameters.

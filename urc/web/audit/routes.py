@@ -110,14 +110,14 @@ class AuditRoutes:
         return await self._answer(lambda: query_of(request.query_params, robots))
 
     async def timeline(self, request: Request) -> Response:
-        """Return the newest entries of one robot, newest first."""
+        """Return the newest entries about one robot, newest first."""
         name = request.path_params["name"]
         if name not in self._robots():
             return told(404, "this server has no robot with that name")
         return await self._answer(lambda: query_of({**request.query_params, "robot": name}, None))
 
     async def export(self, request: Request) -> Response:
-        """Return all visible entries as JSON lines, oldest first, for `urc audit --check`."""
+        """Return all entries that the visitor may see as JSON lines, for `urc audit --check`."""
         if self._log is None:
             return told(404, _NO_LOG)
         if self._exports >= _EXPORTS:

@@ -1,4 +1,4 @@
-"""The WebSocket that sends a robot's traffic to one developer page and answers its requests.
+"""The WebSocket that sends a robot's traffic to one developer page and answers the page's requests.
 
 Layer 5. Each page has its own backlog of traffic; if it is full, the oldest rows are dropped and
 counted. A page that reads no data for `STALL_S` seconds is disconnected. A thread handles the

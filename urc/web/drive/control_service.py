@@ -57,8 +57,8 @@ class ControlService:
         """Restore the latch from `file`.
 
         The controls are the held commands of `driver`. The store `file` preserves the latch across
-        restarts; None stores no latch. The `recorder` receives audit events; None records no
-        events.
+        restarts; with None, the latch is not stored. The `recorder` receives audit events; with
+        None, no events are recorded.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -255,8 +255,8 @@ class ControlService:
 
         Rights are checked when a tick is applied, in `_tick`.
 
-        A new tick replaces a pending tick without being decoded. Too many ticks pause the socket to
-        save processor time.
+        A new tick replaces a pending tick without being decoded. If too many ticks arrive, the
+        socket is paused to save processor time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
@@ -320,7 +320,7 @@ class ControlService:
         self.once.stopped()
 
     async def settle(self) -> None:
-        """Wait until the latch has been stored or storing it has failed."""
+        """Wait until the latch has been stored, or storing has failed."""
         if self._file is not None:
             await self._file.settle()
 

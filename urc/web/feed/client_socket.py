@@ -49,7 +49,7 @@ class FlowControl(Protocol):
         """Write whole WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass each whole text message to `sink` before `ClientSocket.receive`.
+        """Pass each whole text message directly to `sink`.
 
         The direct call saves two task switches per message. `receive` returns only messages for
         which `sink` returns False.

@@ -64,7 +64,7 @@ class Pacer:
     """A rate limiter that passes the first event of a burst immediately and later events steadily.
 
     The limiter tolerates jitter of one period, so it never delays a source that sends at exactly
-    the permitted rate. In any second, it passes at most one event above the permitted number.
+    the permitted rate. In any second, it passes at most one event more than permitted.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -149,7 +149,7 @@ class Fanout:
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake`, which must not block, at each flush; return the client's position."""
+        """Call `wake`, which must not block, at each flush; return a new client position."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))

@@ -28,7 +28,7 @@ class EncodedImage(NamedTuple):
     """The complete WebSocket frame."""
     sample: Sample
     number: int
-    """Number of the image, counted over all signals."""
+    """Number of the image, counted across all signals."""
     made_s: float
 
 

@@ -15,7 +15,7 @@ from urc.web.fleet.robots import RobotService
 __all__ = ["ContactWatch"]
 
 _LOOK_S: Final = 2.0
-"""Interval between two checks and accuracy of the times, in seconds."""
+"""Interval between checks, and therefore the accuracy of the times, in seconds."""
 _SAVE_S: Final = 60.0
 """Interval between two saves of the file, in seconds."""
 
@@ -34,7 +34,7 @@ class ContactWatch:
         Args:
             services: function that returns the robots' services, keyed by the robots' names in
                 URLs.
-            folder: the data folder; None stores nothing.
+            folder: the data folder; with None, nothing is stored.
             utc: function that returns the UTC time, in seconds since 1970.
         """
         self._services = services

@@ -50,7 +50,7 @@ class RobotOptions:
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
     monitors: bool = False
-    """Whether robots stay connected for their alarms by default."""
+    """Whether robots stay connected to monitor their alarms by default."""
 
 
 class ResolvedSettings(NamedTuple):
@@ -113,7 +113,7 @@ class RobotFactory:
         Args:
             name: the robot's name in URLs.
             profile: the robot's profile, without added interfaces.
-            kept: the robot's stored settings; None reads them from the file.
+            kept: the robot's stored settings; with None, they are read from the file.
         """
         chosen = self.settings_store(name).load() if kept is None else kept
         filled = self.resolved_settings(profile, chosen)
@@ -218,7 +218,7 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return the versions of each installed package with a robot, keyed by package name.
+        """Return the versions of each installed package that contains a robot, by package name.
 
         Versions are in ascending order. If a robot package and a driver package have the same
         name, the result contains only the package in use.

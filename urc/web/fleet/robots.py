@@ -90,8 +90,7 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum numbers of a robot's clients: from one unknown address, and from one signed-in
-visitor."""
+"""Maximum number of a robot's clients from one unknown address, and from one signed-in visitor."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
@@ -156,7 +155,7 @@ class Robot:
     playback: Playback | None = None
     """The playback shown instead of a robot; None for a robot."""
     is_monitored: bool = False
-    """Whether the robot stays connected for its alarms, even without open pages."""
+    """Whether the robot stays connected to monitor its alarms, even without open pages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,11 +219,12 @@ class RobotService:
             robot: the robot.
             linger_s: how long the session stays open after the last client has left, in seconds.
             clock: the clock.
-            latch: store that preserves a latched STOP across restarts; None stores no latch.
-            recorder: receives the audit events; None records no events.
+            latch: store that preserves a latched STOP across restarts; with None, the latch is not
+                stored.
+            recorder: receives the audit events; with None, no events are recorded.
             start_lock: lock shared by all of a server's robots, so that sessions start one at a
                 time.
-            alarms: the robot's alarms; None creates alarms that are not stored.
+            alarms: the robot's alarms; with None, the service creates alarms that are not stored.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -271,7 +271,7 @@ class RobotService:
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count a client of `who` while the context is open; see `SocketPeer` for `who`."""
+        """Count a client while the context is open; see `SocketPeer.who` for `who`."""
         self._visitors += 1
         self._operators[who] += 1
         self._changed.set()
@@ -348,8 +348,8 @@ class RobotService:
         """Keep the robot disconnected while the context is open.
 
         Callers that connect to the robot themselves need the context, because many robots accept
-        only one connection. No operator may be driving the robot. An open session ends first, and
-        clients wait for the next session.
+        only one connection. The caller must ensure that no operator is driving the robot. An open
+        session ends first, and clients wait for the next session.
         """
         self._held_off += 1
         self._changed.set()
@@ -492,7 +492,7 @@ class RobotService:
 
     @property
     def is_monitored(self) -> bool:
-        """Whether the robot stays connected for its alarms."""
+        """Whether the robot stays connected to monitor its alarms."""
         is_ready = self.alarms.has_limits and not missing_settings(self.robot)
         return self._wants_monitoring and is_ready
 

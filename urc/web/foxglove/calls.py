@@ -29,7 +29,7 @@ class CallFailed(Exception):
 
 
 class RunCommand(Protocol):
-    """The execution of a command; see `urc.web.api.robots.RobotCalls.run`."""
+    """A function that runs a command; see `urc.web.api.robots.RobotCalls.run`."""
 
     async def __call__(
         self, name: str, service: RobotService, peer: SocketPeer, wanted: str, asked: CommandAsked

@@ -2,8 +2,8 @@
 
 Layer 5. One task reads, another writes, and each robot with subscriptions has a task that keeps the
 robot connected. The writer sends messages while the kernel accepts them. While the writer waits,
-old readings are dropped in favour of new ones. A client that reads nothing for `STALL_S` seconds is
-disconnected.
+new readings replace the oldest unsent readings. A client that reads nothing for `STALL_S` seconds
+is disconnected.
 """
 
 import asyncio

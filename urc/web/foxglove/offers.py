@@ -33,7 +33,7 @@ class RobotContents(NamedTuple):
 class RobotCatalogue:
     """The topics and services of all robots, created once for all clients.
 
-    Creating them for a hundred robots takes longer than a driven robot can wait.
+    Creating them for a hundred robots would block the event loop for too long.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class RobotCatalogue:
 
 
 class OfferSource(NamedTuple):
-    """The robots, with one visitor's rights."""
+    """The served robots, with functions that return one visitor's rights."""
 
     services: Callable[[], Mapping[str, RobotService]]
     """Function that returns the robots, keyed by their names in URLs."""

@@ -1,7 +1,7 @@
 """The frames to be sent to one Foxglove client, in order.
 
 Layer 5. Pure. Announcements are sent first, then responses, then statuses, then the robots'
-messages, one robot at a time in turn. The number of frames of each kind is limited.
+messages, in turn. The number of frames of each kind is limited.
 """
 
 from collections import deque

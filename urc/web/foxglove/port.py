@@ -26,7 +26,7 @@ class FoxglovePort:
         """
         self.wanted = wanted
         self.flag = "--foxglove"
-        """Command-line option with the port, named in errors."""
+        """Command-line option that sets the port, for error messages."""
         self.port = 0
         """The open port; 0 before the server listens."""
 

@@ -41,7 +41,7 @@ class RobotFeed:
         self._seen_links: dict[str, LinkStatus] = {}
         """Last state sent for each subscribed connection."""
         self._links_count = 0
-        """Number of connection changes that have been checked."""
+        """Number of connection state changes at the last check."""
         self._dropped = 0
         self._hub: Hub | None = None
         self._messages: HubMessages | None = None

@@ -28,7 +28,7 @@ _arguments: Final = msgspec.json.Decoder(dict[str, Any])
 
 
 class BadRequest(Exception):
-    """A request that is not a JSON object of arguments, as one line of text."""
+    """The request is not a JSON object of arguments; the message is one line of text."""
 
 
 class RobotServiceType(NamedTuple):

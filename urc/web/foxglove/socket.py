@@ -34,7 +34,7 @@ from urc.wire.foxglove import PATH, SUBPROTOCOLS, chosen_subprotocol
 __all__ = ["TOKEN", "FoxgloveServer", "TokenInAddress"]
 
 TOKEN: Final = "token"  # noqa: S105 - the name of a parameter
-"""Query parameter with the token of a program."""
+"""Query parameter that contains the token of a program."""
 _SECOND_NS: Final = 1_000_000_000
 
 

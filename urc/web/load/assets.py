@@ -79,7 +79,7 @@ class Assets:
     files: dict[str, _CachedFile] = field(default_factory=dict)
 
     def respond(self, name: str, request: Request) -> Response:
-        """Return the file, or status 304 if the browser's copy is current; raise status 404."""
+        """Return the file, or status 304 if the browser's copy is current; raise 404 if missing."""
         file = self.files.get(name)
         if file is None:
             raise HTTPException(404)

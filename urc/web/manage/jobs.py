@@ -53,7 +53,7 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Accesses of the package to this machine that no setting controls."""
+    """The package's access to this machine beyond its settings, one line per access."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
@@ -192,8 +192,8 @@ class Jobs:
 
         Args:
             number: number of the job.
-            takes_risks: whether the user also approved the accesses to this machine that no setting
-                controls.
+            takes_risks: whether the user also approved the access to this machine beyond the
+                settings.
             unsigned: names of unsigned packages that the user accepts.
 
         Raises:

@@ -19,7 +19,7 @@ __all__ = ["move_playback", "playback_state"]
 def playback_state(playback: Playback | None) -> Response:
     """Return the playback's state as a response; status 404 if there is no playback."""
     if playback is None:
-        return told(404, "this robot is not a recording")
+        return told(404, "this is not a playback")
     return answer(
         PlaybackState(
             began_s=playback.began_s,
@@ -34,7 +34,7 @@ def playback_state(playback: Playback | None) -> Response:
 async def move_playback(request: Request, playback: Playback | None) -> Response:
     """Play, pause or seek the playback; return its state as a response."""
     if playback is None:
-        return told(404, "this robot is not a recording")
+        return told(404, "this is not a playback")
     try:
         asked = await body_of(request, PlaybackRequest)
     except ApiError as refusal:

@@ -236,7 +236,7 @@ class ManageRoutes:
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Start a job that adds the package at a path in a repository or on this machine."""
+        """Start a job that adds the package at a path in a repository or on the server."""
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
@@ -268,7 +268,7 @@ class ManageRoutes:
 
     @_api
     async def remove(self, request: Request) -> Response:
-        """Remove a package; without ``yes``, only list the packages that would be removed."""
+        """Remove a package if ``yes`` is true; otherwise, list the packages to be removed."""
         said = await body_of(request, InstallRequest)
         if not said.yes:
             required = parse_requirement(said.package)

@@ -93,8 +93,7 @@ class SettingsPage:
     """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
     monitoring: tuple[Option, ...]
-    """Choices for whether the robot stays connected for its alarms; empty for a robot without
-    alarms."""
+    """Choices for the monitoring of alarms; empty for a robot without alarms."""
     groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
     """Names of the tested transports."""

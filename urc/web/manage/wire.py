@@ -81,7 +81,7 @@ class JobDecision(ManageMessage, frozen=True):
 
     number: int
     takes_risks: bool = False
-    """Whether the user also approved the accesses to this machine that no setting controls."""
+    """Whether the user also approved the package's access to this machine beyond its settings."""
     unsigned: Annotated[tuple[_Short, ...], msgspec.Meta(max_length=128)] = ()
     """Unsigned packages that the user accepts, such as ``widgets/dial``."""
 
@@ -106,8 +106,8 @@ class JobNews(ManageMessage, frozen=True):
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """Accesses to this machine that no setting controls; for an update, only additional
-    accesses."""
+    """The package's access to this machine beyond its settings, one line per access; for an update,
+    only additional access."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""
@@ -292,7 +292,7 @@ class SettingsAsked(ManageMessage, frozen=True):
     anyway: bool = False
     """Whether to save the settings even if the connection test fails."""
     monitors_alarms: bool | None = None
-    """Whether the robot stays connected for its alarms; null for the server's default."""
+    """Whether the robot stays connected to monitor its alarms; null for the server's default."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):

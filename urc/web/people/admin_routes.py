@@ -115,7 +115,7 @@ class AdminRoutes:
 
     @answers_changes
     async def pairing(self, request: Request) -> Response:
-        """Return the state of a pairing; only the pairing's creator has its random identifier."""
+        """Return the state of a pairing; only the pairing's creator knows its random identifier."""
         state = self._pairings.state(request.path_params["id"], self._control.now())
         return answer(state)
 

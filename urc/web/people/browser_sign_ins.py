@@ -43,7 +43,7 @@ answers_refusals: Final = answers_errors_with(403)
 HASHES: Final = 2
 """Limit on concurrent passphrase hashes, each of which needs 64 MiB."""
 MOST_WAITING: Final = 32
-"""Limit on attempts that wait for their turn to be hashed."""
+"""Limit on attempts that wait for their passphrase to be hashed."""
 _LONGEST_AGENT: Final = 200
 
 
@@ -117,7 +117,7 @@ class BrowserSignIns:
         self.recorder.sign_in_failed(way, place, str(error), name=name, principal=person)
 
     def succeeded(self, name: str) -> None:
-        """Forget the failed attempts for a name."""
+        """Reset the count of failed attempts for a name."""
         self._throttle.succeeded(name)
 
     @asynccontextmanager

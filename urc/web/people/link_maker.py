@@ -23,7 +23,7 @@ from urc.web.people.pairings import Pairings
 __all__ = ["LinkMaker"]
 
 _QUIET: Final = 4
-"""Width of the quiet zone in modules (ISO/IEC 18004, 6.3.8)."""
+"""Width of the QR code's quiet zone, in modules (ISO/IEC 18004, 6.3.8)."""
 _SCALE: Final = 8
 
 

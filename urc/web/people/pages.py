@@ -29,7 +29,7 @@ _NO_STORE: Final = {"cache-control": "no-store"}
 
 
 class GrantScope(NamedTuple):
-    """A choice of robots for a role."""
+    """A choice of the robots that a role applies to."""
 
     value: str
     """Suffix of a grant: "", ``@cart`` or ``@#lab``."""

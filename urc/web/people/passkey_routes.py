@@ -163,7 +163,7 @@ def _person(request: Request) -> Principal:
 def _party(request: Request) -> RelyingParty:
     authority = parse_host(request.headers["host"])
     if authority is None:
-        raise ApiError(400, "the request names no host")  # the page policy has already refused it
+        raise ApiError(400, "the host header is invalid")  # the page policy has already refused it
     return relying_party(authority.host, authority.port)
 
 

@@ -3,9 +3,10 @@
 Layer 5. This is the outermost ASGI middleware. It removes proxy headers from all requests, so no
 other part of the server can see or trust a forged header.
 
-Theory of operation. Each request contains the proxy's proof. A browser's first request opens a
-sign-in, whose secret never leaves this process. The middleware adds the secret to the request's
-cookie, so the same rules for rights, origin and revocation apply as for a browser.
+Theory of operation. Each request contains a secret that proves that it comes from the proxy. A
+browser's first request opens a sign-in, whose secret never leaves this process. The middleware adds
+the secret to the request's cookie, so the same rules for rights, origin and revocation apply as for
+a browser.
 """
 
 import asyncio

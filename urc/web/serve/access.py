@@ -268,7 +268,7 @@ def _unrecorded(who: Identity, place: str, agent: str) -> None:
 
 
 def _unheard(place: str) -> None:
-    """Ignore a bad token, because this server has no audit log."""
+    """Ignore an invalid token, because this server has no audit log."""
 
 
 def _right_clock() -> str:

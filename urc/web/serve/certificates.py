@@ -92,8 +92,8 @@ class LocalCertificate:
         if authority.left_out:
             left_out = ", ".join(authority.left_out)
             notes.append(
-                f"the authority's limits exclude {left_out}; to create a new one, use"
-                " --allow-host with this name"
+                f"the authority's limits exclude {left_out}; to create a new authority,"
+                " use --allow-host with this name"
             )
         return LoadedCertificate(
             _context(issued.chain, issued.key),

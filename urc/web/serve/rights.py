@@ -65,7 +65,7 @@ class Right(NamedTuple):
 
 FRESH_S: Final = 300.0
 """Time after a sign-in, in seconds, during which people can change packages, settings and rights. A
-tablet that was left signed in is therefore not enough for such changes."""
+tablet that was left signed in therefore does not permit such changes."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
@@ -85,7 +85,7 @@ class RightHolder(Protocol):
     """The rights of a visitor, as routes check them; see `urc.web.serve.visitor.Visitor`."""
 
     def may(self, right: Right, robot: str = "") -> bool:
-        """Return whether the visitor has a right now."""
+        """Return whether the visitor currently has a right."""
 
     @property
     def is_fresh(self) -> bool:

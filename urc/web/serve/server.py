@@ -48,7 +48,7 @@ class FurtherPort(Protocol):
     wanted: int
     """TCP port; 0 lets the system choose one."""
     flag: str
-    """Command-line option with the port, named in errors."""
+    """Command-line option that sets the port, for error messages."""
 
     def opened(self, port: int) -> None:
         """Store the port on which the server listens."""

@@ -24,8 +24,8 @@ __all__ = ["ServiceManager", "answers"]
 log = logging.getLogger(__name__)
 
 _SIGNS: Final = 3
-"""Heartbeats per watchdog interval. sd_watchdog_enabled(3) recommends two. With three, one lost
-request does not end the server."""
+"""Heartbeats per watchdog interval. sd_watchdog_enabled(3) recommends two. With three heartbeats,
+one lost request does not end the server."""
 _STATUS: Final = b"HTTP/1.1 "
 
 

@@ -98,7 +98,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             self._protocol.resume_writing()
 
     def continue_handshake(self) -> None:
-        """Process the received handshake data; the cryptography is slow."""
+        """Process the received handshake data, which takes long because of the cryptography."""
         if self._is_closing or self._is_ready:
             return
         try:

@@ -1,4 +1,4 @@
-"""Plain HTTP on a TLS port and TLS from a web server in front of URC.
+"""Plain HTTP requests on a TLS port, and TLS provided by a web server in front of URC.
 
 Layer 5. The module contains two ASGI middlewares around the application. `TlsPort` redirects plain
 HTTP to HTTPS. The exceptions are connections from this machine, STOP, and the pages that a device

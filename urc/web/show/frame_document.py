@@ -37,7 +37,7 @@ class FramePage:
 
 
 class FrameDocuments:
-    """A maker of the documents.
+    """A maker of frame documents.
 
     Args:
         modules: the pages' import map.

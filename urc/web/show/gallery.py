@@ -98,7 +98,7 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function marks the text for the catalogues; pages translate it with `t`.
+    The function only marks the text for translation; pages translate it with `t`.
     """
     return text
 
@@ -177,7 +177,7 @@ class DemoPage:
     faults: tuple[WidgetProblem, ...]
     """Problems in widgets that cannot be shown."""
     stamp_url: str
-    """URL of the current stamp, for reloads after an edit; "" for a page that does not reload."""
+    """URL of the files' stamp, for reloads after an edit; "" for a page that does not reload."""
     stamp: str
     """Stamp of the widget files, computed before the files were read."""
 
@@ -208,7 +208,7 @@ class Gallery:
         self._ways = ways
         self._trust = trust
         self.assets = Assets()
-        """Files of the shown widgets, including unused widgets."""
+        """Files of the gallery's widgets, including widgets that no robot uses."""
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the gallery's routes, which must precede the route for the widget files."""

@@ -41,7 +41,7 @@ is the robot's page; ``interfaces.js`` writes the cookie."""
 
 @dataclass(frozen=True, slots=True)
 class InterfaceChoice:
-    """A choice in a robot's list of interfaces."""
+    """An entry in a robot's list of interfaces."""
 
     name: str
     title: str

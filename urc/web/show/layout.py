@@ -82,7 +82,7 @@ def grid_css(
         interface: the interface.
         slots: names of the slots with widgets.
         footprints: footprint of each slot's widget.
-        titles: title of each slot's widget, for the button of the missing slots.
+        titles: title of each slot's widget, for the button that shows the missing slots.
     """
     css = ""
     background = interface.background if interface.background in slots else ""
@@ -159,7 +159,7 @@ def _button(
 
 
 def _css_string(text: str) -> str:
-    """Return a string for a style sheet.
+    """Return text as a string literal for a style sheet.
 
     All characters that could end the string or the sheet are escaped (CSS Syntax Level 3, section
     4.3.7).

@@ -125,7 +125,7 @@ def motion_lines(driver: Driver) -> list[str]:
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport whose loss disables the command; "" if no transport does so."""
+    """Return the transport whose loss disables the command; "" if there is no such transport."""
     line = command.transport if command else ""
     return "" if opens_on_demand(line, driver) else line
 
@@ -144,7 +144,7 @@ def opens_on_demand(transport: str, driver: Driver) -> bool:
 def _ranges(
     command: Command | None, port: WidgetPort, given: OutputBinding
 ) -> dict[str, dict[str, object]]:
-    """Return the minimum, maximum and rest value of each argument set by a stick or slider."""
+    """Return the minimum, maximum and neutral value of each argument set by a stick or slider."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -183,7 +183,7 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function marks the text for the catalogues; the page translates it.
+    The function only marks the text for translation; the page translates it.
     """
     return text
 
