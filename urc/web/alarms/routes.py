@@ -171,7 +171,7 @@ class AlarmCalls:
         if service.robot.playback is not None:
             raise ApiError(409, "the alarms of a playback cannot be changed", "recorded")
         if not visitor_of(request).may_give(""):
-            raise ApiError(403, "this token permits only single commands", "forbidden")
+            raise ApiError(403, "this token is limited to certain commands", "forbidden")
         return name, service
 
     def _actor(self, request: Request) -> AlarmActor:

@@ -1,6 +1,6 @@
 """Distribution of one robot's alarms to all its pages.
 
-Layer 5. A page gets all alarms once, and afterwards only changes, at most five times a second. For
+Layer 5. A page receives all alarms once, and then only changes, at most five times a second. For
 example, 200 alarms in 10 s result in 50 messages per page. Each message is encoded once for all
 pages with the same position.
 """

@@ -46,10 +46,10 @@ class FlowControl(Protocol):
         """Wait until the kernel has accepted all written data."""
 
     def write(self, frame: bytes) -> None:
-        """Write whole WebSocket frames."""
+        """Write complete WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass each whole text message directly to `sink`.
+        """Pass each complete text message directly to `sink`.
 
         The direct call saves two task switches per message. `receive` returns only messages for
         which `sink` returns False.
@@ -67,7 +67,7 @@ class SocketFlow:
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
-        """Callback for each whole text message."""
+        """Callback for each complete text message."""
         self._transport: asyncio.Transport | None = None
         self._is_free = True
         self._writable = asyncio.Event()
@@ -109,12 +109,12 @@ class SocketFlow:
         await self._writable.wait()
 
     def write(self, frame: bytes) -> None:
-        """Write whole WebSocket frames."""
+        """Write complete WebSocket frames."""
         if (transport := self._transport) and not transport.is_closing():
             transport.write(frame)
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass each whole text message to `sink`."""
+        """Pass each complete text message to `sink`."""
         self.sink = sink
 
     def hold_back(self, is_held: bool) -> None:

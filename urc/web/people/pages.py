@@ -44,7 +44,7 @@ class PeoplePage:
     nav: Nav
     scopes: tuple[GrantScope, ...]
     robots: tuple[GrantScope, ...]
-    """Choices for single robots; each value is a robot's name in URLs."""
+    """Choices of individual robots; each value is a robot's name in URLs."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A parser for WebSocket frames that each contain one whole text message, as almost all ticks do.
+"""A parser for WebSocket frames that each contain a complete text message, such as most ticks.
 
 Layer 5, pure. The parser only reads the bytes. The WebSocket library processes everything else in
 the same bytes: fragments, control frames and protocol errors. For other frames, this module only
@@ -33,11 +33,11 @@ class WebSocketFrames:
         self._is_inside = False
         """Whether a fragmented message is incomplete."""
         self.spans: list[tuple[int, int]] = []
-        """Start and end of each whole text frame at the beginning of the last received bytes, for
-        `text_of`. Empty if the bytes were a single text frame."""
+        """Start and end of each complete text frame at the beginning of the last received bytes,
+        for `text_of`. Empty if the bytes were a single text frame."""
 
     def whole(self, data: bytes) -> bytes | None:
-        """Return the text if `data` is exactly one whole text frame; otherwise None."""
+        """Return the text if `data` is exactly one complete text frame; otherwise None."""
         size = len(data)
         if self._is_between and size >= _HEAD + _MASK and data[0] == _TEXT and data[1] & _MASKED:
             at, said = _HEAD + _MASK, data[1] & 0x7F
@@ -75,13 +75,13 @@ class WebSocketFrames:
 
 
 def text_of(frame: bytes) -> bytes:
-    """Return the text of a whole frame from `WebSocketFrames.spans`."""
+    """Return the text of a complete frame from `WebSocketFrames.spans`."""
     at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
     return _unmasked(frame[at - _MASK : at], frame[at:])
 
 
 def _is_text(data: bytes, at: int) -> bool:
-    """Return whether a whole text frame begins at `at` with a length of at most 16 bits."""
+    """Return whether a complete text frame with a length of at most 16 bits begins at `at`."""
     size = data[at + 1]
     return data[at] == _TEXT and bool(size & _MASKED) and size & 0x7F != _LONG
 

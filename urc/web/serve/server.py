@@ -214,7 +214,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         self._urc_flow.lost()
 
     def data_received(self, data: bytes) -> None:
-        """Pass a whole text message directly to the client; leave all other data to uvicorn."""
+        """Pass a complete text message directly to the client; leave all other data to uvicorn."""
         if self._urc_frames is None:
             self._urc_frames = WebSocketFrames()
             super().data_received(data)

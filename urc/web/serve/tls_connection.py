@@ -47,7 +47,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._on_data = on_data
         self._on_end = on_end
         self.has_replied = False
-        """Whether the server has replied to a whole first message from the client."""
+        """Whether the server has replied to a complete first message from the client."""
         self._context = context
         self._in = ssl.MemoryBIO()
         self._out = ssl.MemoryBIO()

@@ -17,7 +17,7 @@ __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
 """Maximum number of unfinished handshakes. Above the limit, the address with the most handshakes
-loses one: the oldest that has sent no whole message, or else the oldest."""
+loses one: the oldest that has sent no complete message, or else the oldest."""
 HANDSHAKE_S = 5.0
 """Time limit from opening a connection to the end of its handshake, in seconds."""
 SHARE = 0.25
@@ -159,7 +159,7 @@ class FirstBytes(asyncio.Protocol):
 
     @property
     def has_replied(self) -> bool:
-        """Whether the client has sent a whole first message."""
+        """Whether the client has sent a complete first message."""
         return self._secure is not None and self._secure.has_replied
 
     def continue_handshake(self) -> None:

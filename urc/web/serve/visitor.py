@@ -100,8 +100,8 @@ class Visitor:
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor currently has a right; `robot` names the robot, if any.
 
-        A token for single commands never permits maintenance or administration, regardless of its
-        role.
+        A token that is limited to certain commands never permits maintenance or administration,
+        regardless of its role.
         """
         if right.role is None:
             return True

@@ -184,7 +184,7 @@ def _ages(names: Iterable[str]) -> dict[str, Any]:
 
 
 def _single(signals: Mapping[str, Any]) -> list[str]:
-    """Return the names of single signals; a list of signals adds one name per element."""
+    """Return the names of individual signals; a list of signals adds one name per element."""
     names = []
     for name, given in signals.items():
         many = isinstance(given, list)

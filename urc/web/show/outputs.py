@@ -99,7 +99,7 @@ def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return the confirmations required for a command and for single argument values."""
+    """Return the confirmations required for a command and for individual argument values."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]

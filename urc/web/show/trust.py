@@ -58,13 +58,13 @@ _GUIDES: Final = (
         "iPhone, iPad",
         (
             phrase("Download the certificate in Safari, and allow the profile."),
-            phrase("Open Settings, General, VPN & Device Management: install the profile."),
+            phrase("Open Settings > General > VPN & Device Management, and install the profile."),
             phrase(
-                "Open Settings, General, About, Certificate Trust Settings: turn on trust for the"
-                " certificate."
+                "Open Settings > General > About > Certificate Trust Settings, and turn on trust"
+                " for the certificate."
             ),
         ),
-        phrase("Open Settings, General, VPN & Device Management: remove the profile."),
+        phrase("Open Settings > General > VPN & Device Management, and remove the profile."),
     ),
     DeviceGuide(
         "windows",
@@ -75,7 +75,7 @@ _GUIDES: Final = (
                 "Place the certificate in the store “Trusted Root Certification Authorities”, and"
                 " confirm."
             ),
-            phrase("Close all windows of the browser, and open it again."),
+            phrase("Close all browser windows, then open the browser again."),
         ),
         phrase(
             "Start certmgr.msc, open “Trusted Root Certification Authorities”, and delete the"
@@ -112,7 +112,10 @@ _GUIDES: Final = (
         "firefox",
         "Firefox",
         (
-            phrase("Open the settings, search for “certificates”: View Certificates, Authorities."),
+            phrase(
+                "Open the settings, search for “certificates”, and open View Certificates >"
+                " Authorities."
+            ),
             phrase("Import the file, and select “Trust this CA to identify websites”."),
         ),
         phrase("Choose the certificate in the same list, then “Delete or Distrust”."),

@@ -240,7 +240,7 @@ def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
 
 
 def encode_error(code: str, message: str) -> str:
-    """Return the message that says why a message was invalid or why the socket closes."""
+    """Return the message that states why a message was invalid or why the socket closes."""
     return encoded(ErrorMessage(code, cut(message)))
 
 

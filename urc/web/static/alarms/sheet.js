@@ -193,7 +193,7 @@ export class AlarmSheet {
       made(
         "span",
         { class: "urc-alarm-text" },
-        made("span", { class: "urc-alarm-line" }, t("{count} alarms of one burst", { count: group.length })),
+        made("span", { class: "urc-alarm-line" }, t("{count} alarms in one burst", { count: group.length })),
         made("span", { class: "urc-alarm-action" }, first ? t("first: {alarm}", { alarm: `${titleOf(first, store)}, ${conditionText(first.condition)}` }) : ""),
       ),
     );
