@@ -146,7 +146,7 @@ class RobotPageRequest:
     is_watching: bool = False
     """Whether the page may only watch."""
     is_part: bool = False
-    """Whether an open page requests this page in order to switch its interface."""
+    """Whether an open page requests this page in order to show another interface."""
     may_act: bool = True
     """Whether the visitor has the role ``drive`` for the robot."""
     dev_url: str = ""

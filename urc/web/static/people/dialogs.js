@@ -131,7 +131,7 @@ export class PeopleDialog {
 
 /** @param {string} qr */
 function picture(qr) {
-  return made("img", { class: "urc-qr", src: qr, alt: t("QR code of the link") });
+  return made("img", { class: "urc-qr", src: qr, alt: t("QR code for the link") });
 }
 
 /** @param {HTMLElement} el */
