@@ -225,7 +225,7 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """Stop all sequences and refuse autonomous motion; an empty `reason` allows motion again.
+        """Stop all sequences and refuse autonomous motion; an empty `reason` allows it again.
 
         Login sequences continue, because a stop can reach the robot only after the login.
         """

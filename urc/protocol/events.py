@@ -107,9 +107,9 @@ class Violation(NamedTuple):
 
 
 class NumbersUsed(NamedTuple):
-    """This connection's counters have advanced, so stops rendered earlier may be outdated.
+    """This connection's counters have advanced, so previously rendered stop frames may be outdated.
 
-    `NumbersUsed` occurs only on connections that share counters with motion
+    `NumbersUsed` occurs only on connections that share counters with motion frames
     (`MotionEncoder.share`).
     """
 

@@ -121,8 +121,8 @@ class MotionEncoder:
     def has_stops(self, command: str) -> bool:
         """Return whether the rendered stops of `command` are still valid.
 
-        Stops are valid while at least half of the spare numbers remain. Rendered stops are always
-        outdated if they depend on values other than arguments and counters.
+        Stops are valid while at least half of the spare counter numbers remain. Stops that depend
+        on values other than arguments and counters are never valid.
         """
         made, line = self._made.get(command), self._found(command).transport
         if made is None or not self._asks[command].is_local or line not in self._lengths:
@@ -220,7 +220,7 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...],
     ) -> Numbered | None:
-        """Render a motion frame again after another frame has used its numbers."""
+        """Render a motion frame again after another frame has used its counter numbers."""
         try:
             made = self.motion_frame(command, arguments, now, confirmed_by)
         except UrcError:

@@ -191,7 +191,7 @@ def test_validate_imports_only_what_a_good_document_needs() -> None:
     ("reply", "said"),
     [
         ("OK", None),
-        ("NO", "no-match: nothing declared matches 'NO'"),
+        ("NO", "no-match: no declaration matches 'NO'"),
         ("ERR", "refused: the robot answered 'ERR'"),
     ],
 )

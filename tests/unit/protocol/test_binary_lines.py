@@ -26,7 +26,7 @@ def test_what_is_sent_may_be_framed_otherwise_than_what_comes() -> None:
 @pytest.mark.parametrize(
     ("read", "fault"),
     [
-        (struct_read("struct: [u8 4]"), ("no-match", "nothing declared matches ff 01")),
+        (struct_read("struct: [u8 4]"), ("no-match", "no declaration matches ff 01")),
         (regex("^hello$"), ("bad-text", r"hex ff is not utf-8 text")),
     ],
     ids=["struct", "regex"],

@@ -152,7 +152,7 @@ def test_a_secret_shows_in_no_message() -> None:
     """Not even when the robot echoes it."""
     talk = logged_in()
     talk.says("you said s3cret-word!")
-    assert talk.messages[-1] == "nothing declared matches 'you said •••!'"
+    assert talk.messages[-1] == "no declaration matches 'you said •••!'"
     assert not any("s3cret" in message for message in talk.messages)
 
 

@@ -223,7 +223,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { wire: "LOAD 3\\n" }, expect: { load: 3 }'),
-            "3:9 1: no-match: nothing declared matches 'LOAD 3'; load: expected 3, but nothing set"
+            "3:9 1: no-match: no declaration matches 'LOAD 3'; load: expected 3, but nothing set"
             " it: 'LOAD 3' is a reply without its request (write polls: [load])",
         ),
         (
@@ -245,7 +245,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { wire: "what?\\n" }', "wait: 1s, expect: { hook: { age: never } }"),
-            "3:9 1: no-match: nothing declared matches 'what?' (if this is intended, add 'fails')",
+            "3:9 1: no-match: no declaration matches 'what?' (if this is intended, add 'fails')",
         ),
         (
             steps("run: ask, sent: { once: ASK }", "wait: 9s"),
@@ -367,7 +367,7 @@ def test_messages_are_fed_and_compared(
     monkeypatch.setitem(globals(), "DRIVER", ROVER)
     found = outcome(tmp_path, test)[0]
     if told is None:
-        assert "nothing declared matches" in found[0]
+        assert "no declaration matches" in found[0]
     else:
         assert found == ([told] if told else [])
 

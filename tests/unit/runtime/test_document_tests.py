@@ -133,7 +133,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
 @pytest.mark.parametrize(
     ("test", "message"),
     [
-        (trial(feed={"wire": "nota hi\n"}), "no-match: nothing declared matches 'nota hi'"),
+        (trial(feed={"wire": "nota hi\n"}), "no-match: no declaration matches 'nota hi'"),
         (
             trial(feed={"wire": "note hi"}),
             "no message or reply matches the fed data; is the end of the frame missing?",
@@ -146,7 +146,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
             trial(feed={"wire": "ok"}, run="stop"),
             "stop should be done, but no reply arrived or no command was run",
         ),
-        (trial(feed={"wire": "no\n"}, run="stop"), "no-match: nothing declared matches 'no'"),
+        (trial(feed={"wire": "no\n"}, run="stop"), "no-match: no declaration matches 'no'"),
         (
             trial(feed={"wire": "ok\n"}, run="say", arguments={"word": "x"}),
             "the test checks nothing; add 'expect', 'sent' or 'fails'",
@@ -170,14 +170,14 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
-            "no-match: nothing declared matches 'full';"
+            "no-match: no declaration matches 'full';"
             " battery: expected 100, but nothing set it:"
             " 'full' does not fit the 'regex' of polls.0, which was sent",
         ),
         (
             trial(feed={"wire": "a\n" * 5}, reply_to=0, expect={"battery": 1}),
-            "no-match: nothing declared matches 'a'; no-match: nothing declared matches 'a';"
-            " no-match: nothing declared matches 'a'; and 2 more;"
+            "no-match: no declaration matches 'a'; no-match: no declaration matches 'a';"
+            " no-match: no declaration matches 'a'; and 2 more;"
             " battery: expected 1, but nothing set it:"
             " 'a' does not fit the 'regex' of polls.0, which was sent",
         ),

@@ -81,7 +81,7 @@ def test_a_secret_is_kept_out_of_all_that_comes_in(form: str) -> None:
         Sample("word", f"it is {form}", 1.0),
         Sample("dump", data, 1.0),
         Sample("pose", {"in": form, form: 1}, 1.0),
-        LogEntry(1.0, "warning", "wire", f"no-match: nothing declared matches '{form}'"),
+        LogEntry(1.0, "warning", "wire", f"no-match: no declaration matches '{form}'"),
         LinkStatus("wire", "lost", f"tcp {form}", 1.0, f"refused {form}"),
         Traffic(1.0, "wire", "received", data),
         Traffic(1.0, "air", "received", data, Envelope("message", {"topic": "/a"}, form)),
@@ -105,12 +105,10 @@ def test_a_secret_that_comes_in_pieces_is_kept_out(form: str, size: int) -> None
 @pytest.mark.parametrize("end", ["...", "'...", "'", "", " …"])
 def test_a_secret_that_a_note_cuts_off_is_no_more_shown(end: str) -> None:
     """Faults quote the first letters of what came."""
-    note = LogEntry(
-        1.0, "warning", "wire", f"no-match: nothing declared matches 'pw hunter2-a{end}"
-    )
+    note = LogEntry(1.0, "warning", "wire", f"no-match: no declaration matches 'pw hunter2-a{end}")
     found = shown(hub_of("hunter2-and-3"), note)
     assert "hunt" not in found
-    assert "nothing declared matches 'pw ‹secret›" in found
+    assert "no declaration matches 'pw ‹secret›" in found
 
 
 def test_a_word_that_only_begins_like_a_secret_is_shown() -> None:

@@ -86,7 +86,7 @@ async def test_traffic_and_notes_come_in_their_order() -> None:
     """With the line, the direction, and the bytes."""
     async with scene() as it:
         it.goes(b"ask\n", "sent")
-        it.robot.log("no-match: nothing declared matches 'x'")
+        it.robot.log("no-match: no declaration matches 'x'")
         it.goes(b"42\n")
         rows = await it.rows()
         assert [(row["kind"], row["line"], row["data"]) for row in rows] == [

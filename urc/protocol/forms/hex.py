@@ -53,7 +53,7 @@ class BytesWriter:
         )
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of pieces such as ``{{ name | u16be }}``; None without a match."""
+        """Return the values of pieces such as ``{{ name | u16be }}``; None if they do not match."""
         data, at = frame.payload, 0
         if not isinstance(data, bytes):
             return None

@@ -36,7 +36,7 @@ class JsonWriter:
         try:
             return self._encode(value)
         except TypeError as error:
-            raise NotWritable(f"this cannot be written as JSON: {error}") from None
+            raise NotWritable(f"the value cannot be written as JSON: {error}") from None
         except ValueError:
             raise NotWritable("JSON cannot represent infinity or NaN") from None
 

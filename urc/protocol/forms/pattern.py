@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression that runs in linear time. Every repeat is possessive and
-matches only characters that cannot follow it.
+A pattern becomes a regular expression that runs in linear time. Every quantifier is possessive and
+repeats only characters that cannot come next.
 """
 
 import re

@@ -36,7 +36,7 @@ class RegexReader:
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
         if found is None or any(found[name] != texts[name] for name in texts if name in found):
-            raise NotWritable(f"no text with {quoted(texts)} fits {self._pattern.source!r}")
+            raise NotWritable(f"no text with {quoted(texts)} matches {self._pattern.source!r}")
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:

@@ -37,7 +37,7 @@ class TextWriter:
             raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the text at each plain name, keyed by name; None if the frame does not match.
+        """Return the text for each plain name, keyed by name; None if the frame does not match.
 
         A counter's number has the key ``seq.NAME``. A field ends at the next occurrence of the
         literal text that follows it. The last field ends before the literal text at the end of the

@@ -16,7 +16,7 @@ class ChecksumTrailer:
     def __init__(self, spec: TrailerSpec, start: bytes) -> None:
         self._spec = spec
         self._before = b"" if spec.each else start
-        """Bytes of the frame before the text; all positions count these bytes."""
+        """Bytes of the frame before the text; all positions include these bytes."""
         self._checksum = Checksum(spec.checksum)
         self._size = self._checksum.size
 

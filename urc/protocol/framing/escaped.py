@@ -1,4 +1,4 @@
-"""Framings that stuff the whole content between two markers.
+"""Framings that apply byte stuffing to the whole content between two markers.
 
 Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between the
 markers is stuffed last, so the length field and the checksum refer to the original bytes. If every
@@ -57,7 +57,7 @@ class EscapedFraming(NamedTuple):
             raise FramingError("an empty frame cannot be sent between two markers")
         content = self.stuffing.stuff(inner)
         if self.stuffing.spec.after and self.codec.length is None and self.tx in content:
-            raise FramingError(f"{payload!r} contains the end of a frame, {self.tx!r}")
+            raise FramingError(f"{payload!r} contains the end marker {self.tx!r}")
         is_bare = self.stuffing.is_doubled and start == self.stuffing.escape
         if is_bare and inner[:1] in (start, end[1:]):
             raise FramingError(f"{payload!r} would look like a marker after {start.hex()}")
@@ -104,7 +104,7 @@ class _DoubledDecoder(StreamDecoder):
         self._start, self._end = framing.codec.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
-        """Number of scanned frame bytes that contain no end; -1 before a frame starts."""
+        """Number of scanned frame bytes that contain no end marker; -1 before a frame starts."""
 
     def restart(self) -> None:
         super().restart()
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return a frame, a violation or None; after None, search again if `_searched` is -1."""
+        """Return a frame, a violation or None; if None and `_searched` is -1, search again."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -180,7 +180,7 @@ class _DoubledDecoder(StreamDecoder):
     def _too_long(self) -> FrameFault | None:
         self._stream.at = len(self._stream.data)
         self._searched = -1
-        text = f"a frame has more than {self._max_bytes} bytes without its end; dropped"
+        text = f"a frame has more than {self._max_bytes} bytes without an end marker; dropped"
         return self._lost("frame-too-long", text)
 
 

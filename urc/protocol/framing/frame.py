@@ -223,7 +223,7 @@ class LengthField:
         place = slice(spec.offset, spec.offset + spec.size)
         if self.end <= stop and spec.flag_at >= 0 and not frame[spec.flag_at] & spec.flag_mask:
             if number or left:
-                text = f"expected {spec.adjust} bytes without the flag, found {len(frame)}"
+                text = f"expected {spec.adjust} bytes if the flag is unset, found {len(frame)}"
                 raise BadFrame("wrong-size", text)
             return  # the bytes there belong to the payload
         if left:

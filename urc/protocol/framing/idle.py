@@ -1,4 +1,4 @@
-"""The framings ``idle`` (silence ends a frame) and ``datagram`` (each receive yields a frame)."""
+"""The framings ``idle`` (silence ends a frame) and ``datagram`` (each block is a frame)."""
 
 from typing import NamedTuple, cast
 
@@ -42,7 +42,7 @@ class IdleFraming(NamedTuple):
 
 
 class DatagramFraming(NamedTuple):
-    """Frames that arrive whole: each receive yields one frame."""
+    """Frames that arrive whole: each received block of bytes is one frame."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -66,7 +66,7 @@ class DatagramFraming(NamedTuple):
 
 
 class _WholeDecoder(StreamDecoder):
-    """A decoder that returns the bytes from each receive as one frame."""
+    """A decoder that returns each received block of bytes as one frame."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, codec: FrameCodec | None, max_bytes: int

@@ -26,7 +26,7 @@ Search = Callable[[bytes | bytearray, int], Any]
 """Search function that returns the next `re` or RE2 match after a start offset, or None."""
 
 _SMALL: Final = 256
-"""Maximum size of a buffer that is searched after every receive, in bytes."""
+"""Maximum size of a buffer that is searched whenever bytes arrive, in bytes."""
 _GROWTH: Final = 8
 """A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005

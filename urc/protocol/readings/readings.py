@@ -110,7 +110,7 @@ class Readings:
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal, which then needs `follow`."""
+        """Return whether a formula or a timed alarm uses the signal, so that it needs `follow`."""
         return name in self._kept
 
     @property

@@ -225,7 +225,7 @@ class Conversation(Connection):
         return sent
 
     def _count_again(self, exchange: Exchange, number: int | None) -> Numbered | None:
-        """Render the frame of a request again after another frame has used its numbers."""
+        """Render a request's frame again after another frame has used its counter numbers."""
         try:
             made = written(exchange, self.counters, self.learnt)
         except BadArgument:
@@ -487,8 +487,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events for a frame whose match result for a request is `offer`.
 
-        A provisional reply may also be a message. Without `frame`, the message has already been
-        reported.
+        A provisional reply may also be a message. A `frame` of None means that the message has
+        already been reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []

@@ -93,7 +93,7 @@ class CompiledRequest(NamedTuple):
     """Reader for the reply if the request has a single reply that contains only samples; otherwise
     None."""
     is_miss_harmless: bool = False
-    """Whether only the poll counts missing replies. If so, a missing reply does not indicate a lost
+    """Whether missing replies are counted only for the poll and never indicate a lost
     connection."""
     is_numbered: bool = False
     """Whether the request is an envelope with a number that the reply repeats."""

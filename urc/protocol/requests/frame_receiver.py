@@ -65,7 +65,7 @@ new = tuple.__new__
 """Fast constructor of named tuples, used for every frame."""
 _SHOWN_BYTES = 20
 """Number of bytes from an unknown frame to include in a message."""
-_NO_MATCH = "nothing declared matches "
+_NO_MATCH = "no declaration matches "
 
 
 class FrameReceiver:
@@ -248,7 +248,7 @@ class FrameReceiver:
         if fault:
             return Violation(self._spec.name, "bad-value", self.secrets.hide(fault))
         if frame.topic is not None:
-            where = f"nothing declared matches the data on {frame.topic!r}"
+            where = f"no declaration matches the data on {frame.topic!r}"
             return Violation(self._spec.name, "no-match", self.secrets.hide(where))
         was_text_wanted = getattr(frame, "was_text_wanted", False)
         try:

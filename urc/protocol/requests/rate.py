@@ -127,7 +127,7 @@ class Counters:
         Args:
             encode: function that renders a frame with the given numbers.
             length: number of frames to render.
-            made: cache of rendered frames, which this series reuses and then replaces.
+            made: cache of rendered frames; the method reuses its frames and replaces its content.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):

@@ -103,7 +103,7 @@ def _read_line(
     if length is not None and length > MAX_FIXED:
         raise BadDefinition(f"{owner}: the array {name[0]} has {length} elements")
     if name[0] in fields:
-        raise BadDefinition(f"{owner} has two fields {name[0]}")
+        raise BadDefinition(f"{owner} has two fields named {name[0]}")
     fields[name[0]] = MessageField(
         name[0], word, length, _default(word, after, length, owner), bound
     )

@@ -64,13 +64,13 @@ def build_read(
 
 
 def read_safely(read: Read, data: bytes) -> dict[str, Any]:
-    """Read a message; raise `BadRosMessage` if it does not fit its definition."""
+    """Read a message; raise `BadRosMessage` if it does not match its definition."""
     try:
         return read(data)
     except BadRosMessage:
         raise
     except _FAULTS as fault:
-        raise BadRosMessage(f"the message does not fit its definition ({fault})") from fault
+        raise BadRosMessage(f"the message does not match its definition ({fault})") from fault
 
 
 def _bad(text: str) -> None:
@@ -265,7 +265,7 @@ class _ReadGenerator:
             return ""
         name = self._name()
         with self._block(f"if {count} > end - p:"):
-            self._emit("bad('a text is longer than its message')")
+            self._emit("bad('a string is longer than its message')")
         if layout.is_wide:
             self._emit(f"{name} = wide(data[p : p + {count}], {self._order!r})")
         else:
@@ -389,7 +389,7 @@ class _ReadGenerator:
             inner._count = self._count + 1000
             value = inner._read(element, wanted)
             if inner._lines or not inner._names:
-                raise AssertionError("an element of constant size needs no code of its own")
+                raise AssertionError("an element of constant size needs no separate code")
             for one in inner._floats:
                 value = _with_check(value, one)
             form = "".join(inner._parts)

@@ -165,12 +165,12 @@ class TopicCodec:
 
     def _layout(self, schema: _Schema) -> Record:
         if schema.encoding not in ("cdr", "ros1"):
-            raise BadDefinition(f"messages in {schema.encoding!r} cannot be read")
+            raise BadDefinition(f"the message encoding {schema.encoding!r} is not supported")
         parse = {"ros2msg": parse_msg, "ros1msg": parse_msg, "ros2idl": parse_idl}.get(
             schema.notation
         )
         if parse is None:
-            raise BadDefinition(f"definitions in {schema.notation!r} cannot be read")
+            raise BadDefinition(f"the definition notation {schema.notation!r} is not supported")
         found = parse(schema.type, schema.text)
         self._known[plain_name(schema.type)] = found
         self._writers.pop((plain_name(schema.type), schema.encoding == "ros1"), None)

@@ -318,7 +318,7 @@ def _reason(layout: Layout, value: object, path: str) -> str:
             if layout.is_time and value == NOW:
                 return ""
             if not isinstance(value, Mapping):
-                return f"{shown} is not an object of fields"
+                return f"{shown} is not a mapping of fields"
             fields = dict(layout.fields)
             for name, inner in value.items():
                 if name not in fields:
@@ -359,6 +359,6 @@ def _is_number(code: str, value: object) -> bool:
 
 
 _WORDS: Final = {
-    "?": "truth value", "f": "number", "d": "number",
+    "?": "boolean", "f": "number", "d": "number",
     **{code: f"whole number of {8 * SIZES[code]} bits" for code in "bBhHiIqQ"},
 }  # fmt: skip

@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function that converts a value to a raw number and the value of that number."""
+    """Return a function from a value to its raw number and the value of that raw number."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:

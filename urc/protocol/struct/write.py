@@ -66,7 +66,7 @@ class StructWriteScope(NamedTuple):
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps that write the items in a scope of their own."""
+    """Return the steps that write the items in a separate scope."""
     rules = StructWriteScope(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 

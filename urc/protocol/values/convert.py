@@ -163,7 +163,7 @@ def _from_base(base: int) -> Step:
                 return int(raw, base)
             except ValueError:
                 pass
-        raise BadValue(f"{quoted(raw)} is not a whole number of base {base}")
+        raise BadValue(f"{quoted(raw)} is not a whole number in base {base}")
 
     return convert
 
@@ -273,7 +273,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
         number = number_of(value) - offset
         raw = number * divisor if divisor else number / scale
         if not math.isfinite(raw):
-            raise BadValue(f"{quoted(value)} has no raw number")
+            raise BadValue(f"{quoted(value)} has no corresponding raw number")
         return _tidy(raw)
 
     return convert

@@ -192,8 +192,8 @@ def test_a_time_of_now_is_left_to_the_sender() -> None:
         ({"linear": {"x": "fast"}}, "linear.x: 'fast' is not a number"),
         ({"linaer": {}}, "the message has no 'linaer'; it has: linear, angular"),
         ({"linear": {"w": 1}}, "linear has no 'w'; it has: x, y, z"),
-        ({"linear": 5}, "linear: 5 is not an object of fields"),
-        ([], "the message: [] is not an object of fields"),
+        ({"linear": 5}, "linear: 5 is not a mapping of fields"),
+        ([], "the message: [] is not a mapping of fields"),
     ],
 )
 def test_a_message_that_does_not_fit_names_its_field(message: object, reason: str) -> None:
@@ -208,7 +208,7 @@ def test_a_message_that_does_not_fit_names_its_field(message: object, reason: st
     [
         ("float64", "pkg/T: 'float64' is not a field"),
         ("int32 x one", "pkg/T: 'one' is not a value of int32"),
-        ("int32 x\nint32 x", "pkg/T has two fields x"),
+        ("int32 x\nint32 x", "pkg/T has two fields named x"),
         ("int32[9999999] x", "pkg/T: the array x has 9999999 elements"),
         ("x" * 300_000, "the definition of pkg/T has more than 262144 characters"),
         ("Missing x", "the type Missing has no definition"),

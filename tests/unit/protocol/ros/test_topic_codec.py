@@ -38,7 +38,7 @@ def test_a_message_is_read_after_its_definition() -> None:
     [
         (b"\0\2\0\0\5", "/a: the message begins with 00 02 00 00, which is not CDR"),
         (b"", "/a: the message begins with , which is not CDR"),
-        (b"\0\1\0\0", "/a: the message does not fit its definition ("),
+        (b"\0\1\0\0", "/a: the message does not match its definition ("),
     ],
 )
 def test_a_bad_message_is_a_fault_with_its_topic(data: bytes, text: str) -> None:
