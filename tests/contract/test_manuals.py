@@ -69,7 +69,7 @@ One \\*lamp\\*, and \\[no link\\](x).
 
 ## Signals
 
-| signal |  | type | limits | states | old after |
+| signal |  | type | limits | states | stale after |
 |---|---|---|---|---|---|
 | `level` | Level | integer | warning at or above 9, hysteresis 1 | `0` off\\|dark | 2s |
 

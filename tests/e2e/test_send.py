@@ -240,7 +240,7 @@ async def test_whoever_drives_on_a_running_server_is_not_driven_against(
         done = await send(profile, "go", *place)
         assert (done.returncode, done.stdout) == (1, "")
         assert done.stderr.startswith(
-            f"urc send: go failed (not-allowed): screen 1 drives the robot on http://{address}"
+            f"urc send: go failed (not-allowed): screen 1 is driving the robot on http://{address}"
         )
         assert (await send(profile, "halt", *place)).returncode == 0
     server.interrupt()

@@ -288,7 +288,7 @@ async def test_urc_send_asks_a_server_over_https(urc_process: Start, tmp_path: P
             if (lease := json.loads(said))["t"] == "lease" and lease["holder"]:
                 break
         done = await asyncio.to_thread(run, "send", str(file), "go", *place)
-        assert f"screen 1 drives the robot on {address}" in done.stderr
+        assert f"screen 1 is driving the robot on {address}" in done.stderr
         (tmp_path / "data" / "tls" / "authority.pem").write_bytes(
             CertificateAuthority(tmp_path / "other", ["localhost"], datetime.now(UTC)).pem
         )

@@ -58,7 +58,7 @@ class AlarmStore:
         """Number of events that the history has lost since the start."""
         self._most_events = most_events
         self._known: dict[str, dict[str, AlarmRecord]] | None = None
-        """Newest record of each alarm, by robot and signal; None before the first `load`."""
+        """Newest record of each alarm, keyed by robot and signal; None before the first `load`."""
         self._records: _Records = {}
         self._events: deque[tuple[str, AlarmEvent]] = deque()
         self._wakes = threading.Condition()
@@ -91,7 +91,7 @@ class AlarmStore:
         records: Mapping[str, AlarmRecord | None],
         events: Iterable[AlarmEvent],
     ) -> None:
-        """Queue events, and changed records by signal (None for no alarm); return immediately."""
+        """Queue events and records, keyed by signal (None means no alarm); return immediately."""
         with self._wakes:
             self._records |= {(robot, signal): one for signal, one in records.items()}
             if self._known is not None:

@@ -130,7 +130,7 @@ def _create(base: sqlite3.Connection) -> None:
 def save_records(
     base: sqlite3.Connection, records: Mapping[tuple[str, str], AlarmRecord | None]
 ) -> None:
-    """Write records by robot and signal, inside a transaction; for None, delete the record."""
+    """Write records, keyed by robot and signal, inside a transaction; delete a record if None."""
     gone = [key for key, record in records.items() if record is None]
     base.executemany("DELETE FROM states WHERE robot = ? AND signal = ?", gone)
     there = [

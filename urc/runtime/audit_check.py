@@ -3,7 +3,7 @@
 Layer 4. All functions block, so servers call them in a thread.
 
 Each exported line has the link before its entry (``before``) and the entry's own link (``chain``).
-Each line can be checked on its own, so an export for selected robots can also be checked. Lines
+Each line can be checked separately, so an export for selected robots can also be checked. Lines
 with consecutive numbers must also match each other.
 """
 
@@ -136,7 +136,7 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
 def compare(file: Path, export: ExportCheck) -> str:
     """Return a message if the audit log lacks an export's last entry, otherwise ""; see `check`.
 
-    An export kept elsewhere therefore shows whether entries were cut off the end of the log.
+    An export kept elsewhere therefore shows whether entries were removed from the end of the log.
 
     Raises:
         OSError: the audit log cannot be read.

@@ -48,7 +48,7 @@ def _harmless(
             take(self, *args, **named)
         except Exception:  # supervisor: motion and STOP must continue
             if not self.is_faulty:
-                log.exception("an event is missing in the audit log of %s", self.robot)
+                log.exception("an event is missing from the audit log of %s", self.robot)
             self.is_faulty = True
 
     return taken
@@ -75,7 +75,7 @@ class AuditRecorder:
         utc: Callable[[], float],
         secrets: Iterable[str] = (),
     ) -> None:
-        """Begin with no motion.
+        """Create a recorder with no motion in progress.
 
         Args:
             robot: name of the robot.
@@ -106,7 +106,7 @@ class AuditRecorder:
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Add strings to redact from now on."""
+        """Add strings to redact in later entries."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._disguises = SecretForms(self._secrets)

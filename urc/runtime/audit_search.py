@@ -36,7 +36,7 @@ class AuditQuery(NamedTuple):
     robots: frozenset[str] | None = None
     """Robots whose entries may be shown; None allows all entries, including the server's."""
     robot: str = ""
-    """Name of the only robot; "" for all robots."""
+    """Name of one robot; "" for all robots."""
     who: str = ""
     """Part of the name or address of a person, device or program, or its complete identifier."""
     what: tuple[str, ...] = ()

@@ -309,7 +309,7 @@ def _check_end(opened: IO[bytes], name: str) -> None:
     opened.seek(max(0, size - _END_BYTES))
     end = opened.read(_END_BYTES)
     if len(end) < _END_BYTES or not end.startswith(b"PK\x05\x06"):
-        raise BackupError(f"{name}: this is not a URC backup, or its end is missing")
+        raise BackupError(f"{name}: this is not a URC backup, or the file is truncated")
     count, directory = struct.unpack("<HI", end[10:16])
     if count > MOST_FILES or directory > MOST_FILES * _ENTRY_BYTES:
         raise BackupError(f"{name}: the archive has too many files")

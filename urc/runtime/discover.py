@@ -65,7 +65,7 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
     values = said.body if isinstance(said.body, Mapping) else NOTHING
     names, types = values.get("topics"), values.get("types")
     if not isinstance(names, list) or not isinstance(types, list):
-        raise TransportError(f"{transport.address}: the reply of rosapi contains no topics")
+        raise TransportError(f"{transport.address}: the reply from rosapi contains no topics")
     types += [""] * (len(names) - len(types))
     return sorted(RosTopic(str(name), str(kind)) for name, kind in zip(names, types, strict=False))
 

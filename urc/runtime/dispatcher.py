@@ -1,7 +1,7 @@
 """The dispatcher: the only caller of a driver's engine.
 
-All calls to the engine run on the event loop, one after another, and are never nested. Performing
-an event only changes the state of a `Link`, the hub or a future. The links' tasks react later. A
+All calls to the engine run on the event loop, one after another, and are never nested. Executing an
+event only changes the state of a `Link`, the hub or a future. The links' tasks react later. A
 driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
@@ -187,7 +187,7 @@ class LinkPort(Protocol):
 
 
 class Dispatcher:
-    """The owner of an engine, which performs the engine's events."""
+    """The owner of an engine, which executes the engine's events."""
 
     def __init__(
         self,
@@ -205,7 +205,7 @@ class Dispatcher:
             engine: the engine, which other code must not call from now on.
             hub: destination of readings and log entries.
             clock: source of time.
-            commands: the driver's commands.
+            commands: the driver's commands, keyed by name.
             limit_s: function that returns the maximum wait for a command in seconds, even if the
                 engine is still busy.
             sequence_control: state and controls of each sequence, by sequence name.

@@ -1,7 +1,7 @@
 """JSON Schemas of Foxglove's standard messages, which viewers recognise by name.
 
 Layer 4. Pure. Source: github.com/foxglove/foxglove-sdk, schemas/jsonschema (MIT), on npm as
-``@foxglove/schemas`` 2.1. The descriptions are left out.
+``@foxglove/schemas`` 2.1. The descriptions are omitted.
 """
 
 from collections.abc import Mapping

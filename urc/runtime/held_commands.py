@@ -129,7 +129,7 @@ class HeldControl:
     """Epoch of the lease in which the command was stopped; motion requires a later epoch."""
 
     def rest(self) -> None:
-        """Set the control to rest."""
+        """Reset the slew rate limit, because the control is at rest."""
         if self.slew is not None:
             self.slew.reset()
 

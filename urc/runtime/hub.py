@@ -250,7 +250,7 @@ class Hub:
         redactor: Redactor | None = None,
         streams: Iterable[str] = (),
     ) -> None:
-        """Begin with no values.
+        """Create a hub without values.
 
         Args:
             signals: the driver's signals.

@@ -19,7 +19,7 @@ from urc.runtime.package_preview import PackagePreview, look
 __all__ = ["PreviewWorker", "bound_this_process", "look_apart"]
 
 TOTAL_S: Final = 60.0
-"""Maximum time for a preview, in seconds; long enough for small and busy machines."""
+"""Maximum time for a preview, in seconds; long enough for slow computers."""
 PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.isolation")
@@ -50,12 +50,12 @@ def look_apart(
             command, input=asked.encode(), capture_output=True, timeout=total_s, check=False
         )
     except subprocess.TimeoutExpired:
-        raise UrcError(f"{document.name}: its preview took longer than {total_s:g} s") from None
+        raise UrcError(f"{document.name}: the preview took longer than {total_s:g} s") from None
     try:
         said = json.loads(done.stdout)
     except ValueError:
         raise UrcError(
-            f"{document.name}: its preview needs more than {PROCESSOR_S} s of processor time or"
+            f"{document.name}: the preview needs more than {PROCESSOR_S} s of processor time or"
             f" {MEMORY_BYTES >> 20} MiB of memory"
         ) from None
     if "problems" in said:
@@ -130,7 +130,7 @@ def _main() -> int:
         }
     text = json.dumps(said)
     if len(text) > _ANSWER_BYTES:
-        text = json.dumps({"fault": f"{document}: its preview is too large"})
+        text = json.dumps({"fault": f"{document}: the preview is too large"})
     sys.stdout.write(text)
     return 0
 

@@ -108,7 +108,7 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int) -> bytes:
 
     Args:
         signal: the signal.
-        sample: one of its readings.
+        sample: a reading of the signal.
         time_ns: time of the reading, in nanoseconds since 1970.
     """
     value = sample.value
@@ -156,7 +156,7 @@ def log_message(note: LogEntry, time_ns: int) -> bytes:
 
 
 def stamp(time_ns: int) -> dict[str, int]:
-    """Return a time as in Foxglove's messages; `time_ns` is in nanoseconds since 1970."""
+    """Return a time in the form of Foxglove's messages; `time_ns` is in nanoseconds since 1970."""
     return {"sec": time_ns // _SECOND_NS, "nsec": time_ns % _SECOND_NS}
 
 

@@ -9,8 +9,8 @@ connection. Every connection ends through `_end`, and only `_serve` stops the re
 A connection counts as good after its first valid frame, and only a good connection resets the
 backoff. URC therefore does not flood a robot that accepts every connection and then closes it. If
 there are ``on_connect`` steps, frames do not count until the steps are done, because a robot may
-refuse the login after a greeting. Pages show the `LinkStatus`. During failed attempts, only the
-status's number of attempts changes.
+refuse the login after a greeting. Pages show the `LinkStatus`. While attempts fail, only the number
+of attempts in the status changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` avoids task switches. Bytes that arrive while the reader waits
@@ -231,7 +231,7 @@ class Link:
         until = self._clock.now() + STUCK_S
         while self.is_connected and not self._outgoing.is_written:
             if self._clock.now() >= until:
-                return f"{self._transport.address} takes nothing"
+                return f"{self._transport.address} accepts no data"
             await self._clock.sleep(_LOOK_S)
         if self.is_connected and isinstance(self._transport, SupportsSettle):
             try:

@@ -102,7 +102,7 @@ def _signals(signals: Mapping[str, Signal]) -> Iterator[str]:
         )
         for signal in signals.values()
     ]
-    header = ("signal", "", "type", "unit", "range", "limits", "states", "old after")
+    header = ("signal", "", "type", "unit", "range", "limits", "states", "stale after")
     yield from _table(header, rows)
     yield from _descriptions(signals.values())
     yield from _alarms(signals.values())
@@ -176,8 +176,8 @@ def _commands(driver: Driver) -> Iterator[str]:
             yield f"- held: sent every {every} while the control is held"
         if command.moves:
             where = f" where {_code(command.moves_if.source)}" if command.moves_if else ""
-            until = "refused while STOP is latched or another operator drives"
-            yield f"- moves the robot by itself{where}: {until}"
+            until = "refused while STOP is latched or another operator is driving"
+            yield f"- moves the robot autonomously{where}: {until}"
         if command.stops:
             yield "- sent once when STOP is pressed"
         yield ""
@@ -253,7 +253,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Describe what the server sends after a release, or after the operator is lost."""
+    """Describe what the server sends after a release or a loss of contact with the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -270,7 +270,7 @@ def _releases(driver: Driver) -> Iterator[str]:
 
 
 def _by_itself(watchdog_s: float | None) -> str:
-    """Describe what the robot itself does if no more frames arrive, not even for a release."""
+    """Describe what the robot does if no more frames arrive, not even for a release."""
     if watchdog_s is None:
         return "The document does not state whether the robot stops by itself."
     if math.isinf(watchdog_s):

@@ -117,4 +117,4 @@ class MotionInterlock:
                 line.close()
         if by:
             return printable(f"STOP was latched by {by}: reset it first on {url}")
-        return printable(f"{holder} drives the robot on {url}") if holder else ""
+        return printable(f"{holder} is driving the robot on {url}") if holder else ""

@@ -45,13 +45,13 @@ class _Shared(Protocol):
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
         """Send a frame with counters without waiting; return whether the frame was accepted.
 
-        `left` receives the sent frame.
+        The callback `left` receives the sent frame.
         """
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
         """Send a frame with counters; wait until the frame is sent.
 
-        `left` receives the sent frame.
+        The callback `left` receives the sent frame.
         """
 
 
@@ -103,7 +103,7 @@ class OutputBuffer:
         return not self._bytes
 
     def reset(self, prompt: Prompt | None = None) -> None:
-        """Empty the buffer; `prompt` is the transport if it can write without waiting."""
+        """Empty the buffer; `prompt` is the transport if it writes without waiting, else None."""
         self._prompt = prompt
         self._waiting.clear()
         self._bytes = 0

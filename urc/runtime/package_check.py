@@ -85,7 +85,7 @@ def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
     try:
         faults = [str(fault) for fault in json.loads(done.stdout)]
     except ValueError:
-        return [f"{document}: the check exceeded its limits of memory and time"]
+        return [f"{document}: the check exceeded its memory or time limit"]
     return [fault[:_FAULT_LONGEST] for fault in faults[:_FAULTS_MOST]]
 
 

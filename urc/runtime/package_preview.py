@@ -51,13 +51,13 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
         *(phrase("makes the browser show the page {url}", url=url) for url in checked.pages),
         *(
             phrase(
-                "widget {name}: a program in a frame of its own; it sees and sends only what its"
-                " cell is bound to",
+                "widget {name}: a program in a separate frame; it can read and send only what its"
+                " slot is bound to",
                 name=name,
             )
             for name in widgets
         ),
-    ] or [phrase("nothing: it is only a layout, without connections")]
+    ] or [phrase("nothing: the package is only a layout, without connections")]
 
 
 def _check_inside(checked: CheckResult, folder: Path) -> None:

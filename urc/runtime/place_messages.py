@@ -1,10 +1,11 @@
 """Poses, positions on the Earth and laser scans as Foxglove's standard messages.
 
-Layer 4. Pure. A signal is a number or a list without a meaning for other programs. The widgets of a
-profile give it one: a map shows where the robot is, and a scan shows distances around it.
+Layer 4. Pure. To other programs, a signal is a number or a list without a meaning. The widgets of a
+profile supply the meaning: a map shows the robot's position, and a scan shows distances around the
+robot.
 
 Positions are in metres and angles in radians, as in REP 103. JSON has no number for an unknown
-distance, so it becomes 0, below the minimum of every sensor.
+distance, so the message contains 0, which is below the minimum of every sensor.
 """
 
 import math

@@ -27,7 +27,7 @@ class RepeatLimiter(Generic[_Key]):
     """A counter for repeated events that do not have an entry yet."""
 
     def __init__(self, burst: int = 16, per_s: float = 16.0) -> None:
-        """Begin with no events.
+        """Create a limiter without events.
 
         Args:
             burst: maximum number of entries at once.

@@ -235,7 +235,9 @@ class ServerRecorder:
         jump_s, self._ahead_s = ahead_s - self._ahead_s, ahead_s
         if abs(jump_s) >= CLOCK_JUMP_S:
             way = "ahead" if jump_s > 0 else "back"
-            text = f"the clock went {way} by {abs(jump_s):.0f} s: it was set, or the machine slept"
+            text = (
+                f"the clock jumped {way} by {abs(jump_s):.0f} s: it was set, or the machine slept"
+            )
             self._record("clock", NO_ACTOR, outcome=text, lasted_s=round(jump_s, 1))
 
     def flush(self, *, is_last: bool = False) -> None:
@@ -295,7 +297,7 @@ class ServerRecorder:
             self._note(entry)
         except Exception:  # supervisor: signing in and STOP must continue
             if not self.is_faulty:
-                log.exception("an event is missing in the audit log")
+                log.exception("an event is missing from the audit log")
             self.is_faulty = True
 
     def _hidden(self, text: str) -> str:

@@ -114,7 +114,7 @@ class SignalHints:
             if cuts and not any(self._fits(cut, transport, one) for cut in cuts for one in reads):
                 form = next(one.form for one in reads if signal in one.fields)
                 text = _shown(cuts[-1], spec.encoding)
-                return f"{text} does not fit the {form!r} of {label}, which was sent"
+                return f"{text} does not match the {form!r} of {label}, which was sent"
         return ""
 
     def _were_asked(self, transport: str) -> Iterator[tuple[str, Reply]]:

@@ -218,7 +218,7 @@ class TestEngine:
         raise UrcError(f"more than {_MOST_TICKS} deadlines are due within {seconds:g} s")
 
     def pass_to_deadline(self, end: float = float("inf")) -> bool:
-        """Advance to the next deadline before `end`; return whether there was one."""
+        """Advance to the next deadline up to `end`; return False if there is no such deadline."""
         due = self.engine.deadline
         if due is None or due > end:
             return False
@@ -227,7 +227,7 @@ class TestEngine:
         return True
 
     def perform(self, events: list[Event]) -> None:
-        """Perform events as a link would."""
+        """Execute events as a dispatcher would."""
         for poll in self.driver.polls:
             if self.engine.lines[poll.transport].has(poll.name) or poll.reply is None:
                 self.used.add(("poll", poll.name))

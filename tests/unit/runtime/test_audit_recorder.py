@@ -116,7 +116,7 @@ def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
     recorder.leased(LeaseState(1, ANN), 3.0)
     assert recorder.is_faulty
     told = [one.getMessage() for one in caplog.records]
-    assert told == ["an event is missing in the audit log of rover"]
+    assert told == ["an event is missing from the audit log of rover"]
 
 
 def test_secrets_that_come_later_are_hidden_too_and_the_longest_first() -> None:

@@ -485,7 +485,7 @@ def test_other_files_are_no_backup(tmp_path: Path) -> None:
         with pytest.raises(BackupError, match=text):
             restored(file, tmp_path / "new")
     other.write_bytes(b"")
-    with pytest.raises(BackupError, match="this is not a URC backup, or its end is missing"):
+    with pytest.raises(BackupError, match="this is not a URC backup, or the file is truncated"):
         restored(other, tmp_path / "new")
 
 

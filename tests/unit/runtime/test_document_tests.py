@@ -172,14 +172,14 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
             "no-match: no declaration matches 'full';"
             " battery: expected 100, but nothing set it:"
-            " 'full' does not fit the 'regex' of polls.0, which was sent",
+            " 'full' does not match the 'regex' of polls.0, which was sent",
         ),
         (
             trial(feed={"wire": "a\n" * 5}, reply_to=0, expect={"battery": 1}),
             "no-match: no declaration matches 'a'; no-match: no declaration matches 'a';"
             " no-match: no declaration matches 'a'; and 2 more;"
             " battery: expected 1, but nothing set it:"
-            " 'a' does not fit the 'regex' of polls.0, which was sent",
+            " 'a' does not match the 'regex' of polls.0, which was sent",
         ),
         (
             trial(feed={"wire": "ok\n"}, run="stop", fails="refused"),

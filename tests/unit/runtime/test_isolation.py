@@ -38,7 +38,7 @@ def test_what_is_wrong_comes_through(tmp_path: Path) -> None:
 
 def test_a_look_takes_no_longer_than_it_may(tmp_path: Path) -> None:
     document = write_package(tmp_path, "driver", "puppet") / "driver.yaml"
-    with pytest.raises(UrcError, match=r"driver.yaml: its preview took longer than 0.01 s"):
+    with pytest.raises(UrcError, match=r"driver.yaml: the preview took longer than 0.01 s"):
         look_apart(document, tmp_path, [], total_s=0.01)
 
 
@@ -48,7 +48,7 @@ def test_a_look_that_ends_without_words_is_told(
     """As where the system ends it, since it wanted too much."""
     monkeypatch.setattr(isolation, "COMMAND", ("-c", "import os; os.abort()"))
     document = write_package(tmp_path, "driver", "puppet") / "driver.yaml"
-    with pytest.raises(UrcError, match=r"its preview needs more than 30 s of processor time"):
+    with pytest.raises(UrcError, match=r"the preview needs more than 30 s of processor time"):
         look_apart(document, tmp_path, [])
 
 

@@ -141,8 +141,8 @@ def test_jump_of_the_clock_is_told_once() -> None:
     book.utc_s -= 60
     book.recorder.check_clock()
     assert book.lines == [
-        "clock x1 the clock went ahead by 31536000 s: it was set, or the machine slept",
-        "clock x1 the clock went back by 60 s: it was set, or the machine slept",
+        "clock x1 the clock jumped ahead by 31536000 s: it was set, or the machine slept",
+        "clock x1 the clock jumped back by 60 s: it was set, or the machine slept",
     ]
 
 
@@ -157,7 +157,7 @@ def test_mistake_in_here_reaches_nobody_and_is_told_once(
     recorder.stopped_by_unknown("rover", "192.0.2.9")
     assert recorder.is_faulty
     told = [one.getMessage() for one in caplog.records]
-    assert told == ["an event is missing in the audit log"]
+    assert told == ["an event is missing from the audit log"]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="POSIX users")

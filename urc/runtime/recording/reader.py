@@ -108,7 +108,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
             size = stream.tell()
         left = 0 if is_whole else stream.seek(0, os.SEEK_END) - size
     if not document and not has_profile:
-        raise UrcError(f"{file} is not a recording of URC: it contains no {PROFILE}")
+        raise UrcError(f"{file} is not a URC recording: it contains no {PROFILE}")
     if not times:
         why = f"{left} bytes cannot be read" if left > 0 else "the recording has only just begun"
         raise UrcError(f"{file} contains nothing to play: {why}")

@@ -50,7 +50,7 @@ __all__ = [
 PROFILE: Final = "profile.yaml"
 """Name of the attachment that contains the robot's complete document."""
 FILES: Final = "files/"
-"""Start of the names of attachments that contain the files of widgets."""
+"""Prefix of the names of attachments that contain widget files."""
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
@@ -160,8 +160,8 @@ class RecordingEncoder:
     def _now(self, time_s: float) -> int:
         """Return the later of `time_s` and the last returned time, so that times never decrease.
 
-        A reading's time is the arrival time of its first byte; traffic's time is its own arrival
-        time.
+        The time of a reading is the arrival time of its first byte, which may be earlier than the
+        time of the last encoded traffic.
         """
         time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
         self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)

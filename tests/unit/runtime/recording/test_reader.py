@@ -165,7 +165,7 @@ def test_a_recording_of_another_program_is_told_in_one_line(tmp_path: Path) -> N
     writer.finish()
     with pytest.raises(UrcError) as refused:
         open_recording(other)
-    assert str(refused.value) == f"{other} is not a recording of URC: it contains no profile.yaml"
+    assert str(refused.value) == f"{other} is not a URC recording: it contains no profile.yaml"
 
 
 def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
