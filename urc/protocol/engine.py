@@ -163,7 +163,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum time from a command or received data to any new deadline, in seconds."""
+        """Minimum time from a command or received data to any deadline it creates, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:

@@ -139,7 +139,8 @@ class MotionEncoder:
 
         A stop can be rendered without a connection. A stop with a counter is a series with one
         frame for each possible next number. The series is long enough for the stops of all held
-        commands on the connection. The stop is empty if the robot ends each motion step by itself.
+        commands on the connection. The stop is empty if the robot ends each motion step
+        automatically.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.

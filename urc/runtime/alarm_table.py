@@ -74,7 +74,7 @@ class AlarmHistoryRow(NamedTuple):
 
 
 class AlarmQuery(NamedTuple):
-    """The events to find for one robot."""
+    """A query for the events of one robot."""
 
     robot: str
     text: str = ""
@@ -130,7 +130,7 @@ def _create(base: sqlite3.Connection) -> None:
 def save_records(
     base: sqlite3.Connection, records: Mapping[tuple[str, str], AlarmRecord | None]
 ) -> None:
-    """Write records, keyed by robot and signal, inside a transaction; delete a record if None."""
+    """Write records, keyed by robot and signal, inside a transaction; None deletes a record."""
     gone = [key for key, record in records.items() if record is None]
     base.executemany("DELETE FROM states WHERE robot = ? AND signal = ?", gone)
     there = [

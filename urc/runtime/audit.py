@@ -1,6 +1,6 @@
 """The writer of the audit log, an SQLite file.
 
-The file records motion and administration, with person and right.
+The file records motion and administration, with the person and right behind each event.
 
 Theory of operation. `AuditLog.add` puts an entry into a short queue and returns. The call never
 waits for a disk, because motion and STOP call `add`. A separate thread writes the queued entries
@@ -87,7 +87,7 @@ class AuditLog:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait until all queued entries are written; return whether the wait succeeded."""
+        """Wait until all queued entries are written; return False after a timeout."""
         with self._wakes:
             return self._wakes.wait_for(lambda: not self._waiting and not self._is_busy, timeout_s)
 

@@ -261,7 +261,7 @@ class AuditRecorder:
         return shown(shown_bytes) if shown_bytes else ""
 
     def _hidden(self, text: str) -> str:
-        """Return text without the secrets, including their encoded forms."""
+        """Return text without the secrets and their encoded forms."""
         return self._disguises.hide(text)
 
 

@@ -31,7 +31,7 @@ class SearchTimeout(UrcError):
 
 
 class AuditQuery(NamedTuple):
-    """The entries to find."""
+    """A query for audit log entries."""
 
     robots: frozenset[str] | None = None
     """Robots whose entries may be shown; None allows all entries, including the server's."""

@@ -1,8 +1,8 @@
 """A backup archive: one private ZIP file with the permanent content of a data folder.
 
-Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Other
-names, links and large files are refused, so a foreign archive cannot write outside the data folder.
-Copies of SQLite files are consistent, even while a server is writing.
+Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Files
+with other names, links and oversized files are rejected, so a foreign archive cannot write outside
+the data folder. Copies of SQLite files are consistent, even while a server is writing.
 """
 
 import os
@@ -113,7 +113,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
 def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
     """Write a backup of a data folder; return the files in the backup and the unknown files.
 
-    The archive appears only when it is complete and is readable only by its owner.
+    The archive appears only when it is complete, and only its owner can read it.
 
     Args:
         data: the data folder.
@@ -229,7 +229,7 @@ class BackupReader:
         if len(set(map(str.casefold, paths))) != len(paths):
             raise BackupError(f"{name}: a file occurs twice")
         if sum(one.size for one in self.files) > MOST_BYTES:
-            raise BackupError(f"{name}: expected at most {MOST_BYTES} bytes in all files")
+            raise BackupError(f"{name}: expected at most {MOST_BYTES} bytes in total")
 
     def extract(self, folder: Path) -> None:
         """Write all files into an empty folder; folders are accessible only to the owner.

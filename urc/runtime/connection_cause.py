@@ -30,7 +30,7 @@ Cause = Literal[
 class _CauseRow(NamedTuple):
     cause: Cause
     words: tuple[str, ...]
-    """Words in lower case; the error message contains at least one of them."""
+    """Lower-case words; the row applies if the error message contains one of them."""
     advice: str
     address: str = ""
     """Prefix of the addresses to which the row applies; "" means all addresses."""

@@ -27,7 +27,7 @@ class Coverage(NamedTuple):
 
 
 def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Coverage:
-    """Return the coverage of a driver by its tests."""
+    """Return the test coverage of a driver."""
     declared: list[Exercised] = [
         *(("command", name) for name in driver.commands),
         *(("poll", poll.name) for poll in driver.polls),

@@ -55,7 +55,7 @@ def exercise(profile: Profile) -> TestReport:
 
 
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
-    """Return a value for every setting: the default, or a sample of the setting's type.
+    """Return a value for every setting: the default, or an example of the setting's type.
 
     Optional settings stay empty.
     """

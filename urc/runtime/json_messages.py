@@ -4,7 +4,7 @@ Layer 4. Pure. Recordings and the Foxglove server share this mapping, so a viewe
 same way. Images and the log use Foxglove's standard messages.
 
 Viewers read the fields of a message from its schema. Each property therefore has a ``type``, or the
-alternatives of an enumeration. A property without a type makes some viewers refuse the whole topic.
+alternatives of an enumeration. A property without a type makes some viewers reject the whole topic.
 """
 
 import base64

@@ -19,7 +19,7 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Pattern for the fixed start of a local host name that settings complete."""
+"""Pattern for the fixed start of a host that is local regardless of the setting that follows."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 

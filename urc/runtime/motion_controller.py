@@ -153,7 +153,7 @@ class MotionController:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next call to `expire`, or None."""
+        """Time of the next call to `expire`; None if no call is needed."""
         return self.lease.deadline
 
     # -- the robot

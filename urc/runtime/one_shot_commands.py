@@ -2,8 +2,8 @@
 
 Layer 4. Only held commands require the lease. All other commands require the role of an operator: a
 watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
-STOP is latched or another operator drives. The engine checks the latch again, because a command may
-have waited in a queue or for a confirmation.
+STOP is latched or another operator is driving. The engine checks the latch again, because a command
+may have waited in a queue or for a confirmation.
 """
 
 import asyncio

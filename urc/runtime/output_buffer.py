@@ -99,7 +99,7 @@ class OutputBuffer:
 
     @property
     def is_written(self) -> bool:
-        """Whether all data was handed to the transport."""
+        """Whether all data has been passed to the transport."""
         return not self._bytes
 
     def reset(self, prompt: Prompt | None = None) -> None:

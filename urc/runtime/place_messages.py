@@ -29,7 +29,7 @@ _UNITS: Final = {
 }
 """Unit of each input in messages."""
 _USUAL: Final = {"heading": "deg"}
-"""Unit of an input whose signal declares no unit, if it is not the unit in messages."""
+"""Assumed unit of an input whose signal declares no unit; by default, the unit in messages."""
 _UPRIGHT: Final = {
     "position": {"x": 0.0, "y": 0.0, "z": 0.0},
     "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
@@ -42,7 +42,7 @@ _Build = Callable[[WidgetUse, _Values], dict[str, object] | None]
 
 
 class PlaceSource(NamedTuple):
-    """The messages about one widget's place or distances."""
+    """The position or distance messages of one widget."""
 
     slot: str
     """Slot of the widget."""
@@ -189,7 +189,7 @@ def _fix(use: WidgetUse, values: _Values) -> dict[str, object] | None:
 
 
 def _satellite_fix(fix: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the known fields of a message such as NavSatFix; {} without a position."""
+    """Return the known fields of a message such as NavSatFix; {} if there is no position."""
     status = fix.get("status")
     state = status.get("status") if isinstance(status, Mapping) else status
     names = ("latitude", "longitude", "altitude")

@@ -31,7 +31,7 @@ _SHORTEST_NUMBER = 4
 """Minimum number of digits in a secret number to redact; shorter numbers match too many
 readings."""
 _CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
-"""Text after a truncated value: dots, a quotation mark, or the end."""
+"""Text after a truncated value: dots, a quotation mark, or the end of the text."""
 
 
 def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:

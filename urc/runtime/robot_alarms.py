@@ -26,7 +26,7 @@ from urc.runtime.signal_sources import sources_of
 __all__ = ["CONNECTION", "AlarmMemory", "RobotAlarms"]
 
 LOOK_S: Final = 1.0
-"""Interval between checks for old values and scheduled changes, in seconds."""
+"""Interval between checks for stale values and scheduled changes, in seconds."""
 FIRST_VALUES_S: Final = 5.0
 """How long an alarm waits for the first values of its `suppressed_when`, in seconds."""
 LOST_S: Final = 30.0
@@ -139,7 +139,7 @@ class RobotAlarms:
         else:
             self._watches_connection = False
         self.signals: Mapping[str, Signal] = declared
-        """The signals of the robot, with `CONNECTION` for a monitored robot."""
+        """The signals of the robot, plus `CONNECTION` for a monitored robot."""
         self._limits = _limits(declared)
         self._sources = sources_of(driver)
         self._seen: dict[str, tuple[str, str]] = dict.fromkeys(self._limits, _UNKNOWN)
@@ -148,7 +148,7 @@ class RobotAlarms:
         names = (one.expression.names for one in self._suppressions)
         inputs = frozenset(name for each in names for name in each) & driver.signals.keys()
         self._inputs: dict[str, Reading] = dict.fromkeys(inputs)
-        """Last values of the signals in the expressions."""
+        """Newest value of each signal in the expressions."""
 
     def renew(self, driver: Driver, *, is_monitored: bool = False) -> None:
         """Use another version of the robot's document."""
@@ -274,13 +274,13 @@ class RobotAlarms:
         return self._hub is not None and self._hub.latest(name) is None
 
     def _is_cut_off(self, name: str) -> bool:
-        """Return whether no transport of a signal is connected."""
+        """Return whether all transports of a signal are disconnected; False without transports."""
         links = self._hub.links if self._hub is not None else {}
         states = [links[one].state for one in self._sources.get(name, ()) if one in links]
         return bool(states) and not any(state in _CONNECTED for state in states)
 
     def _check(self) -> float:
-        """Handle old values and all due changes."""
+        """Handle stale values and all due changes."""
         if self._hub is not None:
             old = [
                 name

@@ -78,7 +78,7 @@ class ServerRecorder:
         now: Callable[[], float] = time.monotonic,
         secrets: Iterable[str] = (),
     ) -> None:
-        """Begin with no events.
+        """Create a recorder without events.
 
         Args:
             note: callback for each entry; must not block.
@@ -99,7 +99,7 @@ class ServerRecorder:
         self.hide(secrets)
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Add strings to redact from now on."""
+        """Add strings to redact in later entries."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._forms = SecretForms(self._secrets)

@@ -68,7 +68,7 @@ class SignalHints:
         asked = self._asked_in_vain(transport, fed, signal)
         asked = asked or self._answered_by(transport, fed, signal)
         if not line.is_open and not line.is_per_request:
-            return f"{transport} is not connected (write connects: {transport})"
+            return f"{transport} is not connected (add connects: {transport})"
         if asked:
             return asked
         if not line.is_open:
@@ -99,7 +99,7 @@ class SignalHints:
             for cut in decoder.feed(fed):
                 if isinstance(cut, bytes) and any(self._fits(cut, transport, one) for one in reads):
                     text = _shown(cut, spec.encoding)
-                    return f"{text} is a reply without its request (write {asked.how})"
+                    return f"{text} is a reply without its request (add {asked.how})"
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:

@@ -64,7 +64,7 @@ def check_values(
             if state.age == "never":
                 yield f"{name}: expected no value, found {shown(sample.value)}"
             else:
-                told = f"the value is {age_s:g} s old, and stale after {longest_s:g} s"
+                told = f"the value is {age_s:g} s old (stale after {longest_s:g} s)"
                 yield f"{name}: it should be {state.age}, but {told}"
 
 

@@ -163,7 +163,7 @@ class TestEngine:
             return
         data = made.numbered.data if isinstance(made, CountedFrame) else made
         if data == b"":
-            text = "the command waits for an outstanding reply"
+            text = "the command is waiting for an outstanding reply"
             self._failed(Failed(number, name, "not-allowed", text))
             return
         self.perform([Send(command.transport, data), Replied(number, name, {})])

@@ -127,7 +127,7 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("[{ id: a, type: text, size: 4 }]", {"a": "a\0b"}, "contains a NUL"),
     ("[{ id: a, type: text, size: u8 }]", {"a": "x" * 256}, "a: 256 does not fit into 8 bits"),
     ("[{ id: a, type: text, until: ETX }]", {"a": "a\3"}, "contains its terminator"),
-    ("[{ id: a, type: text, size: 4, encoding: ascii }]", {"a": "é"}, "does not exist in ascii"),
+    ("[{ id: a, type: text, size: 4, encoding: ascii }]", {"a": "é"}, "cannot be encoded in ascii"),
     ("[{ id: a, type: bytes, size: 2 }]", {"a": "xy"}, "a: expected hex digits, found 'xy'"),
     ("[u8 k, { switch: { by: k, cases: { '1': [u8 a] } } }]", {"k": 3}, "no case for k = 3"),
     ("[{ id: a, type: u8, count: 2, value: '[1, 2, 3]' }]", {}, "expected 2 items, found 3"),

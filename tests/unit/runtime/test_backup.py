@@ -413,7 +413,7 @@ def test_sizes_and_counts_are_bounded(tmp_path: Path, monkeypatch: pytest.Monkey
     entries = [(f"robots/r{number}.json", b"x" * 1000) for number in range(20)]
     file = archive(tmp_path / "large.zip", *entries)
     monkeypatch.setattr(backup_archive, "MOST_BYTES", 19_999)
-    with pytest.raises(BackupError, match="expected at most 19999 bytes in all files"):
+    with pytest.raises(BackupError, match="expected at most 19999 bytes in total"):
         restored(file, tmp_path / "new")
     monkeypatch.setattr(backup_archive, "MOST_BYTES", 20_000)
     monkeypatch.setattr(backup_archive, "MOST_FILES", 20)

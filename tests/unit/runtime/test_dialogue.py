@@ -224,7 +224,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         (
             steps('feed: { wire: "LOAD 3\\n" }, expect: { load: 3 }'),
             "3:9 1: no-match: no declaration matches 'LOAD 3'; load: expected 3, but nothing set"
-            " it: 'LOAD 3' is a reply without its request (write polls: [load])",
+            " it: 'LOAD 3' is a reply without its request (add polls: [load])",
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }, expect: { load: { alarm: high } }'),
@@ -275,7 +275,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }', "wait: 9s, expect: { hook: { age: stale } }"),
-            "4:9 2: hook: it should be stale, but the value is 9 s old, and stale after 60 s",
+            "4:9 2: hook: it should be stale, but the value is 9 s old (stale after 60 s)",
         ),
         (
             steps("wait: 1s, closed: wire"),

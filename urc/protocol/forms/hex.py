@@ -46,7 +46,7 @@ class BytesWriter:
             except UnicodeEncodeError as error:
                 wrong = error.object[error.start]
                 raise NotWritable(
-                    f"{quoted(wrong)} cannot be written in {self._encoding}"
+                    f"{quoted(wrong)} cannot be encoded in {self._encoding}"
                 ) from None
         raise NotWritable(
             f"{template.source.strip()}: {str(value)[:40]} is neither a byte nor text"

@@ -30,7 +30,7 @@ class JsonWriter:
             return self._text(filled(self._tree, namespace)).encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
-            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
+            raise NotWritable(f"{quoted(wrong)} cannot be encoded in {self._encoding}") from None
 
     def _text(self, value: object) -> str:
         try:

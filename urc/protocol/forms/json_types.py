@@ -28,7 +28,7 @@ class _Shape:
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape after one more path step; create the shape if it is missing."""
+        """Return the shape at the next path step; create the shape if it is missing."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:

@@ -18,7 +18,7 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["CASTS", "PatternReader", "pattern_source"]
 
 _BLANK: Final = r"\s\x1c-\x1f"
-"""ASCII characters that Python's `split` and `float` treat as blanks."""
+"""ASCII characters that Python's `split` and `float` treat as whitespace."""
 _SOURCES: Final[Mapping[FieldKind, str]] = {
     "integer": r"[+-]?[0-9]{1,400}+",
     "number": r"[+-]?(?:(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"

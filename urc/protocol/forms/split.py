@@ -65,7 +65,8 @@ class SplitReader:
         wrong = written_differently(fields, self._read(text))
         if wrong:
             raise NotWritable(
-                f"{wrong}: {quoted(fields[wrong])} cannot be a part of {quoted(text)}"
+                f"{wrong}: {quoted(fields[wrong])} would be read back differently from"
+                f" {quoted(text)}"
             )
         return encoded(text, self._encoding)
 
@@ -123,5 +124,5 @@ class KeyvalueReader:
         text = self._pairs.join(pairs)
         wrong = written_differently(fields, self._read(text))
         if wrong or not pairs:
-            raise NotWritable(f"{wrong or 'nothing'} cannot be a pair of {quoted(text)}")
+            raise NotWritable(f"{wrong or 'nothing'} cannot be written as a pair in {quoted(text)}")
         return encoded(text, self._encoding)

@@ -34,7 +34,7 @@ class TextWriter:
             return text.encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
-            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
+            raise NotWritable(f"{quoted(wrong)} cannot be encoded in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the text for each plain name, keyed by name; None if the frame does not match.

@@ -46,7 +46,7 @@ class TopicReader:
         """Return a message with `fields`; raise `NotWritable` if impossible."""
         topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
         if not self._fits(topic):
-            raise NotWritable(f"{topic!r} is not a topic of {self._topic!r}")
+            raise NotWritable(f"{topic!r} does not match the topic {self._topic!r}")
         body = self._reader.write({name: raw for name, raw in fields.items() if name != "_topic"})
         return Envelope("message", {"topic": topic}, body)
 

@@ -22,7 +22,7 @@ __all__ = ["BadFrame", "LengthField", "FrameCodec", "length_of"]
 Open = Callable[[bytes], bytes]
 
 _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
-"""Start values of the CRCs that the standard library computes, keyed by CRC parameters."""
+"""Initial values of the CRCs that the standard library computes, keyed by CRC parameters."""
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:

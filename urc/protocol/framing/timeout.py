@@ -70,7 +70,7 @@ class _PatientDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the timeout, or the framing's deadline if it is earlier."""
+        """Time at which an incomplete frame times out, or the framing's deadline if earlier."""
         if self._told:
             return float("-inf")
         own, timeout = self._decoder.deadline, self._framing.timeout_s

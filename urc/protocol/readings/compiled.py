@@ -1,8 +1,8 @@
 """Generated decoders of text frames: one function per declaration, from text to samples.
 
 A generated decoder handles only the common case, in which every field is present and valid. In all
-other cases, the closures (`slow`) read the frame again. Tests compare the generated decoders with
-the closures.
+other cases, the ordinary decoder (`slow`) reads the frame again. Tests compare the generated
+decoders with the ordinary decoder.
 """
 
 from typing import TYPE_CHECKING, Final, cast

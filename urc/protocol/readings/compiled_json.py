@@ -2,7 +2,7 @@
 
 Pure. A generated decoder supports only JSON documents in which every field is present and has the
 declared type. A second function for the same paths supports documents with missing or null fields.
-The closures read all other documents, as in `urc.protocol.readings.compiled`.
+The ordinary decoder reads all other documents, as in `urc.protocol.readings.compiled`.
 """
 
 from collections.abc import Iterator, Mapping

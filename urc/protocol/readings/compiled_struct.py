@@ -1,7 +1,7 @@
 """Generated decoders of binary frames: one function per declaration, from bytes to samples.
 
-Pure. Generated decoders support only frames in which all items have fixed positions. The closures
-read frames with invalid values, as in `urc.protocol.readings.compiled`.
+Pure. Generated decoders support only frames in which all items have fixed positions. The ordinary
+decoder reads frames with invalid values, as in `urc.protocol.readings.compiled`.
 """
 
 from typing import cast

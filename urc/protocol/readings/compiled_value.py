@@ -1,7 +1,7 @@
 """Conversion of a raw field to a sample, shared by the generated decoders.
 
 Each engine builds the source text for field conversions, checks and samples once. If a value has
-the wrong type or is out of range, the closures (`slow`) read the frame again.
+the wrong type or is out of range, the ordinary decoder (`slow`) reads the frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ __all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Compiled = Callable[[Frame, float], "Taken | None"]
-"""Function that takes a frame and the time. It returns the samples and the refused values, or None
+"""Function that takes a frame and the time. It returns the samples and the rejected values, or None
 if the frame does not match."""
 
 _BEGIN: Final = (

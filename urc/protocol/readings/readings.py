@@ -19,7 +19,7 @@ __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
 """Function that takes a frame's fields and the time. It returns the samples and a message for each
-refused value."""
+rejected value."""
 
 
 class _Computed(NamedTuple):

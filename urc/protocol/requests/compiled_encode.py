@@ -1,9 +1,9 @@
 """Generated encoders: one function per command, which encodes arguments to bytes.
 
 A generated encoder handles only the common case, in which every argument is a number of the
-declared type. The closures in `urc.protocol.requests.encode` handle all other cases. Tests compare
-the generated encoders with the closures. Templates of generated encoders may contain only sums and
-products of numbers, and the filter ``fixed``.
+declared type. The ordinary encoder in `urc.protocol.requests.encode` handles all other cases. Tests
+compare the generated encoders with the ordinary encoder. Templates of generated encoders may
+contain only sums and products of numbers, and the filter ``fixed``.
 """
 
 import ast

@@ -292,7 +292,7 @@ class Conversation(Connection):
         """Process messages at the front of the stream and report their samples together.
 
         Processing short frames one by one takes almost twice as long as in batches (decision 27). A
-        batch ends after the expected reply or a refused value, or before another kind of frame.
+        batch ends after the expected reply or a rejected value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,

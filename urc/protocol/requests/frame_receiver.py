@@ -267,7 +267,7 @@ class FrameReceiver:
         return self.events_of(samples, refused), samples
 
     def events_of(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
-        """Return the events for samples and refused values.
+        """Return the events for samples and rejected values.
 
         A valid frame without values also causes an event, because it shows that the robot is alive.
         """

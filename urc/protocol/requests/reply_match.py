@@ -45,7 +45,7 @@ class Matcher:
 
     Args:
         reader: reader for the fields of a frame.
-        decode: function that returns the samples and the refused values from the fields.
+        decode: function that returns the samples and the rejected values from the fields.
         compiled: generated function that reads and decodes the most common frames.
     """
 
@@ -57,7 +57,7 @@ class Matcher:
         self.reader = reader
         self.decode = decode
         self.take: Compiled = compiled or self._take
-        """Function that returns the samples and refused values of a frame; None if the frame does
+        """Function that returns the samples and rejected values of a frame; None if the frame does
         not match."""
 
     def _take(self, frame: Frame, now: float) -> Taken | None:

@@ -90,7 +90,7 @@ class _Parser:
         return tokens
 
     def _bad(self, word: str) -> BadDefinition:
-        return BadDefinition(f"{self._owner}: {printable(word)!r} is not expected in the IDL text")
+        return BadDefinition(f"{self._owner}: unexpected {printable(word)!r} in the IDL text")
 
     def parse(self) -> list[Definition]:
         while self._at < len(self._tokens):

@@ -135,4 +135,4 @@ def _value(word: str, text: str, owner: str) -> object:
         return int(bare, 0) if _INTEGERS.fullmatch(word) else float(bare)
     except (KeyError, ValueError):
         pass
-    raise BadDefinition(f"{owner}: {printable(text[:_SHOWN])!r} is not a value of {word}") from None
+    raise BadDefinition(f"{owner}: {printable(text[:_SHOWN])!r} is not a valid {word}") from None

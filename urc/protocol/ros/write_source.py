@@ -105,7 +105,7 @@ def _wide(value: str) -> bytes:
 def _known(value: Any, names: frozenset[str]) -> Any:
     """Return a mapping of fields; raise `TypeError` for any other value or an unknown field."""
     if not isinstance(value, Mapping) or not value.keys() <= names:
-        raise TypeError("not the fields of this message")
+        raise TypeError("not a mapping of this message's fields")
     return value
 
 

@@ -183,7 +183,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
                 raw = value.encode(codec)
             except UnicodeEncodeError as error:
                 wrong = error.object[error.start]
-                raise NotWritable(f"{name}: {quoted(wrong)} does not exist in {codec}") from None
+                raise NotWritable(f"{name}: {quoted(wrong)} cannot be encoded in {codec}") from None
         if item.until and item.until in raw:
             raise NotWritable(f"{name}: {quoted(raw)} contains its terminator {quoted(item.until)}")
         return raw

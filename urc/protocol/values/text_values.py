@@ -32,7 +32,7 @@ def encoded(text: str, encoding: str) -> bytes:
     try:
         return text.encode(encoding)
     except UnicodeEncodeError as error:
-        raise NotWritable(f"{quoted(error.object)} does not exist in {encoding}") from None
+        raise NotWritable(f"{quoted(error.object)} cannot be encoded in {encoding}") from None
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:

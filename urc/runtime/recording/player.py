@@ -270,7 +270,7 @@ class PlaybackSession:
     """A session that plays a recording; the session refuses every command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
-        """Begin with no values."""
+        """Create a session without values."""
         self.hub = Hub(profile.driver.signals)
         self.frames: MotionFrames = Engine(profile.driver, settings).motions
         self.backend: MotionBackend | None = None

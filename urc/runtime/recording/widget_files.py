@@ -21,7 +21,7 @@ MOST_FILE_BYTES: Final = 16 << 20
 
 
 def attach_files(writer: Any, profile: Profile) -> list[str]:
-    """Attach the files; return the names of the missing, unreadable and too large files."""
+    """Attach the files; return the names of the missing, unreadable and oversized files."""
     left, lost = MOST_FILE_BYTES, []
     files = {name: place for use in profile.uses() for name, place in use.files.items()}
     for name, place in files.items():

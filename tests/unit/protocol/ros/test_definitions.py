@@ -207,7 +207,7 @@ def test_a_message_that_does_not_fit_names_its_field(message: object, reason: st
     ("text", "reason"),
     [
         ("float64", "pkg/T: 'float64' is not a field"),
-        ("int32 x one", "pkg/T: 'one' is not a value of int32"),
+        ("int32 x one", "pkg/T: 'one' is not a valid int32"),
         ("int32 x\nint32 x", "pkg/T has two fields named x"),
         ("int32[9999999] x", "pkg/T: the array x has 9999999 elements"),
         ("x" * 300_000, "the definition of pkg/T has more than 262144 characters"),
