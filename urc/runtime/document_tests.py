@@ -169,7 +169,7 @@ def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
     complaints += check_bytes(trial, trial.driver, test.sent)
     if not checks and is_fed_only and not complaints and not trial.fresh and not trial.used:
         complaints.append(
-            "no message or reply matches the fed data; is the end of the frame missing?"
+            "no message or reply matches the data in 'feed'; is the end of the frame missing?"
         )
     if not checks and command is not None and not complaints:
         complaints += check_reply(trial.ended, {}, command)  # the command only has to complete
@@ -232,7 +232,7 @@ def _act(trial: TestEngine, step: DialogueStep) -> None:
     for name, fed in step.feed.items():
         for piece in pieces_of(fed):
             if not trial.engine.lines[name].is_open:
-                raise UrcError(f"{name} is not connected: it cannot receive the fed data")
+                raise UrcError(f"{name} is not connected: it cannot receive the data in 'feed'")
             trial.feed(name, piece)
     trial.wait(step.wait_s or 0.0)
 

@@ -1,6 +1,6 @@
 """One robot's alarms, which are detected from its hub's samples, stored and announced.
 
-Layer 4. Each sample includes its alarm, so a sample costs one comparison, and only changes are
+Layer 4. Each sample includes its alarm, so each sample takes one comparison, and only changes are
 processed. The object belongs to a robot, not to a session. If there is no session, all values are
 unknown, and the alarms persist.
 

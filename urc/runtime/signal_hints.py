@@ -57,7 +57,7 @@ class SignalHints:
             return ": nothing was fed"
         others = sorted(self._trial.fresh)
         if others:
-            return f": the fed data set {', '.join(others[:5])}"
+            return f": the data in 'feed' set {', '.join(others[:5])}"
         return ""
 
     def _of_line(self, transport: str, signal: str) -> str:

@@ -105,11 +105,11 @@ def check_reply(
     """Yield the mismatches of the first finished command and discard its result."""
     place = next((place for place, one in enumerate(ended) if of in ("", one.command)), None)
     if place is None:
-        yield f"{of or 'the command'} should be done, but no reply arrived or no command was run"
+        yield f"{of or 'the command'} should have ended, but no reply arrived or no command was run"
         return
     one = ended.pop(place)
     if isinstance(one, Failed):
-        yield f"{one.command} should be done, but it failed"
+        yield f"{one.command} should have succeeded, but it failed"
         return
     for name, value in wanted.items():
         if name not in one.values:

@@ -60,7 +60,7 @@ def test_items_are_read(items: str, data: str, fields: dict[str, Any] | None) ->
 FAULTS = [
     ("[{ id: a, type: u8, valid: { max: 100 } }]", "65", "a: expected -1e+308 to 100, found 101"),
     ("[{ id: a, type: text, size: 2 }]", "FFFF", "a: hex ff is not utf-8 text"),
-    ("[i8 _n, { id: a, type: bytes, size: _n }]", "FF 01", "a: -1 is not a size"),
+    ("[i8 _n, { id: a, type: bytes, size: _n }]", "FF 01", "a: -1 is not a valid size"),
     ("[u8 _n, { id: a, type: u8, if: 1 / _n > 2 }]", "00 01", "division by zero"),
 ]
 

@@ -228,7 +228,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }, expect: { load: { alarm: high } }'),
-            "3:9 1: load: expected the alarm high, but nothing set it: the fed data set hook",
+            "3:9 1: load: expected the alarm high, but nothing set it: the data in 'feed' set hook",
         ),
         (
             steps("wait: 1s, expect: { load: 3 }"),
@@ -241,7 +241,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { once: "A 3\\n" }', "expect: { load: 3 }"),
-            "3:9 1: once is not connected: it cannot receive the fed data",
+            "3:9 1: once is not connected: it cannot receive the data in 'feed'",
         ),
         (
             steps('feed: { wire: "what?\\n" }', "wait: 1s, expect: { hook: { age: never } }"),
@@ -258,7 +258,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps("run: ask", "reply: {}"),
-            "4:9 2: the command should be done, but no reply arrived or no command was run",
+            "4:9 2: the command should have ended, but no reply arrived or no command was run",
         ),
         (
             steps("run: ask", 'feed: { once: "A 3\\n" }, reply: { load: 4, lode: 1 }'),
@@ -267,7 +267,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps("run: ask", 'feed: { once: "ERR\\n" }, reply: {}'),
-            "4:9 2: refused: the robot answered 'ERR'; ask should be done, but it failed",
+            "4:9 2: refused: the robot answered 'ERR'; ask should have succeeded, but it failed",
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }, expect: { hook: { age: never } }'),

@@ -136,7 +136,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         (trial(feed={"wire": "nota hi\n"}), "no-match: no declaration matches 'nota hi'"),
         (
             trial(feed={"wire": "note hi"}),
-            "no message or reply matches the fed data; is the end of the frame missing?",
+            "no message or reply matches the data in 'feed'; is the end of the frame missing?",
         ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0),
@@ -144,7 +144,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(feed={"wire": "ok"}, run="stop"),
-            "stop should be done, but no reply arrived or no command was run",
+            "stop should have ended, but no reply arrived or no command was run",
         ),
         (trial(feed={"wire": "no\n"}, run="stop"), "no-match: no declaration matches 'no'"),
         (
@@ -161,7 +161,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0, expect={"note": "x"}),
-            "note: expected 'x', but nothing set it: the fed data set battery",
+            "note: expected 'x', but nothing set it: the data in 'feed' set battery",
         ),
         (
             trial(feed={"wire": "4"}, reply_to=0, expect={"battery": 4}),

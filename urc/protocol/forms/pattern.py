@@ -97,7 +97,9 @@ class PatternReader:
         found = self._read(text)
         for name, value in fields.items():
             if found is None or (name in found and not _is_same(found[name], value)):
-                raise NotWritable(f"{name}: {quoted(value)} does not fit {quoted(text)}")
+                raise NotWritable(
+                    f"{name}: {quoted(value)} differs when read back from {quoted(text)}"
+                )
         return encoded(text, self._encoding)
 
 

@@ -65,8 +65,7 @@ class SplitReader:
         wrong = written_differently(fields, self._read(text))
         if wrong:
             raise NotWritable(
-                f"{wrong}: {quoted(fields[wrong])} would be read back differently from"
-                f" {quoted(text)}"
+                f"{wrong}: {quoted(fields[wrong])} differs when read back from {quoted(text)}"
             )
         return encoded(text, self._encoding)
 

@@ -53,11 +53,11 @@ class XmlReader:
                 root = ElementTree.Element(path.steps[0].tag, dict(path.steps[0].attributes))
             _put(root, path, field_text(value))
         if root is None:
-            raise NotWritable("a document needs at least one of its fields")
+            raise NotWritable("an XML document needs at least one of the declared fields")
         text = ElementTree.tostring(root, encoding="unicode")
         wrong = written_differently(fields, self._read(text))
         if wrong:
-            raise NotWritable(f"{wrong}: {quoted(fields[wrong])} cannot be written into a document")
+            raise NotWritable(f"{wrong}: {quoted(fields[wrong])} cannot be written as XML")
         return encoded(text, self._encoding)
 
 

@@ -38,7 +38,7 @@ class StructReader:
         except BadText as error:
             raise NotWritable(str(error)) from None
         if found is None:
-            raise NotWritable(f"no frame has the fields {quoted(known)}")
+            raise NotWritable(f"no valid frame has the fields {quoted(known)}")
         return data
 
 

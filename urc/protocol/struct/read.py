@@ -228,7 +228,7 @@ def build_amount(extent: Extent | None, name: str) -> Amount:
         if isinstance(found, float) and found.is_integer():
             found = int(found)
         if not isinstance(found, int) or found < 0:
-            raise BadItem(f"{name}: {quoted(found)} is not a size")
+            raise BadItem(f"{name}: {quoted(found)} is not a valid size")
         return found, at
 
     return amount

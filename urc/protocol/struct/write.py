@@ -274,7 +274,7 @@ def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
     def pad(builder: FrameBuilder, scope: Scope) -> None:
         number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
-            raise NotWritable(f"padding: {quoted(number)} is not a size")
+            raise NotWritable(f"padding: {quoted(number)} is not a valid size")
         builder.append(bytes((item.pad,)) * number)
 
     return pad
