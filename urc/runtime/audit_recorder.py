@@ -168,7 +168,7 @@ class AuditRecorder:
 
     @contextmanager
     def caused_by(self, operator: Operator | None) -> Iterator[None]:
-        """Name `operator` in the entries about STOP and its reset while the context is open."""
+        """Record `operator` as the cause of STOP and its reset while the context is open."""
         before, self._cause = self._cause, operator
         try:
             yield

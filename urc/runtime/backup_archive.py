@@ -1,8 +1,8 @@
 """A backup archive: one private ZIP file with the permanent content of a data folder.
 
-Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Files
-with other names, links and oversized files are rejected, so a foreign archive cannot write outside
-the data folder. Copies of SQLite files are consistent, even while a server is writing.
+Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Links,
+oversized files and all other names are rejected, so a foreign archive cannot write outside the data
+folder. Copies of SQLite files are consistent, even while a server is writing.
 """
 
 import os

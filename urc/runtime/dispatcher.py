@@ -202,7 +202,7 @@ class Dispatcher:
         """Create the dispatcher for an engine.
 
         Args:
-            engine: the engine, which other code must not call from now on.
+            engine: the engine; from now on, only the dispatcher may call it.
             hub: destination of readings and log entries.
             clock: source of time.
             commands: the driver's commands, keyed by name.

@@ -436,7 +436,7 @@ class Hub:
         """Open a tap on all samples and log entries for the duration of the context.
 
         Args:
-            with_traffic: whether to include the bytes of the connections, from now on.
+            with_traffic: whether to include the connections' traffic from now on.
         """
         tap = EventTap()
         self._taps.add(tap)

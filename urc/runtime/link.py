@@ -45,8 +45,8 @@ __all__ = ["Link"]
 SLICE_BYTES = 4096
 """Maximum number of bytes that the engine processes before the loop's other tasks run."""
 SLICE_S = 0.001
-"""Maximum time that the engine can process bytes before other tasks run, in seconds; a slower
-engine gets fewer bytes."""
+"""Maximum time for which the engine may process bytes before other tasks run, in seconds; a slower
+engine receives fewer bytes."""
 _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
 """Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the

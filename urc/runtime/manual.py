@@ -354,7 +354,7 @@ def _plain(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    """Return text as Markdown code; escape bars, which would otherwise end the table cell."""
+    """Return text as Markdown code; escape vertical bars, which would end the table cell."""
     clean = printable(text).replace("|", "\\|")
     if "`" in clean:
         return f"`` {clean} ``"

@@ -43,7 +43,7 @@ class FifoEvent:
     """An event that releases its waiters in FIFO order."""
 
     def __init__(self, event: asyncio.Event) -> None:
-        """Store the event, which must never be cleared later."""
+        """Store the event, which must never be cleared."""
         self._event = event
         self._turn = asyncio.Lock()  # FIFO
         self._waiting = 0

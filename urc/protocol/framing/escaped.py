@@ -1,9 +1,9 @@
 """Framings that apply byte stuffing to the whole content between two markers.
 
-Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between the
-markers is stuffed last, so the length field and the checksum refer to the original bytes. If every
-marker byte in the content is escaped, an ordinary search finds the markers. If a marker begins with
-the escape byte and the content contains doubled escape bytes, the decoder processes all escapes in
+Theory of operation. Markers (start, end, delimiter) are sent unchanged. Byte stuffing is the last
+step of encoding, so the length field and the checksum refer to the original bytes. If every marker
+byte in the content is escaped, an ordinary search finds the markers. If a marker begins with the
+escape byte and the content contains doubled escape bytes, the decoder processes all escapes in
 order. A frame with a length field is decoded byte by byte up to its length.
 """
 

@@ -4,7 +4,7 @@ Theory of operation. If the framing has start bytes, the decoder advances to the
 otherwise, every byte may begin a frame. If the length, the end bytes or the checksum is wrong, only
 the first byte is dropped. A valid frame may begin at the second byte of an invalid frame. The
 checksum may therefore be computed several times over the same bytes, so `RescanBudget` limits
-rescanning. After the budget is spent, an invalid frame is dropped as a whole.
+rescanning. After the budget is spent, the whole invalid frame is dropped.
 """
 
 from typing import NamedTuple

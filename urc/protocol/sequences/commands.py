@@ -66,7 +66,7 @@ def why_not_allowed(
 
 
 def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, ...]:
-    """Return the confirmation questions of `command` with these arguments.
+    """Return the confirmation questions for `command` with these arguments.
 
     Args:
         command: the declared command.

@@ -129,7 +129,7 @@ class Recorder:
             self._wakes.notify()
 
     def close(self) -> None:
-        """Write the queued events and the end of the file; take at most ten seconds."""
+        """Write the queued events and complete the file; take at most ten seconds."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify()
@@ -298,7 +298,7 @@ async def recorded(
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.
-        on_step: callback for the creation and for the end of the file.
+        on_step: callback for the creation and the end of the file.
         document: the whole profile as one document; "" means no document, and None means to read
             the profile's file.
     """
@@ -329,7 +329,7 @@ class _Steps:
             self._on_step("started", self._recorder.file.name, "")
 
     def ended(self) -> None:
-        """Report the end of the file, or the reason why there is no file."""
+        """Report that the recording has ended, or the reason why there is no file."""
         self.look()
         recorder = self._recorder
         if self._on_step is not None and (recorder.is_begun or recorder.fault):
