@@ -41,7 +41,7 @@ def broke(fault: BaseException) -> str:
 
 
 def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
-    """Return the message about a failed connection to `place`, with the reason."""
+    """Return the message for a failed connection to `place`, with the reason."""
     if isinstance(fault, OwnAddressError):
         return f"{place}: {fault.strerror}"
     if isinstance(fault, socket.gaierror | UnicodeError):

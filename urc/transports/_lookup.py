@@ -19,13 +19,13 @@ _Connected = TypeVar("_Connected")
 class AddressLookup:
     """A repeatable address lookup for one host and port.
 
-    The event loop's thread pool would delay the program's exit, and without a network a resolver
-    may take half a minute. Each lookup therefore runs in a separate thread. Only one lookup runs at
-    a time; a retry waits for the running lookup.
+    A lookup in the event loop's thread pool could delay the program's exit by half a minute if the
+    network is down. Each lookup therefore runs in a separate thread. Only one lookup runs at a
+    time; a retry waits for the running lookup.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Prepare a lookup for sockets of type `kind`, without starting the lookup."""
+        """Prepare a lookup for sockets of type `kind`, without starting it."""
         self._host = host
         self._port = port
         self._kind = kind
@@ -35,8 +35,8 @@ class AddressLookup:
         """Return every address of the host.
 
         Raises:
-            OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller sets a
-                time limit.
+            OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller must set
+            one.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)
@@ -82,7 +82,7 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
 
 
 def _numeric(host: str, port: int, kind: socket.SocketKind) -> list[Address] | None:
-    """Return a numeric host's addresses, without starting a thread."""
+    """Return a numeric host's addresses without starting a thread; None for a host name."""
     try:
         return _resolve(host, port, kind, socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):

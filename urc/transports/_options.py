@@ -15,7 +15,7 @@ def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
     """
     found = options.get(key)
     if not isinstance(found, str) or not found.strip():
-        raise TransportError(f"{kind} needs a host name or address as {key}, not {found!r}")
+        raise TransportError(f"{kind}: {key} must be a host name or address, not {found!r}")
     return found.strip()
 
 
@@ -27,7 +27,7 @@ def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
     """
     found = options.get(key)
     if isinstance(found, bool) or not isinstance(found, int) or not 1 <= found <= 65535:
-        raise TransportError(f"{kind} needs a port from 1 to 65535 as {key}, not {found!r}")
+        raise TransportError(f"{kind}: {key} must be an integer from 1 to 65535, not {found!r}")
     return found
 
 
@@ -41,7 +41,7 @@ def text(kind: str, options: Mapping[str, object], key: str, default: str = "") 
     if found is None or found == "":
         return default
     if not isinstance(found, str):
-        raise TransportError(f"{kind} needs text as {key}, not {found!r}")
+        raise TransportError(f"{kind}: {key} must be text, not {found!r}")
     return found
 
 
@@ -55,7 +55,7 @@ def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -
     if found is None:
         return default
     if not isinstance(found, bool):
-        raise TransportError(f"{kind} needs true or false as {key}, not {found!r}")
+        raise TransportError(f"{kind}: {key} must be true or false, not {found!r}")
     return found
 
 
@@ -71,5 +71,5 @@ def choice(
     if found is None:
         return default
     if found not in among:
-        raise TransportError(f"{kind} needs {key}: {' | '.join(among)}, not {found!r}")
+        raise TransportError(f"{kind}: {key} must be {' | '.join(among)}, not {found!r}")
     return str(found)

@@ -31,8 +31,8 @@ if sys.platform != "win32":
 
     FAULTS = (*FAULTS, termios.error)
 _KEPT_OPTIONS, _AT_ONCE = 64, 4096
-"""Maximum number of pending unsolicited options. `_AT_ONCE` is the maximum number of bytes to
-process in one step.
+"""Maximum number of unsolicited RFC 2217 options to keep. `_AT_ONCE` is the maximum number of bytes
+to process in one step.
 """
 _DRAIN_S, _LOOK_S = 0.3, 0.01
 """Maximum wait for unsent bytes before a port closes, in seconds. `_LOOK_S` is the interval between
@@ -70,10 +70,9 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """An RFC 2217 connection that does not wait for confirmation of unused notifications.
+    """An RFC 2217 connection that does not wait for the server to confirm unused notifications.
 
-    The library would wait until its timeout, because ser2net, a common server, never sends this
-    confirmation.
+    The common server ser2net never confirms them, so the library would wait until its timeout.
     """
 
     def _data_received(self, data: bytes) -> None:

@@ -1,8 +1,9 @@
 """An open TCP connection as a stream, and a base class for transports that use a stream.
 
-Each connection stores received data in one fixed-size buffer. While the buffer is full, the socket
-is not read, so a flooding robot fills only its own send queue. `write` returns after the kernel has
-accepted every byte, so the connection may be closed immediately after the last write.
+Each connection stores received data in one fixed-size buffer. URC does not read from the socket
+while the buffer is full, so a flooding robot fills only its own send queue. `write` returns after
+the kernel has accepted every byte, so the connection may be closed immediately after the last
+write.
 """
 
 import asyncio
@@ -64,7 +65,7 @@ class TcpStream(asyncio.BufferedProtocol):
     """
 
     def __init__(self, read_ahead_bytes: int = READ_AHEAD_BYTES) -> None:
-        """Initialise a stream that `adopt` connects."""
+        """Initialise an unconnected stream; `adopt` connects it."""
         self._buffer = memoryview(bytearray(read_ahead_bytes))
         self._filled = 0
         self._ended: str | None = None
@@ -289,7 +290,7 @@ def as_bytes(payload: Payload) -> bytes:
 
 
 def forget_unsent(line: socket.socket) -> None:
-    """Make the next close of the socket `line` reset the connection and discard unsent data."""
+    """Configure the socket `line` to reset the connection and discard unsent data when closed."""
     with suppress(OSError, ValueError):  # already closed; uvloop raises ValueError
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 

@@ -37,7 +37,7 @@ class StreamDialer:
         self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def open(self, timeout_s: float) -> ByteStream:
-        """Return an open stream; raise `ConnectFailed` on failure within `timeout_s` seconds.
+        """Return an open stream within `timeout_s` seconds, or raise `ConnectFailed`.
 
         The addresses of a host name are tried in sequence, each with an equal share of the
         remaining time.

@@ -52,14 +52,15 @@ class Tls:
 
     @classmethod
     def of(cls, kind: str, option: object, *, is_server: bool = False) -> Self | None:
-        """Return the TLS settings of the option, or None without TLS.
+        """Return the TLS settings from the option, or None if TLS is off.
 
         Args:
             kind: the transport's type, for error messages.
             option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
                 ``server_name`` and ``verify``. The values of ``ca``, ``cert`` and ``key`` are file
                 names or PEM text.
-            is_server: whether the robot connects to URC, so URC presents its certificate.
+            is_server: whether the robot connects to URC, so that URC is the TLS server and presents
+                its certificate.
 
         Raises:
             TransportError: an option or a file is invalid.
@@ -69,8 +70,10 @@ class Tls:
         if option is True:
             option = {}
         if not isinstance(option, Mapping):
-            raise TransportError(f"{kind} needs true or options as tls, not {option!r}")
-        context = _context_of(f"{kind}, tls:", option, is_server=is_server)
+            raise TransportError(
+                f"{kind}: tls must be true, false or a mapping of options, not {option!r}"
+            )
+        context = _context_of(f"{kind}, tls", option, is_server=is_server)
         return cls(context, _options.text(kind, option, "server_name"), is_server=is_server)
 
     async def secure(self, stream: ByteStream, host: str, place: str) -> ByteStream:
@@ -193,7 +196,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
                 context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trust this authority only
             context.load_verify_locations(cadata=_pem(authority))
     except (OSError, ValueError) as fault:
-        raise TransportError(f"{where} cannot use ca ({reason(fault)})") from fault
+        raise TransportError(f"{where}: cannot use ca ({reason(fault)})") from fault
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     if not is_checked:
         context.check_hostname = False
@@ -212,7 +215,7 @@ def _load_own(
     key = _options.text(where, options, "key")
     if not certificate:
         if is_server or key:
-            raise TransportError(f"{where} needs a certificate in the option cert")
+            raise TransportError(f"{where}: needs a certificate in the option cert")
         return
     try:
         # The library reads only from files, but a key may be a secret setting. The key is therefore
@@ -223,7 +226,7 @@ def _load_own(
             files[1].write_text(_pem(key or certificate), "ascii")
             context.load_cert_chain(files[0], files[1], password=_no_password)
     except (OSError, ValueError) as fault:
-        raise TransportError(f"{where} cannot use cert and key ({_words(fault)})") from fault
+        raise TransportError(f"{where}: cannot use cert and key ({_words(fault)})") from fault
 
 
 def _no_password() -> str:

@@ -73,7 +73,7 @@ class Transport(Protocol):
         """The connection's target as display text, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
-        """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Open the connection within `timeout_s` seconds, or raise `ConnectFailed`."""
 
     async def receive(self) -> Payload:
         """Return at least one received byte, or the next envelope.
@@ -144,7 +144,7 @@ class TransportSetup(NamedTuple):
 class SupportsReady(Protocol):
     """A transport that URC must prepare before connecting.
 
-    The preparation does not count as connecting.
+    The connection timeout does not include the preparation.
     """
 
     async def ready(self) -> None:
@@ -161,7 +161,7 @@ class SupportsSettle(Protocol):
         The wait is limited to a few seconds.
 
         Returns:
-            One line about data that has not arrived; "" if all data has arrived or its state is
+            One line about the data that has not arrived; "" if all data has arrived, or if this is
             unknown.
         """
 
@@ -171,7 +171,7 @@ class SupportsProbe(Protocol):
     """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
-        """Return once the remote program has sent any data after the call.
+        """Wait until the remote program sends data.
 
         Raises:
             TransportError: the connection broke.
@@ -223,7 +223,7 @@ class Prompt(SupportsOffer, Protocol):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data is still unwritten; ``send(b"")`` waits until it is written."""
+        """Whether accepted data is still unwritten; ``send(b"")`` waits until none is."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink` until the connection is closed.

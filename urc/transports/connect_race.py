@@ -1,8 +1,8 @@
 """Overlapping attempts to connect to a robot that may become reachable at any moment.
 
-The operating system repeats a failed connection attempt only after a second, and later at longer
-intervals. If `HURRY` is set, new attempts start at short intervals. Earlier attempts continue,
-because a distant robot may reply late.
+The operating system repeats an unanswered connection attempt only after a second, then at
+increasing intervals. If `HURRY` is set, new attempts start at short intervals. Earlier attempts
+continue, because a distant robot may reply late.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ single attempt."""
 
 
 async def connected(family: int, address: object) -> socket.socket:
-    """Return a connected non-blocking socket; the caller sets the timeout.
+    """Return a connected non-blocking socket; the caller must set a timeout.
 
     Raises:
         OSError: the robot or this machine refuses the connection.

@@ -2,7 +2,7 @@
 
 A request counts as sent when its bytes are in the kernel; `receive` returns the response. The
 number of concurrent requests is limited. If a new request waits too long, the oldest request is
-dropped. A request on a lost connection fails immediately.
+dropped. If a connection is lost, its request fails immediately.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ PATIENCE_S = 1.0
 
 
 class HttpTransport:
-    """A transport to one robot's web server, which may be opened several times."""
+    """A reusable transport to one robot's web server."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -61,7 +61,7 @@ class HttpTransport:
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """Check that the server responds, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Check that the server responds within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         client = HttpClient(
             self._place,

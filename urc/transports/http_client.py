@@ -24,8 +24,8 @@ from urc.transports.web_origin import Credentials, WebOrigin
 __all__ = ["HttpClient", "HttpFault", "leads_up"]
 
 KEPT_S = 3.0
-"""Lifetime of an idle connection, in seconds; small robots close idle connections after five
-seconds."""
+"""Lifetime of an idle connection, in seconds; it is short because small robots close idle
+connections after five seconds."""
 CONNECT_S = 3.0
 """Maximum time to open a connection, including TLS, in seconds."""
 MAX_COOKIES = 50
@@ -101,7 +101,8 @@ class HttpClient:
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
             raise HttpFault(
-                f"{method} {path[:80]!r} would leave {base or '/'}: a path must not contain '..'"
+                f"{method} {path[:80]!r} would be outside {base or '/'}:"
+                " a path must not contain '..'"
             )
         return self._built(method, f"{self._base}/{path.lstrip('/')}", headers, body)
 
@@ -355,8 +356,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes; 0 if unknown.
 
-        The result is 0 for a connection that the robot has closed, even if the library still holds
-        the connection.
+        The result is 0 if the robot has closed the connection, even if the library still holds it.
         """
         stream = self._stream
         return 0 if isinstance(stream, TcpStream) and stream.has_ended else unsent_of(stream)
@@ -408,7 +408,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
 
 
 class _PoolTransport(httpx2.AsyncBaseTransport):
-    """A library transport that uses URC's connection pool and raises errors unchanged."""
+    """A library transport that uses URC's connection pool and keeps the pool's errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

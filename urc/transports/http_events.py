@@ -33,7 +33,7 @@ class LineSplitter:
     """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Create a splitter; lines over `max_bytes` long are skipped or replaced by `instead`."""
+        """Create a splitter that skips lines over `max_bytes` or yields `instead` for them."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
@@ -93,7 +93,7 @@ class EventStreamParser:
     """An incremental parser of an event stream."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Skip events longer than `max_bytes`; `last_id` is the previous connection's last id."""
+        """Skip events over `max_bytes` long; `last_id` is the previous connection's last id."""
         self._most = max_bytes
         self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
@@ -103,11 +103,11 @@ class EventStreamParser:
         self._is_too_long = False
         self._next_id = last_id
         self.last_id = last_id
-        """The newest event's id, sent in the Last-Event-ID header."""
+        """The newest event's id, which a new connection sends in the Last-Event-ID header."""
         self.left_out = 0
         """Number of events skipped so far."""
         self.retry_s: float | None = None
-        """Retry delay requested by the robot, in seconds; None if the robot has requested none."""
+        """Retry delay requested by the robot, in seconds; None if it has not requested one."""
 
     def feed(self, data: bytes) -> list[Event]:
         """Process the next part of the stream and return the completed events."""

@@ -52,7 +52,7 @@ class MultipartParser:
     """An incremental splitter of a multipart body into parts without their headers."""
 
     def __init__(self, boundary: bytes, max_part_bytes: int) -> None:
-        """Create a splitter at `boundary` (see `boundary_of`), for parts up to `max_part_bytes`."""
+        """Create a splitter for `boundary` (see `boundary_of`) that limits the size of parts."""
         # Between parts, the preceding line break and the dashes may be missing. Inside a part, they
         # distinguish a delimiter from the image.
         self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))

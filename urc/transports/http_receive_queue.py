@@ -30,10 +30,10 @@ class HttpReceiveQueue:
         self._has_room.set()
         self._ended: str | None = None
         self.dropped = 0
-        """Number of images that were replaced by newer images."""
+        """Number of images that newer images have replaced."""
 
     def answer(self, place: int, envelope: Envelope) -> None:
-        """Add a request's response; the limit on requests also limits the responses."""
+        """Add a request's response; the limit on requests also limits the number of responses."""
         self._waiting["answer", place] = envelope
         self._arrived.set()
 

@@ -1,8 +1,8 @@
 """Streams from a robot over HTTP: images, events and lines. Each stream runs as a task.
 
 While the transport is open, a failed stream is requested again after increasing delays. Only the
-first failure and the recovery are logged. The transport ends only if the robot refuses connections
-and no stream has received data for `_GONE_S` seconds.
+first failure and the recovery are logged. The connection ends only if the robot refuses connections
+and has sent no data for `_GONE_S` seconds.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ SHORTEST_RETRY_S: Final = 0.2
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""Time for which all streams must be silent, in seconds, before a refused connection means that the
+"""Time without data from the robot, in seconds, after which a refused connection means that the
 robot is unreachable."""
 
 log = logging.getLogger(__name__)
@@ -65,17 +65,19 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
         path, _, event = topic.partition("#")
         if kind not in KINDS:
             words = "mjpeg, stills, sse or lines"
-            raise TransportError(f"http needs {words} as 'stream' of {topic!r}, not {kind!r}")
+            raise TransportError(f"http: 'stream' of {topic!r} must be {words}, not {kind!r}")
         if event and kind != "sse":
             raise TransportError(
                 f"http supports named events only in streams of type sse: {topic!r}"
             )
         if not isinstance(every_s, int | float) or not 0.01 <= every_s <= 3600:
-            raise TransportError(f"http needs 10ms to 1h as 'every' of {topic!r}, not {every_s!r}")
+            raise TransportError(
+                f"http: 'every' of {topic!r} must be from 10ms to 1h, not {every_s!r}"
+            )
         spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
         known = found.setdefault(path, spec)
         if (known.kind, known.every_s) != (spec.kind, spec.every_s):
-            raise TransportError(f"http cannot listen to {path!r} with two kinds of stream")
+            raise TransportError(f"http cannot open {path!r} as two kinds of stream")
         found[path] = known._replace(topics=known.topics | {topic})
     if len(found) > MAX_STREAMS:
         raise TransportError(f"http supports at most {MAX_STREAMS} paths")
@@ -244,7 +246,7 @@ class HttpStream:
         self._pulse.heartbeat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:
-            log.info("%s: here again after %d failures", self._shown, self._failures)
+            log.info("%s: recovered after %d failures", self._shown, self._failures)
             self._failures = 0
 
     def _fail(self, fault: Exception) -> None:

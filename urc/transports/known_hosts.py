@@ -72,7 +72,7 @@ class HostKeys:
         return found
 
     def judge(self, key: asyncssh.SSHKey, known: HostKeyStatus) -> str:
-        """Return "" for a trusted `key`; else trusted fingerprints, ``revoked`` or ``unknown``."""
+        """Return "" for a trusted `key`, else trusted fingerprints, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
         if key in known.revoked:
@@ -109,7 +109,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> HostKeySta
         text = file.read_text("utf-8")
     except FileNotFoundError as missing:
         if is_asked_for:
-            raise TransportError(f"there is no known-hosts file {file}") from missing
+            raise TransportError(f"the known-hosts file {file} does not exist") from missing
         return HostKeyStatus()
     except (OSError, UnicodeError) as fault:
         raise TransportError(f"cannot read the known-hosts file {file} ({_why(fault)})") from fault

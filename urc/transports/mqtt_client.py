@@ -5,8 +5,8 @@ Each `open` connects a socket and creates a paho client for this connection only
 earlier connection can therefore never be sent late. A reused paho client would store unacknowledged
 messages and send them again. The transport starts no threads.
 
-Every connection starts a clean MQTT session. The broker publishes the last will whenever the
-connection ends, even if URC closes it. A will that repeats a stop is harmless.
+Every connection starts a clean MQTT session. The broker publishes the will whenever the connection
+ends, even if URC closes the connection. A will that repeats a stop is harmless.
 """
 
 import asyncio
@@ -32,8 +32,8 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""Keepalive interval, in seconds. If no data arrives for twice this time, the broker is considered
-lost."""
+"""Keepalive interval, in seconds. If no data arrives for twice this time, the connection is
+considered lost."""
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a received message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
@@ -52,7 +52,7 @@ log = logging.getLogger(__name__)
 
 
 class MqttTransport:
-    """A transport to one broker, which may be opened several times."""
+    """A reusable transport to one broker."""
 
     def __init__(self, options: MqttOptions, dialer: Dialer) -> None:
         """Store the options and the dialer for a broker, without connecting."""
@@ -66,7 +66,7 @@ class MqttTransport:
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, log in and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect, log in and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         where = self._options.where
         try:
@@ -206,7 +206,7 @@ class _MqttSession:
         except (ValueError, UnicodeEncodeError) as problem:
             raise TransportError(f"mqtt cannot publish to {topic!r} ({problem})") from problem
         if done.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE:
-            text = f"message dropped: {MAX_UNACKNOWLEDGED} earlier messages lack an acknowledgement"
+            text = f"message dropped: {MAX_UNACKNOWLEDGED} earlier messages are unacknowledged"
             raise TransportError(text)
         while self._client.want_write() and self.queue.ended is None:
             await self._until_writable()
@@ -215,7 +215,7 @@ class _MqttSession:
         self._raise_if_ended()
 
     def end(self, *, has_farewell: bool = True) -> None:
-        """Close immediately. The broker publishes the last will, if one is declared.
+        """Close immediately. The broker publishes the will, if one is declared.
 
         Args:
             has_farewell: whether to send DISCONNECT, which also flushes earlier data.
@@ -344,7 +344,7 @@ class _PahoClient(Client):
         self._options = options
         self._given = line
         self.fault = ""
-        """The system's reason for the end of the connection, which paho only logs."""
+        """The operating system's reason for the end of the connection, which paho only logs."""
 
     def start(self) -> None:
         """Send the login request."""
@@ -396,7 +396,7 @@ class _PahoClient(Client):
             return super()._sock_recv(min(bufsize, _READ_BYTES))
 
     def _sock_send(self, buf: bytes | bytearray) -> int:
-        """Send some of the packets; if sending fails, keep the reason."""
+        """Send some of the packets; if sending fails, record the reason."""
         with self._explained():
             return super()._sock_send(buf)
 

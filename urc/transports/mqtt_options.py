@@ -28,7 +28,7 @@ class MqttTopic(NamedTuple):
 
 
 class WillMessage(NamedTuple):
-    """The last will: a message that the broker publishes when the connection ends."""
+    """The will: a message that the broker publishes when the connection ends."""
 
     topic: str
     payload: bytes
@@ -68,7 +68,7 @@ def read_options(setup: TransportSetup) -> MqttOptions:
         raise TransportError("mqtt has a password but no username")
     version = str(given.get("version", 5))
     if version not in ("5", "3.1.1"):
-        raise TransportError(f"mqtt needs 5 or 3.1.1 as version, not {version!r}")
+        raise TransportError(f"mqtt: version must be 5 or 3.1.1, not {version!r}")
     return MqttOptions(
         _options.host("mqtt", given),
         _options.port("mqtt", {"port": port, **given}),
@@ -102,10 +102,12 @@ def _will(given: object) -> WillMessage | None:
     if given is None:
         return None
     if not isinstance(given, Mapping):
-        raise TransportError(f"mqtt needs topic and payload as will, not {given!r}")
+        raise TransportError(f"mqtt: will must be a mapping with topic and payload, not {given!r}")
     topic = _options.text("mqtt", given, "topic")
     if not topic or "+" in topic or "#" in topic:
-        raise TransportError(f"mqtt needs one topic without wildcards for its will, not {topic!r}")
+        raise TransportError(
+            f"mqtt: the topic of will must be one topic without wildcards, not {topic!r}"
+        )
     payload = _options.text("mqtt", given, "payload").encode()
     retain = _options.flag("mqtt", given, "retain", default=False)
     return WillMessage(topic, payload, _qos("qos", given), retain)
@@ -114,5 +116,5 @@ def _will(given: object) -> WillMessage | None:
 def _qos(name: str, given: Mapping[str, object]) -> int:
     value = given.get(name, 0)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 2:
-        raise TransportError(f"mqtt needs 0, 1 or 2 as {name}, not {value!r}")
+        raise TransportError(f"mqtt: {name} must be 0, 1 or 2, not {value!r}")
     return value

@@ -45,7 +45,7 @@ class SerialSettings(NamedTuple):
 
 
 class SerialTransport(StreamTransport):
-    """A transport over one serial port, which may be opened several times."""
+    """A reusable transport over one serial port."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
         """Store the settings; `port` is a device path, a port name, or an address with a scheme."""
@@ -63,7 +63,7 @@ class SerialTransport(StreamTransport):
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:
-        """Open and configure the port, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Open and configure the port within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         if self._is_raw and self._reach is not None:
             self._stream = await self._reach.open(timeout_s)
@@ -95,7 +95,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     options = setup.options
     port = _options.text("serial", options, "port").strip()
     if not port:
-        raise TransportError("serial needs a port, as /dev/ttyUSB0 or socket://HOST:PORT")
+        raise TransportError("serial needs a port, such as /dev/ttyUSB0 or socket://HOST:PORT")
     if setup.tunnel is not None:
         raise TransportError("serial cannot be tunnelled; remove tunnel")
     if not port.startswith(_SOCKET):
@@ -123,7 +123,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
 
 
 def _remedy(port: str) -> str:
-    """Return a hint about the user group that may open the port, on systems with groups."""
+    """Return a hint about the user group that may open the port; "" on systems without groups."""
     if sys.platform == "win32":
         return ""
     import grp
@@ -157,14 +157,14 @@ def _number(options: Mapping[str, object], key: str, default: int, among: range)
     found = options.get(key, default)
     if isinstance(found, bool) or not isinstance(found, int) or found not in among:
         limits = f"{among.start} to {among.stop - 1}"
-        raise TransportError(f"serial needs {key} from {limits}, not {found!r}")
+        raise TransportError(f"serial: {key} must be an integer from {limits}, not {found!r}")
     return found
 
 
 def _stop_bits(options: Mapping[str, object]) -> float:
     found = options.get("stop_bits", 1)
     if isinstance(found, bool) or found not in (1, 1.5, 2):
-        raise TransportError(f"serial needs stop_bits: 1 | 1.5 | 2, not {found!r}")
+        raise TransportError(f"serial: stop_bits must be 1 | 1.5 | 2, not {found!r}")
     return cast("float", found)
 
 
@@ -199,7 +199,9 @@ def _host_and_port(address: str) -> tuple[str, int]:
     host = host.removeprefix("[").removesuffix("]")
     port = int(number) if number.isascii() and number.isdecimal() else 0
     if not host or not 1 <= port <= 65535:
-        raise TransportError(f"serial needs {scheme}://HOST:PORT, not {address!r}")
+        raise TransportError(
+            f"serial: port must have the form {scheme}://HOST:PORT, not {address!r}"
+        )
     return host, port
 
 

@@ -118,7 +118,9 @@ def _keepalive(value: object) -> float:
     found = _DURATION.fullmatch(value) if isinstance(value, str) else None
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
     if not _ALIVE_S[0] <= seconds <= _ALIVE_S[1]:
-        raise TransportError(f"ssh: keepalive_interval is a time from 200ms to 1m, not {value!r}")
+        raise TransportError(
+            f"ssh: keepalive_interval must be a time from 200ms to 1m, not {value!r}"
+        )
     return seconds
 
 
@@ -140,12 +142,12 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
 
 
 _COLUMNS, _ROWS = 240, 24
-"""The pseudo-terminal's columns and rows; it is wide enough to keep shells from wrapping long
+"""Columns and rows of the pseudo-terminal, which is wide enough to keep shells from wrapping long
 lines."""
 
 
 class SshTransport:
-    """A transport to one SSH server, which can also serve as a `Tunnel` for other transports."""
+    """A transport to one SSH server, and a `Tunnel` for other transports."""
 
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
@@ -165,7 +167,7 @@ class SshTransport:
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:
-        """Log in and start the program, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Log in and start the program within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         async with _within(timeout_s, self.target.address.text):
             connection = await self._shared.join(timeout_s)
@@ -214,7 +216,7 @@ class SshTransport:
         await self.close()
 
     def break_off(self) -> None:
-        """Reset the connection and its outer tunnel, so that unsent data is discarded."""
+        """Reset the connection and its outer tunnel, and discard unsent data."""
         self._shared.break_off()
         if self._outer is not None:
             self._outer.break_off()

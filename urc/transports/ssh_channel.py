@@ -1,7 +1,8 @@
 """An SSH channel as a byte stream.
 
-Received data is buffered up to `READ_AHEAD_BYTES`. If the buffer is full, the channel is not read,
-and SSH flow control stops the sender. `write` returns after the kernel has accepted every byte.
+Received data is buffered up to `READ_AHEAD_BYTES`. While the buffer is full, URC does not read from
+the channel, and SSH flow control stops the sender. `write` returns after the kernel has accepted
+every byte.
 """
 
 import asyncio
@@ -24,7 +25,7 @@ MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
 """Maximum wait for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
-"""Maximum size of standard error output in the message about a program's end, in bytes."""
+"""Maximum number of standard error bytes to quote in the message about a program's end."""
 
 
 class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
@@ -34,7 +35,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         """Initialise a channel.
 
         Args:
-            wire: socket of the SSH connection, which is full when the kernel accepts no more data.
+            wire: the SSH connection's socket; it is full while the kernel accepts no more data.
             program: the program's name in messages, such as ``the shell``; "" for a forwarded
                 connection.
         """

@@ -55,7 +55,7 @@ class SshConnection:
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
     async def program(self, command: str | None, **options: Any) -> SshChannel:
-        """Start `command`, or a shell for None; return a channel to the program."""
+        """Start `command`, or a shell for the command None; return a channel to the program."""
         what = "the shell" if command is None else "the command"
         return await self._opened(
             lambda channel: self.ssh.create_session(
@@ -179,7 +179,7 @@ class SharedConnection:
     async def join(self, timeout_s: float) -> SshConnection:
         """Return the shared connection, opening it if necessary; call `leave` afterwards.
 
-        The caller sets the timeout; a cancelled caller does not affect other callers.
+        The caller enforces the timeout; a cancelled caller does not affect other callers.
 
         Raises:
             ConnectFailed: opening failed. If opening fails, do not call `leave`.
@@ -194,7 +194,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the shared connection; close it after the last user."""
+        """Release the shared connection; close it if no user remains."""
         self._users -= 1
         if self._users:
             return
@@ -214,7 +214,7 @@ class SharedConnection:
     async def _again(
         self, before: "asyncio.Task[SshConnection] | None", timeout_s: float
     ) -> SshConnection:
-        """Open a new connection, after closing the dead connection if there is one."""
+        """Close the dead connection, if there is one, and open a new connection."""
         if before is not None and not before.cancelled() and before.exception() is None:
             await before.result().close()
         return await self._dial(timeout_s)

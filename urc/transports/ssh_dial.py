@@ -28,7 +28,7 @@ class OfferedHostKey(NamedTuple):
 
     @property
     def fingerprint(self) -> str:
-        """The fingerprint, as ``SHA256:…``."""
+        """The fingerprint, in the form ``SHA256:…``."""
         return fingerprint(self.key)
 
     @property

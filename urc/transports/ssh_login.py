@@ -46,7 +46,7 @@ class Login(NamedTuple):
     """Whether to accept legacy algorithms that are no longer secure."""
 
     def __repr__(self) -> str:
-        """Return text with only the user name, so that no secret enters a log."""
+        """Return text that contains only the user name, so that no secret enters a log."""
         return f"Login({self.username!r})"
 
 

@@ -26,7 +26,7 @@ delay lets asyncssh read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return one line that says why a connection ended, as in other transports."""
+    """Return the one-line reason for a lost connection, in the words of other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
             return "the connection broke (the robot no longer answers)"
@@ -96,11 +96,11 @@ class SshSocket(asyncio.BufferedProtocol):
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass on the received bytes."""
+        """Pass the received bytes to asyncssh."""
         self.passes(bytes(self._buffer[:nbytes]))
 
     def passes(self, data: bytes) -> None:
-        """Pass on received data; close the connection after too many unsent replies."""
+        """Pass received data to asyncssh; close the connection after too many unsent replies."""
         before = self._transport.get_write_buffer_size()
         self._inner.data_received(data)
         after = self._transport.get_write_buffer_size()
@@ -110,12 +110,12 @@ class SshSocket(asyncio.BufferedProtocol):
             self._transport.abort()
 
     def eof_received(self) -> bool:
-        """Pass on the end of the stream after all earlier data, then close the socket."""
+        """Pass the end of the stream to asyncssh after all earlier data, then close the socket."""
         self._at_last(self._no_more_comes)
         return True  # stay open until then
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Report the lost connection after passing on all earlier data; wake waiting tasks."""
+        """Report the lost connection to asyncssh after all earlier data; wake waiting tasks."""
         self._at_last(self._lost, exc)
 
     def pause_writing(self) -> None:
@@ -148,10 +148,10 @@ class SshSocket(asyncio.BufferedProtocol):
 
 
 class TunnelAdapter:
-    """An asyncssh tunnel that supplies the connection under an SSH connection."""
+    """An asyncssh tunnel that provides the underlying connection of an SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
-        """Create a tunnel over a connected socket, or over another forwarding SSH connection."""
+        """Create a tunnel over a connected socket, or through another SSH connection."""
         self._line = line
         self._is_used = False
         self.wire: SshSocket
@@ -173,7 +173,7 @@ class TunnelAdapter:
         return channel, inner
 
     def give_up_unused(self) -> None:
-        """Close the socket, unless a connection owns the socket."""
+        """Close the socket unless a connection is using it."""
         if isinstance(self._line, socket.socket) and not self._is_used:
             self._line.close()
 

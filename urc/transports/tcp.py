@@ -41,8 +41,8 @@ class TcpListener(StreamTransport):
 
     After a failed `open`, the port keeps listening, so that a robot is not refused between two
     attempts. After a replacement, the first `close` also keeps the port listening. The next `open`
-    within `HANDOVER_S` receives the newer connection. Any other `close` stops listening on the
-    port.
+    within `HANDOVER_S` seconds receives the newer connection. Any other `close` stops listening on
+    the port.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
@@ -85,7 +85,7 @@ class TcpListener(StreamTransport):
         return place_of(self._bind or "*", self.port)
 
     async def open(self, timeout_s: float) -> None:
-        """Wait for a connection, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Wait for a connection; raise `ConnectFailed` after `timeout_s` seconds."""
         await super().close()
         self._stay_open()
         try:
@@ -205,7 +205,7 @@ class TcpListener(StreamTransport):
         self._replace()
 
     def _replace(self) -> None:
-        """Inform the current connection that it is being replaced."""
+        """End the current connection, because a newer connection replaces it."""
         stream = self._stream
         if stream is None or self._newer is None:
             return
@@ -252,7 +252,7 @@ _LOOPBACK = "127.0.0.1"
 
 
 class TcpTransport(StreamTransport):
-    """A transport over one TCP connection, which may be opened several times."""
+    """A reusable transport over one TCP connection."""
 
     def __init__(
         self,
@@ -292,7 +292,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data still waits for the kernel; `send` waits for that data."""
+        """Whether accepted data is still unwritten; `send` waits until none is."""
         stream = self._stream
         return type(stream) is TcpStream and not stream.is_writable
 
@@ -327,6 +327,6 @@ def from_setup(setup: TransportSetup) -> Transport:
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")
     if who == "host" and not only:
-        raise TransportError("tcp with from: host needs the address of the permitted robot as host")
+        raise TransportError("tcp with 'from: host' needs the permitted robot's address in host")
     tls = Tls.of("tcp", options.get("tls"), is_server=True)
     return TcpListener(bind, port, only=only if who == "host" else "", tls=tls)

@@ -30,8 +30,7 @@ __all__ = ["TelnetTransport", "TelnetOptions", "from_setup"]
 DEFAULT_PORT: Final = 23
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
 _COLUMNS: Final = 240
-"""Width of the terminal that URC reports, in characters; the width prevents shells from wrapping
-long lines."""
+"""Reported terminal width, in characters; wide enough to keep shells from wrapping long lines."""
 _LONGEST_NAME: Final = 40
 _SMALL_BYTES: Final = 1024
 """Maximum size of a received segment that URC acknowledges immediately, in bytes."""
@@ -51,7 +50,7 @@ class TelnetOptions(NamedTuple):
 
 
 class TelnetTransport(StreamTransport):
-    """A transport over one Telnet connection, which may be opened several times."""
+    """A reusable transport over one Telnet connection."""
 
     def __init__(
         self, host: str, port: int, wishes: TelnetOptions, tunnel: Tunnel | None = None
@@ -144,8 +143,8 @@ def _acknowledge(line: socket.socket) -> None:
     """Acknowledge received bytes immediately.
 
     Many Telnet servers send small segments and wait for each acknowledgement. Delayed
-    acknowledgements would cost 40 ms per command. The system resets the socket option for immediate
-    acknowledgements at every read.
+    acknowledgements would add 40 ms to each command. The system resets the socket option for
+    immediate acknowledgements at every read.
     """
     if _QUICKACK is not None:
         with suppress(OSError):  # the connection is closing
@@ -162,7 +161,7 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
     terminal = _options.text("telnet", options, "terminal", "VT100")
     if len(terminal) > _LONGEST_NAME or not (terminal.isascii() and terminal.isprintable()):
         raise TransportError(
-            f"telnet needs a name of up to {_LONGEST_NAME} letters as terminal, not {terminal!r}"
+            f"telnet: terminal must be a name of up to {_LONGEST_NAME} letters, not {terminal!r}"
         )
     negotiate = _options.choice("telnet", options, "negotiate", ("full", "passive"), "passive")
     wishes = TelnetOptions(

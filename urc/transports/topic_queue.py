@@ -20,10 +20,10 @@ TOPIC_BYTES = 524_288
 other messages of its topic.
 """
 MESSAGES = 4096
-"""Maximum number of queued messages of all topics, because a wildcard may match any number of
-topics."""
+"""Maximum number of queued messages across all topics; needed because a wildcard may match any
+number of topics."""
 ALL_BYTES = 33_554_432
-"""Maximum number of queued bytes of all topics."""
+"""Maximum number of queued bytes across all topics."""
 A_TURN = 32
 """Maximum number of envelopes handled in one turn of the event loop."""
 ANSWERS = 1024

@@ -24,7 +24,7 @@ class Address:
         self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def dial(self, timeout_s: float) -> socket.socket:
-        """Return a connected non-blocking socket; every address gets an equal share of the time.
+        """Return a connected non-blocking socket; each address gets an equal share of `timeout_s`.
 
         Raises:
             OSError, UnicodeError: the connection failed; `explain` returns a message.

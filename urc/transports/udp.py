@@ -1,6 +1,6 @@
 """The UDP transport; every payload is one datagram, and every datagram is one frame.
 
-UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
+UDP has no connections, so opening sends nothing, and a lost robot is detected only by its silence.
 The transport reports the errors that UDP can detect: a closed port on the robot and a missing
 route. If the options contain no address, opening waits for the first datagram, and its sender
 becomes the robot.
@@ -117,7 +117,7 @@ class UdpTransport:
             raise
 
     async def receive(self) -> bytes:
-        """Return the next datagram; raise `PeerClosed` for a closed socket or refused data."""
+        """Return the next datagram; raise `PeerClosed` if the connection has ended."""
         while not self._arrived:
             if self._ended:
                 raise PeerClosed(self._ended)
@@ -128,7 +128,7 @@ class UdpTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Send `data` as one datagram; raise `TransportError` on an error."""
+        """Send `data` as one datagram; raise `TransportError` on failure."""
         payload = as_bytes(data)
         if self._line is None or self._ended or self._robot is None:
             raise PeerClosed(self._ended or CLOSED)
@@ -238,7 +238,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the connection because of an error and raise the error.
+        """Raise `fault` as a `TransportError`; end the connection unless a datagram was too long.
 
         Raises:
             TransportError: always.
@@ -261,7 +261,7 @@ class UdpTransport:
 
 
 class _Endpoint(asyncio.DatagramProtocol):
-    """A protocol that passes on the datagrams read by the event loop."""
+    """A protocol that passes datagrams and errors from the event loop to callbacks."""
 
     def __init__(
         self, heard: Callable[[bytes, _Address], None], note: Callable[[OSError], None]
@@ -293,9 +293,9 @@ def from_setup(setup: TransportSetup) -> Transport:
     usual = "host" if host and not is_broadcast else "any"
     who = _options.choice("udp", options, "from", ("any", "host"), usual)
     if not host and (port or who == "host" or is_broadcast):
-        raise TransportError("udp needs a host name or address as host")
+        raise TransportError("udp needs a host name or address in host")
     if not listen and not (host and port):
-        raise TransportError("udp needs the host and port of the robot, or a local port as listen")
+        raise TransportError("udp needs the robot's host and port, or a local port in listen")
     return UdpTransport(
         host,
         port,

@@ -31,7 +31,7 @@ _PIECE_BYTES = 65536
 
 
 class Dialer:
-    """A dialer for one web server, which may be used several times."""
+    """A reusable dialer for one web server."""
 
     def __init__(self, place: WebOrigin, *, tls: Tls | None, tunnel: Tunnel | None) -> None:
         """Store the origin `place`, the TLS settings, and the tunnel for future connections."""
@@ -48,11 +48,11 @@ class Dialer:
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:
-        """Return an open stream; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        """Return an open stream within `timeout_s` seconds, or raise `ConnectFailed`."""
         return await self._reach.open(timeout_s)
 
     async def plug(self, timeout_s: float) -> socket.socket:
-        """Return a connected socket, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Return a connected socket within `timeout_s` seconds, or raise `ConnectFailed`."""
         if self._address is None:
             return self._bridge(await self._reach.open(timeout_s))
         try:
@@ -64,7 +64,7 @@ class Dialer:
             raise ConnectFailed(self._address.explain(fault)) from fault
 
     def unsent(self, line: socket.socket) -> int:
-        """Return the number of unacknowledged bytes of `line`, a socket that `plug` returned."""
+        """Return the number of unacknowledged bytes of `line`, a socket from `plug`."""
         return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:

@@ -45,12 +45,12 @@ class OptionReader:
         self._options = options
 
     def part(self, name: str) -> "OptionReader":
-        """Return a reader of the mapping option `name`; a missing option gives an empty reader."""
+        """Return a reader of the mapping option `name`, or an empty reader if it is missing."""
         found = self._options.get(name)
         if found is None:
             return OptionReader(self.kind, {})
         if not isinstance(found, Mapping):
-            raise TransportError(f"{self.kind} needs a mapping as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be a mapping, not {found!r}")
         return OptionReader(self.kind, found)
 
     def entries(self) -> Iterable[tuple[str, object]]:
@@ -63,7 +63,7 @@ class OptionReader:
         if not isinstance(found, list | tuple) or not all(
             isinstance(one, str) and _TOKEN.fullmatch(one) for one in found
         ):
-            raise TransportError(f"{self.kind} needs a list of names as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be a list of names, not {found!r}")
         return list(found)
 
     def text(self, name: str, default: str = "") -> str:
@@ -72,7 +72,7 @@ class OptionReader:
         if found is None:
             return default
         if not isinstance(found, str):
-            raise TransportError(f"{self.kind} needs text as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be text, not {found!r}")
         return found.strip()
 
     def choice(self, name: str, choices: tuple[str, ...], default: str) -> str:
@@ -80,28 +80,28 @@ class OptionReader:
         found = self.text(name, default)
         if found not in choices:
             words = f"{', '.join(choices[:-1])} or {choices[-1]}"
-            raise TransportError(f"{self.kind} needs {words} as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be {words}, not {found!r}")
         return found
 
     def flag(self, name: str, default: bool) -> bool:
         """Return a boolean option."""
         found = self._options.get(name, default)
         if not isinstance(found, bool):
-            raise TransportError(f"{self.kind} needs true or false as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be true or false, not {found!r}")
         return found
 
     def number(self, name: str, default: float, least: float, most: float) -> float:
-        """Return a number option from `least` to `most`."""
+        """Return a number option; its value must be from `least` to `most`."""
         found = self._options.get(name, default)
         if isinstance(found, bool) or not isinstance(found, int | float):
-            raise TransportError(f"{self.kind} needs a number as {name}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be a number, not {found!r}")
         if not least <= found <= most:
             span = f"from {least:g} to {most:g}"
-            raise TransportError(f"{self.kind} needs {name} {span}, not {found!r}")
+            raise TransportError(f"{self.kind}: {name} must be {span}, not {found!r}")
         return found
 
     def duration(self, name: str, default_s: float, least_s: float, most_s: float) -> float:
-        """Return a duration option in seconds; the value includes a unit: ``250ms``, ``5s``."""
+        """Return a duration option in seconds; its value has a unit: ``250ms``, ``5s``."""
         given = self._options.get(name)
         if given is None:
             return default_s
@@ -109,13 +109,13 @@ class OptionReader:
         seconds = float(found[1]) * _UNITS_S[found[2]] if found else -1.0
         if not least_s <= seconds <= most_s:
             span = f"from {least_s:g}s to {most_s:g}s"
-            raise TransportError(f"{self.kind} needs {name} {span}, not {given!r}")
+            raise TransportError(f"{self.kind}: {name} must be {span}, not {given!r}")
         return seconds
 
     def place(self, plain: str) -> WebOrigin:
         """Return the target in the option `url`; with TLS, its scheme is `plain` + ``s``."""
         url = self.text("url")
-        wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
+        wanted = f"{self.kind}: url must be a URL such as {plain}://192.168.4.1/, not {url!r}"
         try:
             parts = urlsplit(url)
             host, port = parts.hostname, parts.port
@@ -124,7 +124,7 @@ class OptionReader:
         if parts.scheme not in (plain, f"{plain}s") or not host or not _HOST.fullmatch(host):
             raise TransportError(wanted)
         if parts.username is not None or parts.password is not None:
-            message = f"{self.kind} needs user and password under auth, not in the url"
+            message = f"{self.kind}: put user and password under auth, not in the url"
             raise TransportError(message)
         if parts.fragment or port == 0 or not _PATH.fullmatch(parts.path + parts.query):
             raise TransportError(wanted)

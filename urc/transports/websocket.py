@@ -1,9 +1,8 @@
 """The WebSocket transport (RFC 6455), based on the library `websockets`.
 
-Each WebSocket message is one payload. Only a few messages are read ahead, and further messages stay
-in the kernel's queue, so a flooding robot must wait. `send` returns after the kernel has accepted
-every byte. A lost robot is detected by missing replies to pings. Unsent data is discarded when a
-connection ends.
+Each WebSocket message is one payload. The transport reads only a few messages ahead, so a flooding
+robot must wait. `send` returns after the kernel has accepted every byte. A lost robot is detected
+by missing replies to pings. Unsent data is discarded when a connection ends.
 """
 
 import asyncio
@@ -40,7 +39,7 @@ _CLOSE_S = 0.2
 
 
 class WebSocketTransport:
-    """A transport over one WebSocket, which may be opened several times."""
+    """A reusable transport over one WebSocket."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -71,11 +70,11 @@ class WebSocketTransport:
 
     @property
     def subprotocol(self) -> str | None:
-        """Subprotocol that the server has selected; None if it has selected no subprotocol."""
+        """Subprotocol that the server has selected, or None."""
         return None if self._socket is None else self._socket.subprotocol
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and do the handshake, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect and do the handshake within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         where = self._place.authority
         try:

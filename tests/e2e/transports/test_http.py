@@ -288,7 +288,7 @@ async def test_stills_are_fetched_again_and_again(
             pass
     failed, mended = caplog.messages
     assert failed.endswith(" /still.jpg: 404 Not Found; trying again")
-    assert " /still.jpg: here again after " in mended
+    assert " /still.jpg: recovered after " in mended
 
 
 @pytest.mark.needs("ffmpeg")

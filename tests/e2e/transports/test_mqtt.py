@@ -284,11 +284,11 @@ async def test_profile_drives_the_emulated_robot_through_the_broker(tmp_path: Pa
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"host": ""}, "mqtt needs a host name or address as host, not ''"),
-        ({"version": 4}, "mqtt needs 5 or 3.1.1 as version, not '4'"),
+        ({"host": ""}, "mqtt: host must be a host name or address, not ''"),
+        ({"version": 4}, "mqtt: version must be 5 or 3.1.1, not '4'"),
         ({"password": "x"}, "mqtt has a password but no username"),
-        ({"will": {"topic": "a/#"}}, "without wildcards for its will, not 'a/#'"),
-        ({"will": {"topic": "a", "qos": 3}}, "mqtt needs 0, 1 or 2 as qos, not 3"),
+        ({"will": {"topic": "a/#"}}, "one topic without wildcards, not 'a/#'"),
+        ({"will": {"topic": "a", "qos": 3}}, "mqtt: qos must be 0, 1 or 2, not 3"),
     ],
 )
 async def test_unusable_option_gets_one_line(options: dict[str, object], text: str) -> None:

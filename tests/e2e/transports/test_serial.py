@@ -177,13 +177,16 @@ async def test_missing_permission_names_the_group(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"port": ""}, "serial needs a port, as /dev/ttyUSB0 or socket://HOST:PORT"),
-        ({"port": "socket://arm"}, "serial needs socket://HOST:PORT, not 'socket://arm'"),
-        ({"baud": "fast"}, "serial needs baud from 50 to 20000000, not 'fast'"),
-        ({"data_bits": 9}, "serial needs data_bits from 5 to 8, not 9"),
-        ({"parity": "N"}, "serial needs parity: none | odd | even | mark | space, not 'N'"),
-        ({"stop_bits": 3}, "serial needs stop_bits: 1 | 1.5 | 2, not 3"),
-        ({"dtr": "low"}, "serial needs true or false as dtr, not 'low'"),
+        ({"port": ""}, "serial needs a port, such as /dev/ttyUSB0 or socket://HOST:PORT"),
+        (
+            {"port": "socket://arm"},
+            "serial: port must have the form socket://HOST:PORT, not 'socket://arm'",
+        ),
+        ({"baud": "fast"}, "serial: baud must be an integer from 50 to 20000000, not 'fast'"),
+        ({"data_bits": 9}, "serial: data_bits must be an integer from 5 to 8, not 9"),
+        ({"parity": "N"}, "serial: parity must be none | odd | even | mark | space, not 'N'"),
+        ({"stop_bits": 3}, "serial: stop_bits must be 1 | 1.5 | 2, not 3"),
+        ({"dtr": "low"}, "serial: dtr must be true or false, not 'low'"),
     ],
 )
 async def test_bad_option_is_one_line(options: dict[str, object], told: str) -> None:

@@ -178,7 +178,7 @@ async def test_known_hosts_of_openssh_are_understood(sshd: Sshd, tmp_path: Path)
     await line.open(OPEN_S)
     await line.close()
     said = await refusal(line_to(sshd, host_key=None, known_hosts=str(tmp_path / "none")))
-    assert said == f"there is no known-hosts file {tmp_path / 'none'}"
+    assert said == f"the known-hosts file {tmp_path / 'none'} does not exist"
 
 
 @pytest.mark.filterwarnings("ignore:Diffie-Hellman over finite fields")

@@ -161,8 +161,8 @@ async def test_robot_may_ask_for_our_certificate(authority: Authority) -> None:
     [
         ({"ca": "/nowhere.pem"}, "tcp, tls: cannot use ca (no such file or directory)"),
         ({"key": "/nowhere.key"}, "tcp, tls: needs a certificate in the option cert"),
-        ({"verify": "no"}, "tcp, tls: needs true or false as verify, not 'no'"),
-        ("yes", "tcp needs true or options as tls, not 'yes'"),
+        ({"verify": "no"}, "tcp, tls: verify must be true or false, not 'no'"),
+        ("yes", "tcp: tls must be true, false or a mapping of options, not 'yes'"),
     ],
 )
 async def test_bad_option_is_one_line(tls: object, told: str) -> None:

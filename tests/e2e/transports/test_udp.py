@@ -226,12 +226,12 @@ async def test_unknown_host_and_taken_port_are_told() -> None:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({}, "udp needs the host and port of the robot, or a local port as listen"),
-        ({"host": "arm"}, "udp needs the host and port of the robot, or a local port as listen"),
-        ({"port": 1}, "udp needs a host name or address as host"),
-        ({"listen": 1, "from": "host"}, "udp needs a host name or address as host"),
-        ({"listen": 70_000}, "udp needs a port from 1 to 65535 as listen, not 70000"),
-        ({"listen": 1, "from": "me"}, "udp needs from: any | host, not 'me'"),
+        ({}, "udp needs the robot's host and port, or a local port in listen"),
+        ({"host": "arm"}, "udp needs the robot's host and port, or a local port in listen"),
+        ({"port": 1}, "udp needs a host name or address in host"),
+        ({"listen": 1, "from": "host"}, "udp needs a host name or address in host"),
+        ({"listen": 70_000}, "udp: listen must be an integer from 1 to 65535, not 70000"),
+        ({"listen": 1, "from": "me"}, "udp: from must be any | host, not 'me'"),
     ],
 )
 async def test_bad_option_is_one_line(options: dict[str, object], told: str) -> None:

@@ -71,7 +71,7 @@ def test_broken_files_are_told(tmp_path: Path) -> None:
     """Which one, and why."""
     with pytest.raises(TransportError) as told:
         HostKeys("", str(tmp_path / "none")).known("diver", 22)
-    assert str(told.value) == f"there is no known-hosts file {tmp_path / 'none'}"
+    assert str(told.value) == f"the known-hosts file {tmp_path / 'none'} does not exist"
     own_file().parent.mkdir()
     own_file().write_bytes(b"\xff\xfe")
     with pytest.raises(TransportError, match="cannot read the known-hosts file"):

@@ -40,19 +40,22 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        ({"host": ""}, "ssh needs a host name or address as host, not ''"),
-        ({"port": 0}, "ssh needs a port from 1 to 65535 as port, not 0"),
+        ({"host": ""}, "ssh: host must be a host name or address, not ''"),
+        ({"port": 0}, "ssh: port must be an integer from 1 to 65535, not 0"),
         ({"username": None}, "ssh needs a username"),
         ({"password": 1234}, "ssh: password must be text; put the value in quotation marks"),
-        ({"mode": "sftp"}, "ssh needs mode: shell | exec | forward, not 'sftp'"),
+        ({"mode": "sftp"}, "ssh: mode must be shell | exec | forward, not 'sftp'"),
         ({"mode": "exec"}, "ssh: 'mode: exec' needs a command"),
         ({"command": "cat"}, "ssh: a command needs 'mode: exec', not 'mode: shell'"),
-        ({"pty": "yes"}, "ssh needs true or false as pty, not 'yes'"),
+        ({"pty": "yes"}, "ssh: pty must be true or false, not 'yes'"),
         (
             {"keepalive_interval": "2h"},
-            "ssh: keepalive_interval is a time from 200ms to 1m, not '2h'",
+            "ssh: keepalive_interval must be a time from 200ms to 1m, not '2h'",
         ),
-        ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
+        (
+            {"keepalive_interval": 5},
+            "ssh: keepalive_interval must be a time from 200ms to 1m, not 5",
+        ),
         ({"environment": "A=b"}, "ssh: environment must contain entries of the form NAME: value"),
         ({"environment": {"A B": "c"}}, "ssh: 'A B' is not the name of an environment variable"),
         (
@@ -75,12 +78,12 @@ def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        ({"host": 5}, "telnet needs a host name or address as host, not 5"),
-        ({"negotiate": "never"}, "telnet needs negotiate: full | passive, not 'never'"),
-        ({"echo": 1}, "telnet needs true or false as echo, not 1"),
+        ({"host": 5}, "telnet: host must be a host name or address, not 5"),
+        ({"negotiate": "never"}, "telnet: negotiate must be full | passive, not 'never'"),
+        ({"echo": 1}, "telnet: echo must be true or false, not 1"),
         (
             {"terminal": "VT\x1b"},
-            "telnet needs a name of up to 40 letters as terminal, not 'VT\\x1b'",
+            "telnet: terminal must be a name of up to 40 letters, not 'VT\\x1b'",
         ),
     ],
 )

@@ -16,13 +16,13 @@ ADDRESSES = [
 ]
 
 WRONG: list[tuple[dict[str, Value], str]] = [
-    ({"port": 1}, "tcp needs a host name or address as host, not None"),
-    ({"host": " ", "port": 1}, "tcp needs a host name or address as host, not ' '"),
-    ({"host": "h"}, "tcp needs a port from 1 to 65535 as port, not None"),
-    ({"host": "h", "port": 0}, "tcp needs a port from 1 to 65535 as port, not 0"),
-    ({"host": "h", "port": 65536}, "tcp needs a port from 1 to 65535 as port, not 65536"),
-    ({"host": "h", "port": "6789"}, "tcp needs a port from 1 to 65535 as port, not '6789'"),
-    ({"host": "h", "port": True}, "tcp needs a port from 1 to 65535 as port, not True"),
+    ({"port": 1}, "tcp: host must be a host name or address, not None"),
+    ({"host": " ", "port": 1}, "tcp: host must be a host name or address, not ' '"),
+    ({"host": "h"}, "tcp: port must be an integer from 1 to 65535, not None"),
+    ({"host": "h", "port": 0}, "tcp: port must be an integer from 1 to 65535, not 0"),
+    ({"host": "h", "port": 65536}, "tcp: port must be an integer from 1 to 65535, not 65536"),
+    ({"host": "h", "port": "6789"}, "tcp: port must be an integer from 1 to 65535, not '6789'"),
+    ({"host": "h", "port": True}, "tcp: port must be an integer from 1 to 65535, not True"),
 ]
 
 

@@ -14,33 +14,33 @@ ADDRESSES = [
     ("websocket", "wss://robot.local", "websocket wss://robot.local:443/"),
 ]
 
-URL = "a url such as http://192.168.4.1/, not"
+URL = "url must be a URL such as http://192.168.4.1/, not"
 WRONG: list[tuple[str, dict[str, object], str]] = [
-    ("http", {}, f"http needs {URL} ''"),
-    ("http", {"url": "robot"}, f"http needs {URL} 'robot'"),
-    ("http", {"url": "ws://robot"}, f"http needs {URL} 'ws://robot'"),
-    ("http", {"url": "http://"}, f"http needs {URL} 'http://'"),
-    ("http", {"url": "http://a:99999"}, f"http needs {URL} 'http://a:99999'"),
-    ("http", {"url": "http://a:0"}, f"http needs {URL} 'http://a:0'"),
-    ("http", {"url": "http://a/#x"}, f"http needs {URL} 'http://a/#x'"),
-    ("http", {"url": "http://a b/"}, f"http needs {URL} 'http://a b/'"),
-    ("http", {"url": 5}, "http needs text as url, not 5"),
+    ("http", {}, f"http: {URL} ''"),
+    ("http", {"url": "robot"}, f"http: {URL} 'robot'"),
+    ("http", {"url": "ws://robot"}, f"http: {URL} 'ws://robot'"),
+    ("http", {"url": "http://"}, f"http: {URL} 'http://'"),
+    ("http", {"url": "http://a:99999"}, f"http: {URL} 'http://a:99999'"),
+    ("http", {"url": "http://a:0"}, f"http: {URL} 'http://a:0'"),
+    ("http", {"url": "http://a/#x"}, f"http: {URL} 'http://a/#x'"),
+    ("http", {"url": "http://a b/"}, f"http: {URL} 'http://a b/'"),
+    ("http", {"url": 5}, "http: url must be text, not 5"),
     (
         "http",
         {"url": "http://me:secret@robot"},
-        "http needs user and password under auth, not in the url",
+        "http: put user and password under auth, not in the url",
     ),
     (
         "websocket",
         {"url": "http://a"},
-        "websocket needs a url such as ws://192.168.4.1/, not 'http://a'",
+        "websocket: url must be a URL such as ws://192.168.4.1/, not 'http://a'",
     ),
 ]
 
 BESIDE: list[tuple[dict[str, object], str]] = [
     ({"tls": True}, "http has tls options, but its url does not use TLS"),
-    ({"auth": "me"}, "http needs a mapping as auth, not 'me'"),
-    ({"auth": {"type": "magic"}}, "http needs basic, bearer or digest as type, not 'magic'"),
+    ({"auth": "me"}, "http: auth must be a mapping, not 'me'"),
+    ({"auth": {"type": "magic"}}, "http: type must be basic, bearer or digest, not 'magic'"),
     ({"auth": {"type": "bearer"}}, "http needs a token for auth of type bearer"),
     ({"auth": {"type": "basic"}}, "http needs a user for auth of type basic"),
     ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y'"),
@@ -61,10 +61,10 @@ BESIDE: list[tuple[dict[str, object], str]] = [
             "Referer",
         )
     ),
-    ({"max_body": 0}, "http needs max_body from 1 to 2.68435e+08, not 0"),
-    ({"in_flight": True}, "http needs a number as in_flight, not True"),
-    ({"response_timeout": "soon"}, "http needs response_timeout from 0.05s to 600s, not 'soon'"),
-    ({"response_timeout": "20m"}, "http needs response_timeout from 0.05s to 600s, not '20m'"),
+    ({"max_body": 0}, "http: max_body must be from 1 to 2.68435e+08, not 0"),
+    ({"in_flight": True}, "http: in_flight must be a number, not True"),
+    ({"response_timeout": "soon"}, "http: response_timeout must be from 0.05s to 600s, not 'soon'"),
+    ({"response_timeout": "20m"}, "http: response_timeout must be from 0.05s to 600s, not '20m'"),
 ]
 
 
@@ -106,7 +106,7 @@ def test_events_of_one_path_share_a_stream() -> None:
 STREAMS: list[tuple[list[TopicSubscription], str]] = [
     (
         [TopicSubscription("/cam")],
-        "http needs mjpeg, stills, sse or lines as 'stream' of '/cam', not None",
+        "http: 'stream' of '/cam' must be mjpeg, stills, sse or lines, not None",
     ),
     (
         [TopicSubscription("/cam#x", {"stream": "mjpeg"})],
@@ -114,14 +114,14 @@ STREAMS: list[tuple[list[TopicSubscription], str]] = [
     ),
     (
         [TopicSubscription("/s", {"stream": "stills", "every": 0.001})],
-        "http needs 10ms to 1h as 'every' of '/s', not 0.001",
+        "http: 'every' of '/s' must be from 10ms to 1h, not 0.001",
     ),
     (
         [
             TopicSubscription("/s#a", {"stream": "sse"}),
             TopicSubscription("/s", {"stream": "lines"}),
         ],
-        "http cannot listen to '/s' with two kinds of stream",
+        "http cannot open '/s' as two kinds of stream",
     ),
     (
         [TopicSubscription(f"/{n}", {"stream": "lines"}) for n in range(17)],

@@ -2,9 +2,9 @@
 
 A WebSocket client offers subprotocols, and the server selects one. A Foxglove protocol server
 requires one of its own subprotocols. A rosbridge server selects no subprotocol. With ``via: auto``,
-the transport therefore offers Foxglove's subprotocols and follows the server's selection. If no
-port is given, the transport tries the usual ports for both kinds, beginning with the port that
-worked last.
+the transport therefore offers Foxglove's subprotocols and follows the server's selection. If the
+options contain no port, the transport tries the usual ports for both kinds, beginning with the port
+that worked last.
 """
 
 from collections.abc import Mapping
@@ -68,10 +68,10 @@ class Candidate:
 
 
 class AnyBridgeTransport:
-    """A transport to the first bridge that answers, which may be opened several times."""
+    """A reusable transport to the first bridge that answers."""
 
     def __init__(self, candidates: list[Candidate], where: str) -> None:
-        """Initialise without connecting; `where` is the target as display text."""
+        """Store the candidates, without connecting; `where` is the target as display text."""
         self._candidates = candidates
         self._where = where
         self._bridge: _Bridge | None = None
@@ -82,7 +82,7 @@ class AnyBridgeTransport:
         return self._bridge.address if self._bridge is not None else f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect to a bridge; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        """Connect to a bridge within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         faults = []
         for candidate in tuple(self._candidates):
@@ -98,7 +98,7 @@ class AnyBridgeTransport:
         raise ConnectFailed("; ".join(faults))
 
     async def receive(self) -> Envelope:
-        """Return the next message, definition or response; raise `PeerClosed` at the end."""
+        """Return the next message, definition or response; raise `PeerClosed` after the last."""
         return await self._open_bridge().receive()
 
     async def send(self, data: Payload) -> None:
@@ -146,18 +146,18 @@ def from_setup(setup: TransportSetup) -> Transport:
     options = setup.options
     via = options.get("via", "rosbridge")
     if not isinstance(via, str) or via not in PORTS:
-        raise TransportError(f"ros needs {', '.join(PORTS)} as via, not {via!r}")
+        raise TransportError(f"ros: via must be one of {', '.join(PORTS)}, not {via!r}")
     host, port = options.get("host"), options.get("port")
     if not isinstance(host, str) or not host.strip():
-        raise TransportError(f"ros needs a host name or address, not {host!r}")
+        raise TransportError(f"ros: host must be a host name or address, not {host!r}")
     host = host.strip()
     if port is not None and (
         isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535
     ):
-        raise TransportError(f"ros needs a port from 1 to 65535, not {port!r}")
+        raise TransportError(f"ros: port must be an integer from 1 to 65535, not {port!r}")
     ros = options.get("version")
     if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, rosbridge.AUTO)):
-        raise TransportError(f"ros needs 1, 2 or auto as version, not {ros!r}")
+        raise TransportError(f"ros: version must be 1, 2 or auto, not {ros!r}")
     wanted = rosbridge.merged(
         [rosbridge.subscription(one.topic, one.attributes) for one in setup.subscriptions]
     )
@@ -180,7 +180,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 def _wire(setup: TransportSetup, where: str, *, offers: bool) -> WebSocketTransport:
     path, tls = setup.options.get("path", "/"), setup.options.get("tls") or None
     if not isinstance(path, str) or not path.startswith("/"):
-        raise TransportError(f"ros needs a path that starts with /, not {path!r}")
+        raise TransportError(f"ros: path must be text that starts with /, not {path!r}")
     options: dict[str, object] = {
         "url": f"{'ws' if tls is None else 'wss'}://{where}{path}",
         "tls": tls,

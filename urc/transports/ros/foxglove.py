@@ -1,10 +1,11 @@
 """A transport for ROS robots behind a Foxglove protocol server, such as foxglove_bridge.
 
 Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
-transport. `FoxgloveSession` implements the protocol. Its objects are discarded with the connection,
+transport. `FoxgloveSession` implements the protocol. The session is discarded with the connection,
 so no data can be sent late. A task reads continuously, even if messages are consumed slowly,
 because the bridge drops a slow client's oldest data. Channels can appear and disappear. Changes are
-collected for `_SETTLE_S`, because a broken robot may announce thousands of channels per second.
+collected for `_SETTLE_S` seconds, because a broken robot may announce thousands of channels per
+second.
 
 A bridge creates a ROS publisher when the client announces a topic, and ROS connects publishers and
 subscribers later. Stops are therefore repeated, and topics from earlier connections are announced
@@ -37,7 +38,7 @@ _TURN_S: Final = 0.005
 
 
 class FoxgloveTransport:
-    """A transport to one Foxglove protocol server, which may be opened several times."""
+    """A reusable transport to one Foxglove protocol server."""
 
     def __init__(
         self,
@@ -74,7 +75,7 @@ class FoxgloveTransport:
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and subscribe; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         await self._wire.open(timeout_s)
         await self.begin(timeout_s)

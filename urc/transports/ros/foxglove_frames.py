@@ -41,7 +41,7 @@ class MessageData(NamedTuple):
 
     subscription: int
     time_ns: int
-    """Time at which the bridge received the message, by the robot's clock."""
+    """Time at which the bridge received the message, according to the robot's clock."""
     data: bytes
 
 

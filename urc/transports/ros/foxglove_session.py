@@ -4,11 +4,12 @@ The session does no I/O. It writes frames to a list, and the transport sends the
 object serves a single connection, so no state is carried over to the next.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
-only to the driver's topics. The bridge sends every message, so the session itself drops messages
-that arrive too soon. It delivers the last message of a burst later. The session passes messages on
-as bytes, preceded by the definition of the topic's type (`urc.protocol.ros.topic_codec`).
+only to the driver's topics. The bridge sends every message at the full rate, so the session drops
+messages that arrive too soon. The last message of a burst is delivered later. The session passes
+messages on as bytes, preceded by the definition of the topic's type
+(`urc.protocol.ros.topic_codec`).
 
-The protocol provides the parameters and the list of topics. The session uses them to answer the
+The protocol provides the parameters and the list of topics. The session uses both to answer the
 corresponding rosapi services itself, so the same document also works with rosbridge.
 """
 
@@ -82,7 +83,7 @@ class _Subscription:
         self.due_s = float("-inf")
         self.is_heard = False
         self.late: Envelope | None = None
-        """Newest message that arrived too soon."""
+        """Newest message that arrived too soon, to be delivered later; None without one."""
 
 
 class FoxgloveSession:

@@ -18,7 +18,7 @@ class TopicGraph:
     """The topics of one ROS system and the mistakes reported so far."""
 
     def __init__(self, tell: Callable[[str], None], ros: int | None) -> None:
-        """Initialise without topics.
+        """Initialise an empty graph.
 
         Args:
             tell: callback that receives one line for each mistake.
@@ -31,7 +31,7 @@ class TopicGraph:
         self._looked: set[str] = set()
 
     def learn(self, types: Mapping[str, str]) -> None:
-        """Set the existing topics with their types; "" for an unknown type."""
+        """Set the existing topics and their types; a type is "" if unknown."""
         self._types = types
         self._looked.clear()
         found = version_of(types.values())
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version that uses this form of type name; None if unknown."""
+    """Return the ROS version that uses type names of this form; None if unknown."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None

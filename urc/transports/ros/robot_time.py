@@ -1,8 +1,8 @@
-"""A robot's clock, estimated from the times in its messages. No I/O.
+"""An estimate of a robot's clock, from the times in its messages. No I/O.
 
 A robot's clock may differ from this machine's clock, and a simulation's clock may be paused.
-Messages arrive with a delay, so the largest difference in the last two seconds is the best
-estimate.
+Delays make the difference between the clocks appear smaller, so the largest difference in the last
+two seconds is the best estimate.
 """
 
 import struct
@@ -12,7 +12,7 @@ from typing import Final
 __all__ = ["RobotTime"]
 
 _KEPT_NS: Final = 2_000_000_000
-"""Time for which a difference is used, in nanoseconds."""
+"""Time for which a measured difference stays valid, in nanoseconds."""
 
 
 class RobotTime:
@@ -23,7 +23,7 @@ class RobotTime:
         self._taken_ns: int | None = None
 
     def told(self, robot_ns: int, here_ns: int) -> None:
-        """Record a robot time that arrived when this machine's time was `here_ns`."""
+        """Record the robot time `robot_ns`, which arrived at this machine's time `here_ns`."""
         difference = robot_ns - here_ns
         is_old = self._taken_ns is None or here_ns - self._taken_ns > _KEPT_NS
         if is_old or difference >= self._difference_ns:

@@ -6,9 +6,9 @@ transport. The protocol over the WebSocket is implemented by roslibpy
 data can be sent late. A task reads continuously, even if messages are consumed slowly, because one
 stalled reader would freeze the topic for every client of the bridge.
 
-A bridge delivers the first message on a topic only after its publisher has connected to the
-subscribers. If the client disconnects before then, the message is dropped. Clients therefore call
-`settle` before disconnecting: the method queries rosapi and waits for the subscribers. The
+A bridge delivers the first message on a topic only after the bridge's publisher has connected to
+the subscribers. If the client disconnects before then, the message is dropped. Clients therefore
+call `settle` before disconnecting: the method queries rosapi and waits for the subscribers. The
 reply also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
@@ -45,7 +45,7 @@ __all__ = ["AUTO", "DEFAULT_PORT", "RosbridgeTransport", "merged", "subscription
 DEFAULT_PORT = 9090
 AUTO: Final = "auto"
 _ANSWER_S = 3.0
-"""Maximum wait for a reply from rosapi, in seconds; afterwards, rosapi counts as missing."""
+"""Maximum wait for a reply from rosapi, in seconds; afterwards, rosapi is considered missing."""
 _PART = 0.5
 """Maximum fraction of the connection timeout that may be spent waiting for rosapi's reply."""
 _CONNECTS_S = 1.0
@@ -59,7 +59,7 @@ log = logging.getLogger(__name__)
 
 
 class RosbridgeTransport:
-    """A transport to one rosbridge server, which may be opened several times."""
+    """A reusable transport to one rosbridge server."""
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class RosbridgeTransport:
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and subscribe; raise `ConnectFailed` on failure within `timeout_s` seconds."""
+        """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         await self._wire.open(timeout_s)
         await self.begin(timeout_s)
@@ -106,13 +106,13 @@ class RosbridgeTransport:
             await session.end()
             await self._wire.close()
             if isinstance(fault, PeerClosed | TimeoutError):
-                told = str(fault) or "it takes nothing"
+                told = str(fault) or "it accepts no data"
                 message = f"{self._where} refused the subscriptions ({told})"
                 raise ConnectFailed(message) from fault
             raise
 
     async def receive(self) -> Envelope:
-        """Return the next message, response or feedback; raise `PeerClosed` at the end."""
+        """Return the next message, response or feedback; raise `PeerClosed` after the last."""
         if self._session is None:
             raise PeerClosed("the connection is closed")
         return await self._session.queue.pop()
@@ -182,7 +182,9 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
     def number(name: str, factor: float = 1) -> int:
         value = attributes.get(name) or 0
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise TransportError(f"ros needs a number as {name} of {topic}, not {value!r}")
+            raise TransportError(
+                f"ros: {name} of {topic} must be a non-negative number, not {value!r}"
+            )
         return round(value * factor)
 
     compression = attributes.get("compression") or "none"
@@ -201,7 +203,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
 
 def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic; a second one would cancel the first one's throttle."""
+    """Return one subscription per topic; a second would cancel the throttle of the first."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -235,7 +237,10 @@ class _Session:
         """Topics whose first message may not have arrived yet, in order of publication."""
 
     async def start(self, subscriptions: tuple[RosSubscription, ...], answer_s: float) -> None:
-        """Query the list of topics, wait up to `answer_s` for it, subscribe, and start reading."""
+        """Start reading, query the list of topics, and subscribe.
+
+        With ``version: auto``, wait up to `answer_s` seconds for the list before subscribing.
+        """
         self._reader = asyncio.create_task(self._read())
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
@@ -261,7 +266,7 @@ class _Session:
         await self._write(frames)
 
     def _look_at(self, topic: str, kind: str) -> list[bytes]:
-        """Return the query for a topic's subscribers, sent with the topic's first message."""
+        """Return the query for a topic's subscribers; [] after the topic's first message."""
         if not self._graph.publishes(topic, kind):
             return []
 

@@ -66,7 +66,7 @@ class RosClient:
         return self._protocol.unanswered
 
     def spell(self, ros: int | None) -> None:
-        """From now on, use the type names of ROS version `ros`; None keeps names as written."""
+        """Use the type names of ROS version `ros` from now on; None keeps names as written."""
         self._ros_version = ros
 
     # -- sending; each method returns the frames to write
@@ -170,7 +170,7 @@ class RosClient:
         self._goals[goal] = name, number
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with the given id or else the action's newest running goal."""
+        """Cancel the goal with the given id, or for an unknown id, the action's newest goal."""
         name, number = _text(attributes, "action"), attributes.get("id")
         running = [goal for goal, (action, _) in self._goals.items() if action == name]
         named = [goal for goal in running if self._goals[goal][1] == number]
@@ -323,7 +323,7 @@ def _keep(table: dict[str, object], name: str, waiting: object) -> None:
 def _text(attributes: Mapping[str, object], name: str) -> str:
     value = attributes.get(name)
     if not isinstance(value, str) or not value:
-        raise TransportError(f"ros needs a {name}, not {value!r}")
+        raise TransportError(f"ros: {name} must be non-empty text, not {value!r}")
     return value
 
 

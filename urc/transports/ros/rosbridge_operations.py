@@ -27,8 +27,8 @@ MAX_PNG_BYTES = 2 * 1024 * 1024
 """Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
 one second."""
 MAX_VALUES = 2_000_000
-"""Maximum number of commas and brackets; the limit exists because an empty list takes three bytes
-as text but fifty in memory."""
+"""Maximum number of commas and brackets; limited because an empty list takes three bytes as text
+but fifty in memory."""
 _MANY_VALUES = 100_000
 """Maximum number of values in CBOR data with shared references; processing this many values takes a
 tenth of a second."""
@@ -151,7 +151,7 @@ def _tagged(first: Any, second: Any) -> object:
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
-        raise ValueError(f"tag {tag.tag} is not known")
+        raise ValueError(f"the CBOR tag {tag.tag} is unknown")
     return list(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
 
 
