@@ -1,9 +1,9 @@
 """Automatic replies of an emulated robot to every request that the driver declares.
 
 The module does not use sockets or clocks. Each received frame is matched against all requests that
-the driver can send on its transport. Each reply is encoded from plausible values, using the
-declaration with which the driver decodes the reply. A command argument with the name of a signal
-sets that signal.
+the driver can send on its transport. Each reply is encoded from plausible values, with the
+declaration that the driver uses to decode it. A command argument with the name of a signal sets
+that signal.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -57,7 +57,7 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """No reply can be built for a declared request; the message is human-readable."""
+    """A failure to build the reply to a declared request; the message is human-readable."""
 
 
 class SimulatedReply(NamedTuple):
@@ -80,7 +80,7 @@ class SimulatedReply(NamedTuple):
 
 
 class DefaultMessage(NamedTuple):
-    """An unsolicited message that the robot repeats."""
+    """An unsolicited message that the robot sends periodically."""
 
     every_s: float
     answer: SimulatedReply
@@ -127,7 +127,7 @@ class DefaultResponder:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: values that were set, or else plausible values."""
+        """Return the raw fields for a frame: values that were set, otherwise plausible values."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -268,9 +268,9 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`, or None.
 
-        There is no result if the best match has arguments or a reply. Otherwise, `frame` may mean
-        several commands. Several declarations of a driver often share a stop frame: the release of
-        a held command, a close message, a command without a reply.
+        Return None if the best match has arguments or a reply. Without these, `frame` may belong to
+        several commands: a stop frame is often the release of a held command, a close message and a
+        separate command.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -283,7 +283,7 @@ class DefaultConnection:
     def labels(self, frame: Frame) -> set[str]:
         """Return the labels of all requests that encode to this frame.
 
-        Without such a request, return the label of the first match.
+        If no request encodes to exactly this frame, return the label of the first match.
         """
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
@@ -318,7 +318,7 @@ class DefaultConnection:
             return False
 
     def _declared(self) -> Iterator[_Request]:
-        """Yield the requests of commands, polls and sequences. Constant requests come first."""
+        """Yield every request that the driver can send on this transport, constants first."""
         driver, name = self._robot.driver, self._spec.name
         requests = []
         for command in driver.commands.values():

@@ -38,7 +38,7 @@ class _ConnectionState(Protocol):
 
 
 class TimedSetters:
-    """The connections to which timed rules are assigned.
+    """The assignment of each timed rule to one connection.
 
     Only the assigned connection changes the robot's state.
     """
@@ -171,7 +171,7 @@ class EmulatedRobot:
         return body.world.top_view(width, height)
 
     def readings(self, now_s: float) -> Mapping[str, Reading]:
-        """Return the values of the robot's signals; no connection is needed.
+        """Return the values of the robot's signals, with or without a connection.
 
         `now_s` is the current time, in seconds since the epoch.
         """
@@ -263,7 +263,8 @@ class EmulatedConnection:
         """Process received data and return the replies. Each reply is a whole frame.
 
         Args:
-            data: bytes from any position in the stream, or an envelope on a message transport.
+            data: the next bytes of the stream, in pieces of any size, or an envelope on a message
+                transport.
             now_s: current time in seconds since the epoch, available to templates as ``now``.
             limit: maximum number of replies; further requests are dropped. None for no limit.
         """
@@ -297,7 +298,7 @@ class EmulatedConnection:
         return answers
 
     def advance(self, dt_s: float, now_s: float) -> list[Payload]:
-        """Advance time by `dt_s` seconds and return the robot's unsolicited frames.
+        """Advance time by `dt_s` seconds; return the robot's unsolicited frames.
 
         A periodic rule sends at most once per call, so a late call does not cause a burst of
         frames.

@@ -1,6 +1,6 @@
 """Faults to inject into an emulated robot: delay, loss, noise and failed sensors.
 
-Pure. With the same traffic and the same faults, the same frames are dropped in every run.
+Pure. Runs with the same traffic and the same faults drop the same frames.
 """
 
 import math
@@ -97,7 +97,7 @@ class Faults:
         """Begin without faults.
 
         Args:
-            missing: signals whose sensors never work on this machine.
+            missing: signals whose sensors need a package that is not installed.
         """
         self.active: dict[str, Fault] = {}
         """Faults, keyed by name; faults of a signal are keyed by name and signal."""

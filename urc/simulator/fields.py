@@ -1,4 +1,4 @@
-"""Raw fields for one of the emulated robot's frames, and subsets of fields that fit into a frame.
+"""Raw fields for one of the emulated robot's frames, and sets of fields that fit into the frame.
 
 Pure.
 """
@@ -21,7 +21,7 @@ class Fields(NamedTuple):
     """Internal fields of the document whose values are unknown."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
-        """Yield sets of fields to encode, from the largest to the smallest."""
+        """Yield sets of fields to encode, in the order in which to try them."""
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own

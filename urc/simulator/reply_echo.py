@@ -72,7 +72,7 @@ def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]
 
 
 class _Name(str):
-    """A name in an equality, as distinct from a text constant."""
+    """A name in an equality, as opposed to a text constant."""
 
     __slots__ = ()
 
@@ -172,6 +172,6 @@ def _as(kind: str, raw: object) -> object:
 
 
 def _is_whole(raw: str) -> bool:
-    """Return whether the text is an integer as written in expressions."""
+    """Return whether the text is an integer literal of an expression."""
     digits = raw.removeprefix("-")
     return digits.isdecimal() and digits.isascii() and str(int(raw)) == raw

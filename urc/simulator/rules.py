@@ -251,7 +251,7 @@ class RuleSet:
 
 
 def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
-    """Return the names in a frame, read by the rule's pattern or form; None if nothing matches."""
+    """Return the values that the rule reads from a frame, by name; None if nothing matches."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:
         if rule.reader is not None:

@@ -1,4 +1,4 @@
-"""Servers that put an emulated robot on real connections, for operators, tests and ``urc demo``.
+"""Servers that make an emulated robot reachable, for operators, tests and ``urc demo``.
 
 The package `urc.simulator.servers` contains one server for each type of transport.
 """
@@ -47,7 +47,7 @@ async def serve(
 
     Args:
         profile: profile with `simulator` rules.
-        settings: values for ports and templates; for a port of 0, the system chooses a port.
+        settings: values for ports and templates; the system chooses a free port for port 0.
         host: local address to listen on; the default accepts only local clients.
         now: function that returns the current time, in seconds since the epoch; templates read the
             time as ``now``.
@@ -127,7 +127,7 @@ def _put_inside(
 
 
 def _known_as(context: ServerContext) -> tuple[object, object, str]:
-    """Return the host, port and URL of a transport; the URL has a scheme without TLS, or is ""."""
+    """Return a transport's host, port and URL; the URL has a scheme without TLS, or is ""."""
     url = context.options.get("url")
     if not isinstance(url, str):
         host, port = context.options.get("host"), context.options.get("port")

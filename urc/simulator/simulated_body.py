@@ -21,7 +21,7 @@ __all__ = ["SimulatedBody", "failsafe_of", "has_rendering", "rendered_signals"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that stay active when the fail-safe stops the body, because they cause no motion. For
+"""Inputs that the fail-safe leaves active, because they cause no motion. For
 example, a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
@@ -65,7 +65,7 @@ class SimulatedBody:
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Restart the fail-safe's timer if a received frame may be one of the timer's commands.
+        """Restart the fail-safe timer if a received frame may be a command that restarts it.
 
         Args:
             labels: commands that the frame may mean.

@@ -95,7 +95,7 @@ _DEEPEST: Final = 16
 
 
 class Unsettable(UrcError):
-    """An invalid value for a signal; the message is human-readable."""
+    """A value that is invalid for a signal; the message is human-readable."""
 
 
 class Values:
@@ -110,7 +110,7 @@ class Values:
         *,
         is_plain: bool = False,
     ) -> None:
-        """Create the robot with `initial` signals and state variables, and any given world."""
+        """Create the robot with `initial` signals and state variables, and optionally a world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}

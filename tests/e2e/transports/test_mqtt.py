@@ -261,7 +261,7 @@ async def test_profile_drives_the_emulated_robot_through_the_broker(tmp_path: Pa
     port = free_port()
     settings = {"host": "127.0.0.1", "port": port}
     async with nothing_left():
-        with pytest.raises(UrcError, match="needs a broker; start one, such as mosquitto"):
+        with pytest.raises(UrcError, match="needs a broker; start one, for example"):
             async with serve_robot(profile, settings):
                 pass
         async with (

@@ -1,7 +1,7 @@
 """The clients of a simulated server, and their conversations with the robot.
 
-Each client has a separate `EmulatedConnection`. The number of clients, the size of input buffers
-and the write timeout are limited. At the maximum number of clients, a new client replaces the
+Each client has a separate `EmulatedConnection`. Limits apply to the number of clients, the size of
+input buffers and the time for a write. At the maximum number of clients, a new client replaces the
 client that has been silent longest. Half-open connections therefore cannot block the server.
 """
 
@@ -84,7 +84,7 @@ class Clients:
         try:
             await talk(client)
         except (OSError, TimeoutError) as fault:
-            log.info("%s: a client was lost: %s", name, str(fault) or "it takes nothing")
+            log.info("%s: lost a client: %s", name, str(fault) or "it does not read its data")
         finally:
             client.abort()
             self._talks.pop(client, None)

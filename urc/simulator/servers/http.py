@@ -1,4 +1,4 @@
-"""An emulated robot behind a web server, with requests and streams of pictures, events and lines.
+"""An emulated robot behind a web server, with requests and streams of images, events and lines.
 
 Requests are passed to the robot's rules as envelopes. Each of the driver's subscriptions is a
 stream at the topic's path. Streams contain the robot's messages or, for a camera, images of its
@@ -26,7 +26,7 @@ __all__ = ["HttpServer"]
 
 
 _BLOCKS: Final = (20, 15)
-"""Columns and rows of 8 by 8 pixel blocks: 160 by 120 pixels."""
+"""Size of the image in blocks of 8 by 8 pixels: 160 by 120 pixels."""
 _PERIOD_S: Final = 12.0
 """Period of the colour cycle, in seconds."""
 

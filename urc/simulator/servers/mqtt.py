@@ -46,7 +46,10 @@ class MqttRobot:
             transport = from_setup(TransportSetup(context.name, options, (TopicSubscription("#"),)))
             await transport.open(OPEN_S)
         except TransportError as fault:
-            hint = "an emulated MQTT robot needs a broker; start one, such as mosquitto -p 1883"
+            hint = (
+                "an emulated MQTT robot needs a broker; start one, for example with"
+                " 'mosquitto -p 1883'"
+            )
             raise UrcError(f"transports.{context.name}: {fault}; {hint}") from fault
         self._transport = transport
         self._clients.admit(lambda client: self._stay(client, transport), lambda: None)

@@ -17,7 +17,7 @@ GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
 """Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""How far a sprung body leans for a given acceleration, in radians per m/s²."""
+"""Lean angle of a sprung body for an acceleration, in radians per m/s²."""
 
 Inputs = Mapping[str, float]
 
@@ -87,7 +87,10 @@ def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the leg angles from -pi to pi. Adjacent legs move in opposite phase, as in a trot."""
+    """Return the leg angles, from -pi to pi radians.
+
+    Adjacent legs move in opposite phase, as in a trot.
+    """
     turns = (motion.phase + (place % 3 != 0) / 2 for place in range(body.legs))
     return tuple(2 * math.pi * ((one + 0.5) % 1.0 - 0.5) for one in turns)
 

@@ -64,7 +64,7 @@ class _Hit(NamedTuple):
 
 
 class _Relative(NamedTuple):
-    """An edge as seen from the camera: start, direction, and twice the area of their triangle."""
+    """An edge relative to the camera: start, direction, and twice the area of their triangle."""
 
     ax: float
     ay: float
@@ -82,7 +82,7 @@ class _Column(NamedTuple):
     scale: float
     """Slope of the ray per pixel from the horizon."""
     even: Channels
-    """Colours of the sky, and of the ground's even tiles."""
+    """Colours of the sky and of the ground's even tiles."""
     odd: Channels
     hole: Channels
 
@@ -116,7 +116,7 @@ def sweep(plan: WorldMap, moment: SensorInput) -> Mapping[str, object]:
 def _echoes(
     edge: Edge, x: float, y: float, first: float, step: float, rays: int
 ) -> Iterator[tuple[int, float]]:
-    """Yield the number and distance of each ray that hits an edge."""
+    """Yield the index and the distance of each ray that hits an edge."""
     start = math.atan2(edge.y1 - y, edge.x1 - x)
     swept = math.remainder(math.atan2(edge.y2 - y, edge.x2 - x) - start, math.tau)
     low, size = (start, swept) if swept >= 0 else (start + swept, -swept)

@@ -22,8 +22,8 @@ _SQUARE_OF_ECCENTRICITY: Final = 0.00669437999014
 _EMPTY: Final = 5.0
 """Battery level at which the simulation replaces the battery, in per cent."""
 _CHANGED_AFTER_S: Final = 30.0
-"""How long the robot must stand still before the battery is replaced, in seconds. The battery is
-replaced so that a demo does not end with an empty battery."""
+"""Time for which the robot must stand still before the battery is replaced, in seconds. The battery
+is replaced so that a demo does not end with an empty battery."""
 _REACH_M: Final = 0.06
 """Distance from the robot's edge to the cliff sensors, in metres."""
 
@@ -231,7 +231,7 @@ class Battery:
         self.current = spec.battery.idle
         """Current drawn from the battery, in A."""
         self._stands_s = 0.0
-        """How long the robot has stood still with an empty battery, in seconds."""
+        """Time for which the robot has stood still with an empty battery, in seconds."""
 
     @property
     def level(self) -> float:

@@ -22,7 +22,7 @@ _TRAIL: Final = "#7f8fa3"
 _ROBOT: Final = "#1f6fd6"
 _NOSE: Final = "#ffffff"
 _OPEN_M: Final = 8.0
-"""Width of the image in a world without obstacles, in metres."""
+"""Width of the visible area in a world without obstacles, in metres."""
 
 Point = tuple[float, float]
 

@@ -1,8 +1,7 @@
 """The world of an emulated robot: a body with inputs and sensors.
 
 The module does not use clocks or sockets. Time is an argument, and the world advances in steps of
-`STEP_S`. Identical commands at identical times produce the same world, however often the world is
-observed.
+`STEP_S`. The same commands at the same times produce the same world, however often it is observed.
 """
 
 import math
@@ -44,7 +43,7 @@ _LOW: Final = 12.0
 _RENDERED: Final = frozenset({"laser", "picture", "panorama", "top"})
 """Readings that need numpy or Pillow."""
 PLAIN: Final = frozenset({"laser", "picture"})
-"""Readings that `urc.simulator.world.plain` draws without numpy and Pillow."""
+"""Readings that `urc.simulator.world.plain` renders without numpy and Pillow."""
 _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
@@ -62,7 +61,8 @@ class World:
         holds: function that evaluates a camera condition, which a document may declare as a
             template.
         has_rendering: whether numpy and Pillow are installed.
-        is_plain: whether to draw level cameras and laser scanners slowly, without these packages.
+        is_plain: whether to render level cameras and laser scanners without these packages, which
+            is slower.
     """
 
     def __init__(
