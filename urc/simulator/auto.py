@@ -268,9 +268,8 @@ class DefaultConnection:
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return `frame` as a request of the command `label`, or None.
 
-        Return None if the best match has arguments or a reply. Without these, `frame` may belong to
-        several commands: a stop frame is often the release of a held command, a close message and a
-        separate command.
+        Return None if the best match has arguments or a reply. Otherwise, `frame` may belong to
+        several commands: a release, a close message and a plain command often share one stop frame.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:

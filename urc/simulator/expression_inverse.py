@@ -1,8 +1,8 @@
 """Invert expressions: find the field value for which an expression has the wanted value.
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
-first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. The result
-is None for an expression without an inverse.
+first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. An
+expression without an inverse results in None.
 """
 
 import ast
