@@ -67,13 +67,13 @@ class CommandRequest(
     token: str = ""
     """Token from `ApprovalRequest`, if the driver requires a confirmation."""
     stops: int | None = None
-    """Number of STOPs that the page knew of when the operator clicked; None skips the check."""
+    """Number of STOPs known to the page when the operator clicked; None skips the check."""
 
 
 class ImageSelection(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """The images that the page shows; the server sends no other images."""
+    """The signals whose images the page shows; the server sends no other images."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
@@ -96,7 +96,7 @@ class ApprovalRequest(
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """Number of STOPs that the page knows of. The server checks only the number in
+    """Number of STOPs known to the page. The server checks only the number in
     `CommandRequest`."""
 
 

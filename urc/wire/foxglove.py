@@ -15,7 +15,8 @@ Messages from the server::
     3 (binary)          the response to a call
 
 Messages from the client are ``subscribe``, ``unsubscribe`` and the binary message 2, a call.
-Clients can't publish: nothing in the protocol would tell the robot that a client let go.
+Clients can't publish, because the protocol cannot tell the robot that a client has released a
+control.
 """
 
 import struct
@@ -105,7 +106,7 @@ class OfferedService(NamedTuple):
 
 
 class Subscription(msgspec.Struct, frozen=True):
-    """One wanted channel; the client chooses `id`."""
+    """One requested channel; the client chooses `id`."""
 
     id: _Id
     channel: _Id = msgspec.field(name="channelId")
@@ -118,7 +119,7 @@ class Subscribe(msgspec.Struct, tag_field="op", tag="subscribe", frozen=True):
 
 
 class Unsubscribe(msgspec.Struct, tag_field="op", tag="unsubscribe", frozen=True):
-    """The end of subscriptions."""
+    """A request to end subscriptions."""
 
     ids: tuple[_Id, ...] = msgspec.field(name="subscriptionIds")
 
@@ -141,7 +142,7 @@ _any: Final = msgspec.json.Decoder(dict[str, object])
 
 
 def chosen_subprotocol(offered: Iterable[str]) -> str | None:
-    """Return the first subprotocol in the client's offer that the server speaks; else None."""
+    """Return the first subprotocol in the client's offer that the server supports, or None."""
     return next((one for one in offered if one in SUBPROTOCOLS), None)
 
 
@@ -208,7 +209,7 @@ def encode_server_info(name: str, version: str, session: str) -> bytes:
 
 
 def encode_advertise(channels: Iterable[OfferedChannel]) -> bytes:
-    """Return the announcement of channels."""
+    """Return the message that announces channels."""
     return _told(
         "advertise",
         channels=[
@@ -226,12 +227,12 @@ def encode_advertise(channels: Iterable[OfferedChannel]) -> bytes:
 
 
 def encode_unadvertise(channels: Iterable[int]) -> bytes:
-    """Return the end of channels."""
+    """Return the message that withdraws channels."""
     return _told("unadvertise", channelIds=list(channels))
 
 
 def encode_services(services: Iterable[OfferedService]) -> bytes:
-    """Return the announcement of services."""
+    """Return the message that announces services."""
     return _told(
         "advertiseServices",
         services=[
@@ -248,23 +249,23 @@ def encode_services(services: Iterable[OfferedService]) -> bytes:
 
 
 def encode_unadvertise_services(services: Iterable[int]) -> bytes:
-    """Return the end of services."""
+    """Return the message that withdraws services."""
     return _told("unadvertiseServices", serviceIds=list(services))
 
 
 def encode_status(level: Level, message: str, status: str = "") -> bytes:
-    """Return a status; a newer status with the same id `status` replaces it."""
+    """Return a status message, which replaces an earlier one with the same id `status`."""
     more = {"id": status} if status else {}
     return _told("status", level=_LEVELS[level], message=message[:_LONGEST], **more)
 
 
 def encode_status_end(statuses: Iterable[str]) -> bytes:
-    """Return the withdrawal of statuses, by id."""
+    """Return the message that removes the statuses with the given ids."""
     return _told("removeStatus", statusIds=list(statuses))
 
 
 def encode_failure(service: int, call: int, message: str) -> bytes:
-    """Return the failure of a call."""
+    """Return the message that reports a failed call."""
     return _told("serviceCallFailure", serviceId=service, callId=call, message=message[:_LONGEST])
 
 

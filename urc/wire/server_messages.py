@@ -62,7 +62,7 @@ class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
 
 
 class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
-    """The meaning of one signal, as in `urc.model.values.Signal`."""
+    """The description of one signal, as in `urc.model.values.Signal`."""
 
     name: str
     type: str
@@ -151,7 +151,7 @@ class LogMessage(Outbound, tag="log", omit_defaults=False, frozen=True):
     """New lines of the log, oldest first; a gap in the numbers means that lines were dropped."""
 
     first: int
-    """Number of the first log line within the session, from 0."""
+    """Number of the first log line, counted from 0 in each session."""
     lines: list[LogRow]
 
 
@@ -175,7 +175,7 @@ class PongMessage(Outbound, tag="pong", frozen=True):
 
 
 class ErrorMessage(Outbound, tag="error", frozen=True):
-    """Why a message was invalid or why the server closes the socket."""
+    """The reason why a message was invalid, or why the server closes the socket."""
 
     code: str
     message: str
@@ -298,7 +298,7 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     value: str = ""
     active: bool = False
     known: bool = False
-    """Whether the present value is known."""
+    """Whether the current value is known."""
     times: int = 1
     returned: int = 0
     acknowledged: int = 0
