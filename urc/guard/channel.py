@@ -73,7 +73,7 @@ class Channel(Protocol):
         """Discard a slot's unsent message."""
 
     async def ready(self) -> None:
-        """Return once a guard is ready."""
+        """Wait until a guard is ready."""
 
     def now(self) -> float:
         """Return the guard's time, in seconds."""

@@ -204,7 +204,7 @@ class GuardClient:
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may be moving, because no stop is known to have been sent."""
+        """Return whether `command` may be moving: the guard has not reported a written stop."""
         control = self._controls.get(command)
         return control is not None and control.may_move
 
@@ -213,7 +213,7 @@ class GuardClient:
         return self.transports[self._held[command].line].is_open
 
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
-        """Wait for written or lost stops; return the command and the report for each stop.
+        """Wait for reports of written or lost stops; return each command with its report.
 
         If the wait is cancelled, no stop is lost.
         """

@@ -133,7 +133,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """How often frames of the engine were refused because their counters were already used."""
+        """Number of refusals of engine frames because their counter values were used up."""
 
     # -- requests from the engine
 
@@ -331,7 +331,7 @@ class GuardedConnection:
             await asyncio.sleep(0)  # a busy line must not delay the stops
 
     def _arrived(self, data: bytes) -> bool:
-        """Pass on received data immediately, unless earlier data is still waiting."""
+        """Pass data to the engine unless earlier data is waiting; return whether it was passed."""
         if not self._is_reading or self._credit <= 0 or not self._is_handed:
             return False
         self._pass_on(data)

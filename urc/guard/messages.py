@@ -136,7 +136,7 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop the listed controls, even if they are idle, as lines, controls and terms."""
+    """Stop the listed controls, even if idle; each entry is a line, a control and its terms."""
 
     controls: list[tuple[str, str, HoldTerms]]
 

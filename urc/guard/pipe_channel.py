@@ -31,10 +31,9 @@ CAN_GUARD: Final = CAN_INHERIT or os.name == "nt"
 _LOOK_S: Final = 0.1
 _SILENT_LOOKS: Final = 5
 _MOST_KEPT_LOOKS: Final = 15
-"""Maximum number of checks without a heartbeat on a busy machine."""
+"""Maximum number of checks for which a silent guard may wait for processor time."""
 _START_LOOKS: Final = 100
-"""Maximum number of checks before the first heartbeat, because Python starts slowly on a busy
-machine."""
+"""Maximum number of checks before the first heartbeat; high, because Python may start slowly."""
 _STEADY_S: Final = 0.5
 """Age at which a guard counts as successfully started, in seconds. A guard that has opened
 a connection also counts as successfully started."""
@@ -89,7 +88,7 @@ class PipeChannel:
     # -- messages
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message; without a guard, drop the message. See `urc.guard.channel.Channel`."""
+        """Send a message; drop it if no guard is running. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
         elif is_urgent and self._turns is not None:
@@ -101,7 +100,7 @@ class PipeChannel:
             self._pipe.drop(slot)
 
     async def ready(self) -> None:
-        """Return after a guard has been initialised."""
+        """Wait until a guard has been initialised."""
         await self._is_up.wait()
 
     def now(self) -> float:
@@ -119,7 +118,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start and initialise the guard process when its turn comes, in a running event loop."""
+        """Start and initialise the guard when its turn comes; requires a running event loop."""
         self._turns = start_turns()
         self._turns.take(self, self._launch)
 
@@ -211,7 +210,7 @@ class PipeChannel:
     # -- the watch
 
     def _watch(self) -> None:
-        """Check the guard's heartbeat every `_LOOK_S`."""
+        """Check the guard's heartbeat every `_LOOK_S` seconds."""
         loop = asyncio.get_running_loop()
         # A late check is ignored, because this process slept and heartbeats may be unread.
         if loop.time() - self._look_s < _LOOK_S and not self._is_kept():

@@ -181,7 +181,7 @@ class GuardedTransport:
         """Send a frame with counters; render it again if other frames use its counter values.
 
         Returns:
-            Whether the frame was accepted; `left` then receives the data given to the transport.
+            Whether the frame was accepted; if so, `left` receives the data handed to the transport.
         """
         if not self._is_open or self._under_way_bytes > _OFFERED_BYTES:
             return False

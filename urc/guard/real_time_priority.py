@@ -3,9 +3,9 @@
 Real-time priority suits the guard, because the guard evaluates no part of a document and does only
 bounded work in each turn. The guard uses the lowest real-time priority (``SCHED_RR``, 1), which has
 precedence over ordinary programs but not over other real-time programs. Two limits prevent a faulty
-guard from blocking the machine. After `LONGEST_S` of uninterrupted work, the guard runs at ordinary
-priority for `PAUSE_S`. After `FATAL_S`, the kernel kills the guard, and the server starts a new
-one. Child threads and child processes run at ordinary priority.
+guard from blocking the machine. After `LONGEST_S` seconds of uninterrupted work, the guard runs at
+ordinary priority for `PAUSE_S` seconds. After `FATAL_S` seconds, the kernel kills the guard, and
+the server starts a new one. Child threads and child processes run at ordinary priority.
 """
 
 import os

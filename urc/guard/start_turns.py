@@ -63,9 +63,10 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, StartTurns] = WeakKeyDictio
 
 
 def start_turns() -> StartTurns:
-    """Return the running event loop's turns: one for every processor except one, at most four.
+    """Return the start turns of the running event loop.
 
-    The remaining processor serves the driven robots.
+    There is one turn for each processor except one: at least one turn, and at most four. The
+    remaining processor serves the driven robots.
     """
     loop = asyncio.get_running_loop()
     return _turns.setdefault(loop, StartTurns(min(max(_processors() - 1, 1), _MOST)))
