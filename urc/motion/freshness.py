@@ -63,7 +63,7 @@ class Freshness:
             return "the input is not newer than the previous input"
         back = self._number - given.echo
         if not 0 <= back < len(self._issued):
-            return "the input does not echo a beat of this server"
+            return "the input does not echo a heartbeat of this server"
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
             return f"Link too slow: your input arrived {(now - issued_at) * 1000:.0f} ms late"

@@ -193,7 +193,7 @@ class HoldToRun:
         return self.terms.stop
 
     def cut(self, *, is_doubtful: bool = False) -> None:
-        """Record the loss of the connection: drop the unsent value and mark a required stop due.
+        """Record the loss of the connection: drop the unsent value and mark a required stop as due.
 
         Args:
             is_doubtful: whether a written stop may have been lost with the connection.

@@ -204,8 +204,8 @@ class Lease:
     def reset(self, client: Operator, stops: int | None = None) -> LeaseChanged | LeaseRefused:
         """Reset the latch, so that operators can drive the robot again.
 
-        A reset neither starts motion nor undoes a newer STOP. `stops` is the number of
-        STOPs that `client` knew of. None means the current number.
+        A reset neither starts motion nor undoes a newer STOP. `stops` is the number of STOPs known
+        to `client`. None means the current number.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("viewers can stop the robot, but cannot reset it")

@@ -62,7 +62,7 @@ def test_ticks_are_remembered_in_a_bounded_way() -> None:
         fresh.issue(number / 1000)
     assert (
         fresh.refusal(ControlInput(1, 1, first), 1, 0.0)
-        == "the input does not echo a beat of this server"
+        == "the input does not echo a heartbeat of this server"
     )
 
 
@@ -146,7 +146,7 @@ def test_echo_of_a_tick_before_the_first_is_refused() -> None:
     echo = fresh.issue(1.0)
     assert (
         fresh.refusal(ControlInput(1, 1, echo - 1), 1, 1.0)
-        == "the input does not echo a beat of this server"
+        == "the input does not echo a heartbeat of this server"
     )
 
 

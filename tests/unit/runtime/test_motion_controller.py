@@ -255,7 +255,7 @@ def test_recorded_ticks_are_refused_by_the_next_connection() -> None:
     given = ControlInput(it.controller.lease.state.epoch, 1, echo)
     assert (
         it.controller.tick("ann", "drive", {}, given, it.now)
-        == "the input does not echo a beat of this server"
+        == "the input does not echo a heartbeat of this server"
     )
 
 
