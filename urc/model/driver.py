@@ -48,8 +48,8 @@ class Timeouts(NamedTuple):
     idle_s: float | None = None
     """Idle time after which the connection is closed, in seconds; None means never."""
     on_connect_s: float | None = None
-    """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the steps'
-    own timeouts apply."""
+    """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the
+    timeouts of the individual steps apply."""
 
 
 class Backoff(NamedTuple):
@@ -211,7 +211,7 @@ class Command(NamedTuple):
     held command or a command that starts autonomous motion."""
     moves_if: Template | None = None
     """Condition on the arguments under which a call starts autonomous motion; None means that every
-    call does if `moves` is true."""
+    call starts motion if `moves` is true."""
     stops: bool = False
     """Whether STOP sends this command; each STOP sends it once."""
     role: Role = "drive"

@@ -117,7 +117,7 @@ class Hold(NamedTuple):
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a stalled connection during motion; None means the transport's default."""
     step_s: float | None = None
-    """Maximum duration, in seconds, of a motion step that the robot ends by itself, without a stop.
+    """Maximum duration of a motion step in seconds, for a robot that ends each step without a stop.
     None means that the robot moves until a stop arrives."""
 
 

@@ -223,7 +223,7 @@ class Profile(NamedTuple):
     """Path of the robot's picture; "" without a picture."""
 
     def uses(self) -> Iterator[WidgetUse]:
-        """Yield the use of a widget in every filled slot of the profile and its interfaces."""
+        """Yield every use of a widget in the slots of the profile and its interfaces."""
         yield from self.slots.values()
         for interface in self.interfaces.values():
             yield from interface.widgets.values()

@@ -92,7 +92,7 @@ class AlarmLimits(NamedTuple):
         return self.for_s > 0 or self.off_delay_s > 0
 
     def attributes_of(self, condition: str) -> AlarmAttributes:
-        """Return the attributes of a limit or alarm state; default attributes if it has none."""
+        """Return the attributes of a limit or alarm state, or default attributes."""
         usual = AlarmAttributes("high" if condition in ("lolo", "hihi") else "medium")
         return next((one for name, one in self.attributes if name == condition), usual)
 
