@@ -23,7 +23,7 @@ LONGEST_S: Final = 0.1
 FATAL_S: Final = 2.0
 PAUSE_S: Final = 1.0
 _PRIORITY: Final = 1
-_NOT_HERE: Final = "this system has no real-time priority"
+_NOT_HERE: Final = "this system does not support real-time priority"
 
 if sys.platform == "linux":
     import resource

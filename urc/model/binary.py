@@ -49,7 +49,7 @@ class Extent(NamedTuple):
     prefix: Number | None = None
     """Number type of the length field before the data, for the kind ``prefix``."""
     expression: Template | None = None
-    """Formula for the size or length, using earlier items, for the kind ``expression``."""
+    """Formula for the size or length from earlier items, for the kind ``expression``."""
 
 
 class Item(NamedTuple):

@@ -8,7 +8,7 @@ __all__ = ["choice", "flag", "host", "port", "text"]
 
 
 def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
-    """Return a host name or address.
+    """Return the host name or address in the option `key`.
 
     Raises:
         TransportError: the option is missing or invalid.

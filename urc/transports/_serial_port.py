@@ -46,7 +46,7 @@ async def open_port(
 
     Args:
         port: a device path or name, or an address ``rfc2217://HOST:PORT``.
-        arguments: settings under the library's names.
+        arguments: settings, keyed by the library's names.
         tune: function that configures a network port's socket.
 
     Raises:

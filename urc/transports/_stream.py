@@ -198,7 +198,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport.abort()
 
     def end(self, why: str) -> None:
-        """Wake all waiting tasks and tell them why the stream ended; keep the first reason."""
+        """Record why the stream ended, unless already recorded, and wake all waiting tasks."""
         if self._ended is None:
             self._ended = why
         self._arrived.set()

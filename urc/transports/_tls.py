@@ -91,7 +91,7 @@ class Tls:
             raise ConnectFailed(_explain(place, name or "", fault)) from fault
         except (PeerClosed, ValueError) as fault:
             await stream.abort()
-            raise ConnectFailed(f"no TLS with {place} ({fault})") from fault
+            raise ConnectFailed(f"no TLS connection to {place} ({fault})") from fault
         except BaseException:
             await stream.abort()
             raise
@@ -215,7 +215,7 @@ def _load_own(
     key = _options.text(where, options, "key")
     if not certificate:
         if is_server or key:
-            raise TransportError(f"{where}: needs a certificate in the option cert")
+            raise TransportError(f"{where}: cert is missing")
         return
     try:
         # The library reads only from files, but a key may be a secret setting. The key is therefore
@@ -255,7 +255,7 @@ def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
         return f"the certificate of {place} is not valid ({fault.verify_message})"
     if fault.reason in ("WRONG_VERSION_NUMBER", "HTTP_REQUEST", "PACKET_LENGTH_TOO_LONG"):
         return f"{place} does not speak TLS"
-    return f"no TLS with {place} ({_words(fault)})"
+    return f"no TLS connection to {place} ({_words(fault)})"
 
 
 def _words(fault: BaseException) -> str:

@@ -1,7 +1,7 @@
 """Interfaces for transports, and the errors that transports raise.
 
-A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
-messages. A transport converts every library exception into one of the errors in this module.
+A transport carries payloads without interpreting them: bytes for streams and datagrams, envelopes
+for messages. A transport converts every library exception into one of the errors in this module.
 
 Only `urc.runtime.link` uses transports, including transports in another process.
 """

@@ -20,7 +20,8 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
     """Return a response's complete, decompressed body.
 
     Raises:
-        HttpFault: the body exceeds `max_bytes`, compressed or not, or has an unknown encoding.
+        HttpFault: the body exceeds `max_bytes` before or after decompression, or has an unknown
+            encoding.
     """
     too_long = f"the response is longer than {max_bytes} bytes"
     if int(response.headers.get("content-length") or 0) > max_bytes:

@@ -27,7 +27,7 @@ KEPT_S = 3.0
 """Lifetime of an idle connection, in seconds; it is short because small robots close idle
 connections after five seconds."""
 CONNECT_S = 3.0
-"""Maximum time to open a connection, including TLS, in seconds."""
+"""Maximum time to open a connection, including the TLS handshake, in seconds."""
 MAX_COOKIES = 50
 
 

@@ -105,9 +105,7 @@ def _will(given: object) -> WillMessage | None:
         raise TransportError(f"mqtt: will must be a mapping with topic and payload, not {given!r}")
     topic = _options.text("mqtt", given, "topic")
     if not topic or "+" in topic or "#" in topic:
-        raise TransportError(
-            f"mqtt: the topic of will must be one topic without wildcards, not {topic!r}"
-        )
+        raise TransportError(f"mqtt: will.topic must be one topic without wildcards, not {topic!r}")
     payload = _options.text("mqtt", given, "payload").encode()
     retain = _options.flag("mqtt", given, "retain", default=False)
     return WillMessage(topic, payload, _qos("qos", given), retain)

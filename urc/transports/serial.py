@@ -175,7 +175,7 @@ def _pin(options: Mapping[str, object], key: str) -> bool | None:
 
 
 def _arguments_of(settings: SerialSettings) -> dict[str, object]:
-    """Return the settings under the library's names."""
+    """Return the settings, keyed by the library's names."""
     from serialx import PinState
 
     arguments: dict[str, object] = {

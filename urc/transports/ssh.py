@@ -56,7 +56,7 @@ class RemoteProgram(NamedTuple):
 
 
 def read_target(setup: TransportSetup) -> SshTarget:
-    """Return the server and the login from the options; raise `TransportError` if invalid."""
+    """Return the server and the login; raise `TransportError` for an invalid option."""
     options = setup.options
     username = _text(options, "username")
     if not username:
@@ -83,7 +83,7 @@ def read_target(setup: TransportSetup) -> SshTarget:
 
 
 def read_program(setup: TransportSetup) -> RemoteProgram:
-    """Return the remote program from the options; raise `TransportError` if invalid."""
+    """Return the remote program; raise `TransportError` for an invalid option."""
     options = setup.options
     mode = _options.choice("ssh", options, "mode", ("shell", "exec", "forward"), "shell")
     command = _options.text("ssh", options, "command")

@@ -55,7 +55,7 @@ class SshConnection:
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
     async def program(self, command: str | None, **options: Any) -> SshChannel:
-        """Start `command`, or a shell for the command None; return a channel to the program."""
+        """Start `command` (None starts a shell); return a channel to the program."""
         what = "the shell" if command is None else "the command"
         return await self._opened(
             lambda channel: self.ssh.create_session(

@@ -207,4 +207,4 @@ def _explain_key(target: SshTarget, offer: OfferedHostKey) -> str:
 
 
 def _first(text: str) -> str:
-    return one_line(text.splitlines()[0]) if text else "no reason is given"
+    return one_line(text.splitlines()[0]) if text else "no reason was given"

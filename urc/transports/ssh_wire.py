@@ -49,7 +49,7 @@ class SshSocket(asyncio.BufferedProtocol):
         self._transport: Any
         self._untaken = 0
         self.fault = ""
-        """Why the whole connection ended; "" while the connection is open."""
+        """Why the SSH connection ended; "" while the connection is open."""
 
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged."""

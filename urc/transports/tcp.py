@@ -275,7 +275,7 @@ class TcpTransport(StreamTransport):
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
-        """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds.
+        """Open the connection within `timeout_s` seconds, or raise `ConnectFailed`.
 
         The addresses of a host name are tried in sequence, each with an equal share of the
         remaining time.

@@ -67,7 +67,7 @@ class TelnetTransport(StreamTransport):
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:
-        """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Open the connection within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
         place = self._address.text
         inner: ByteStream | None = None

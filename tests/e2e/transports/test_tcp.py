@@ -131,7 +131,7 @@ async def test_robot_without_tls_is_told() -> None:
     async with program("socat", listening, "SYSTEM:'head -c 1 >/dev/null'"):
         await listens(port)
         told = await refusal(line(port, tls=True))
-        assert told.startswith(f"no TLS with 127.0.0.1:{port} (")
+        assert told.startswith(f"no TLS connection to 127.0.0.1:{port} (")
     port = free_port()
     async with program("socat", f"TCP-LISTEN:{port},bind=127.0.0.1,fork", "SYSTEM:'sleep 60'"):
         await listens(port)
@@ -160,7 +160,7 @@ async def test_robot_may_ask_for_our_certificate(authority: Authority) -> None:
     ("tls", "told"),
     [
         ({"ca": "/nowhere.pem"}, "tcp, tls: cannot use ca (no such file or directory)"),
-        ({"key": "/nowhere.key"}, "tcp, tls: needs a certificate in the option cert"),
+        ({"key": "/nowhere.key"}, "tcp, tls: cert is missing"),
         ({"verify": "no"}, "tcp, tls: verify must be true or false, not 'no'"),
         ("yes", "tcp: tls must be true, false or a mapping of options, not 'yes'"),
     ],

@@ -40,7 +40,7 @@ def test_errors_of_sockets(fault: OSError, cause: str) -> None:
         ("10.0.0.5:1883 refuses the connection (not authorized)", "sign-in"),
         ("HTTP 401: unauthorised", "sign-in"),
         ("the certificate of 10.0.0.5:443 is not valid for this name", "tls"),
-        ("no TLS with 10.0.0.5:443 (wrong version number)", "tls"),
+        ("no TLS connection to 10.0.0.5:443 (wrong version number)", "tls"),
         ("the host key of 10.0.0.5:22 is unknown: found SHA256:x", "host-key"),
         ("no such file or directory", "device"),
         ("nothing received for 5 s; reconnecting", "silent"),

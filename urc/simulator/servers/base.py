@@ -136,7 +136,7 @@ def option_port(context: ServerContext, key: str = "port", default: int | None =
 
 
 def host_and_port(host: str, port: int) -> str:
-    """Return a host and port in the usual notation."""
+    """Return a host and port as ``HOST:PORT``, with brackets around an IPv6 address."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 

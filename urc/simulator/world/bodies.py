@@ -96,7 +96,7 @@ def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def _lean(body: BodySpec, motion: Motion) -> None:
-    """Set roll and pitch: the body leans against accelerations and rocks on rough ground."""
+    """Set roll and pitch: the body leans as it accelerates and rocks on rough ground."""
     along, across, _ = motion.accelerations
     motion.pitch += (-_LEAN * along - motion.pitch) * 0.2
     motion.roll += (_LEAN * across - motion.roll) * 0.2

@@ -221,7 +221,10 @@ def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """The battery, which never falls below 0 %. An empty battery is replaced after a standstill."""
+    """The battery; its charge never falls below 0 %.
+
+    An empty battery is replaced after a standstill.
+    """
 
     def __init__(self, spec: WorldSpec) -> None:
         """Initialise the battery with the declared level."""

@@ -122,7 +122,7 @@ class AnyBridgeTransport:
         return "" if self._bridge is None else await self._bridge.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge; return as soon as the bridge has sent any data."""
+        """Probe the bridge; return when the bridge sends data."""
         await self._open_bridge().probe()
 
     def unsent(self) -> int:

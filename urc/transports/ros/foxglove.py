@@ -7,9 +7,9 @@ because the bridge drops a slow client's oldest data. Channels can appear and di
 collected for `_SETTLE_S` seconds, because a broken robot may announce thousands of channels per
 second.
 
-A bridge creates a ROS publisher when the client announces a topic, and ROS connects publishers and
-subscribers later. Stops are therefore repeated, and topics from earlier connections are announced
-again as soon as a connection opens.
+When the client announces a topic, the bridge creates a ROS publisher, which ROS connects to the
+subscribers only later. Stops are therefore repeated, and topics from earlier connections are
+announced again as soon as a connection opens.
 """
 
 import asyncio
@@ -113,7 +113,7 @@ class FoxgloveTransport:
             self._check = loop.call_later(_CHECK_S, session.check_topics)
 
     async def receive(self) -> Envelope:
-        """Return the next message, definition or response; raise `PeerClosed` at the end."""
+        """Return the next message, definition or response; raise `PeerClosed` after the last."""
         if self._session is None:
             raise PeerClosed("the connection is closed")
         return await self._session.queue.pop()

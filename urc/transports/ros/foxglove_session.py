@@ -46,14 +46,14 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
 
 MAX_CHANNELS: Final = 4096
-"""Maximum number of known services and of known channels; any beyond this number are ignored.
+"""Maximum number of known services and of known channels; further ones are ignored.
 Channels for the driver's topics are accepted up to twice this number."""
 MAX_PENDING: Final = 256
 """Maximum number of pending calls; above the limit, the oldest call is dropped."""
 KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
-"""Maximum number of different status messages from the robot to report."""
+"""Maximum number of different status messages that are passed on."""
 MAX_RETRIES: Final = 5
 """Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
@@ -83,7 +83,7 @@ class _Subscription:
         self.due_s = float("-inf")
         self.is_heard = False
         self.late: Envelope | None = None
-        """Newest message that arrived too soon, to be delivered later; None without one."""
+        """Newest message that arrived too soon and must be delivered later, or None."""
 
 
 class FoxgloveSession:

@@ -1,4 +1,4 @@
-"""Checks of topics against a ROS system's graph.
+"""Checks that a driver's topics match the graph of a ROS system.
 
 A ROS connection reports no error for a topic that does not exist, has a different type, or has no
 subscribers. A connection with access to the graph, such as rosapi, passes the topics to a

@@ -331,5 +331,5 @@ def _fields(body: object) -> dict[str, object]:
     if body is None:
         return {}
     if not isinstance(body, Mapping):
-        raise TransportError("a ROS message must be an object of fields; use json")
+        raise TransportError("a ROS message must be an object with fields; use json")
     return dict(cast("Mapping[str, object]", body))
