@@ -81,7 +81,7 @@ class LivenessWatch:
         now = self._clock.now()
         if now >= self._liveness.deadline:
             ms = 1000 * (SILENCE_S if self._liveness.is_asked else self._silent_s or SILENCE_S)
-            self._failed(f"the robot's side has sent no data for {ms:.0f} ms while moving")
+            self._failed(f"the remote program has sent no data for {ms:.0f} ms during motion")
             return
         if self._transport is not None:
             self._liveness.asked(now)

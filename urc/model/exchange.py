@@ -122,7 +122,7 @@ class Hold(NamedTuple):
 
 
 class Confirm(NamedTuple):
-    """A confirmation question before a command is sent."""
+    """A confirmation question that is asked before a command is sent."""
 
     level: Literal["normal", "hazardous"] = "normal"
     text: str = ""

@@ -220,7 +220,7 @@ class Profile(NamedTuple):
     """Tags that put the robot into groups, for which rights can be granted; at most 16, all
     different."""
     picture: str = ""
-    """Path of the robot's picture; "" without a picture."""
+    """Path of the robot's picture; "" if there is no picture."""
 
     def uses(self) -> Iterator[WidgetUse]:
         """Yield every use of a widget in the slots of the profile and its interfaces."""

@@ -130,7 +130,7 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        If there is no `data`, the tick renews the lease but drops any unsent value, because the new
+        Without `data` (None), the tick renews the lease but drops any unsent value, because the new
         input value cannot be sent.
 
         Returns:

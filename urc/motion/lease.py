@@ -26,7 +26,7 @@ class Operator(NamedTuple):
     """A person at a dashboard page."""
 
     id: str
-    """Identifier, unique while connected."""
+    """Identifier, unique among the connected operators."""
     name: str = ""
     """Name shown to other operators."""
     role: Role | None = "drive"

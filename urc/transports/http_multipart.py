@@ -43,7 +43,7 @@ def boundary_of(content_type: str) -> bytes:
         raise MultipartFault("the Content-Type has no boundary")
     if len(core) > MAX_BOUNDARY or not core.isascii():
         raise MultipartFault(
-            f"the boundary has more than {MAX_BOUNDARY} characters, or invalid ones"
+            f"the boundary has more than {MAX_BOUNDARY} characters, or contains invalid characters"
         )
     return core.encode()
 

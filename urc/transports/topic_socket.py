@@ -1,4 +1,4 @@
-"""Connected sockets for third-party protocol libraries and one-line error messages.
+"""Connected sockets and one-line error messages for third-party protocol libraries.
 
 Without this module, the libraries would look up host names in threads that delay the program's
 exit. This module connects in the same way as the TCP transport, with the same error messages.

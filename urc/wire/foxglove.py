@@ -125,7 +125,7 @@ class Unsubscribe(msgspec.Struct, tag_field="op", tag="unsubscribe", frozen=True
 
 
 class ServiceCall(NamedTuple):
-    """A call of a service; the client chooses `call`."""
+    """A service call; the client chooses the number `call`."""
 
     service: int
     call: int

@@ -372,7 +372,7 @@ async def test_a_hostile_server_costs_counted_faults(tmp_path: Path) -> None:
     ):
         await until(lambda: value(robot, "slow") == 43)
         text = "\n".join(str(line) for line in robot.hub.notes)
-        assert "the definition of a channel has 1000000 characters" in text
+        assert "the definition of a channel is too long (1000000 characters)" in text
 
 
 @pytest.mark.parametrize(

@@ -203,7 +203,7 @@ async def test_reason_names_the_length_of_the_silence(
     it = Watched(robot if is_asked else CountedWire(), silent_s)
     it.begin()
     await it.clock.advance(2.1)
-    assert it.said == [f"the robot's side has sent no data for {told} while moving"]
+    assert it.said == [f"the remote program has sent no data for {told} during motion"]
     it.watch.end()
 
 

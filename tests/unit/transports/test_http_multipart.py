@@ -135,7 +135,7 @@ def test_boundary_is_read_as_cameras_write_it(header: str, boundary: bytes) -> N
         ("multipart/x-mixed-replace; boundary=--", "the Content-Type has no boundary"),
         (
             "multipart/x-mixed-replace; boundary=" + "x" * 201,
-            "the boundary has more than 200 characters, or invalid ones",
+            "the boundary has more than 200 characters, or contains invalid characters",
         ),
     ],
 )

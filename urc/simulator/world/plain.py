@@ -150,7 +150,7 @@ def level_picture(
 ) -> list[bytearray]:
     """Return the forward image as three planes of rows: red, green and blue.
 
-    Pitch and roll move whole columns up or down, which is accurate enough for a body that leans.
+    Pitch and roll move whole columns up or down, which is accurate enough for small angles.
 
     Args:
         plan: the obstacles.

@@ -118,7 +118,7 @@ def channel_of(said: Mapping[str, Any]) -> AdvertisedChannel:
         raise BadOperation("a channel has no id, topic or encoding")
     schema = _text(said, "schema")
     if len(schema) > MAX_SCHEMA:
-        raise BadOperation(f"the definition of a channel has {len(schema)} characters")
+        raise BadOperation(f"the definition of a channel is too long ({len(schema)} characters)")
     notation = _text(said, "schemaEncoding") or {"cdr": "ros2msg", "ros1": "ros1msg"}.get(
         encoding, ""
     )
@@ -144,7 +144,9 @@ def service_of(said: Mapping[str, Any], encodings: tuple[str, ...]) -> ServiceTy
         else:
             encoding, schema, notation, type_name = usual, _text(said, f"{part}Schema"), "", ""
         if len(schema) > MAX_SCHEMA:
-            raise BadOperation(f"the definition of a service has {len(schema)} characters")
+            raise BadOperation(
+                f"the definition of a service is too long ({len(schema)} characters)"
+            )
         notation = notation or ("ros1msg" if encoding == "ros1" else "ros2msg")
         parts.append([type_name or f"{kind}_{part.capitalize()}", encoding, notation, schema])
     return ServiceType(number, name, kind, *parts)

@@ -102,7 +102,7 @@ class OperationReader:
             raise BadOperation(f"fragment {number} of {total} is invalid")
         key = str(name) if isinstance(name, str | int) else "?"
         if len(key) > _LONGEST_ID:
-            raise BadOperation(f"the id of a fragment has {len(key)} characters")
+            raise BadOperation(f"the id of a fragment is too long ({len(key)} characters)")
         pieces = self._halves.setdefault(key, {})
         self._sizes[key] = self._sizes.get(key, 0) + len(data) - len(pieces.get(number, ""))
         pieces[number] = data
