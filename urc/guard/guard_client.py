@@ -204,7 +204,7 @@ class GuardClient:
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may be moving: the guard has not reported a written stop."""
+        """Return whether `command` may be moving, because no stop has been reported as written."""
         control = self._controls.get(command)
         return control is not None and control.may_move
 

@@ -117,7 +117,7 @@ class Hold(NamedTuple):
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a stalled connection during motion; None means the transport's default."""
     step_s: float | None = None
-    """Maximum duration of a motion step in seconds, for a robot that ends each step without a stop.
+    """Maximum duration of one motion step, in seconds, if the robot ends each step without a stop.
     None means that the robot moves until a stop arrives."""
 
 

@@ -263,8 +263,7 @@ class EmulatedConnection:
         """Process received data and return the replies. Each reply is a whole frame.
 
         Args:
-            data: the next bytes of the stream, in pieces of any size, or an envelope on a message
-                transport.
+            data: any number of bytes from the stream, or an envelope on a message transport.
             now_s: current time in seconds since the epoch, available to templates as ``now``.
             limit: maximum number of replies; further requests are dropped. None for no limit.
         """

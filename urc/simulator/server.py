@@ -47,7 +47,7 @@ async def serve(
 
     Args:
         profile: profile with `simulator` rules.
-        settings: values for ports and templates; the system chooses a free port for port 0.
+        settings: values for ports and templates; for port 0, the system chooses a free port.
         host: local address to listen on; the default accepts only local clients.
         now: function that returns the current time, in seconds since the epoch; templates read the
             time as ``now``.

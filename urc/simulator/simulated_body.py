@@ -21,8 +21,8 @@ __all__ = ["SimulatedBody", "failsafe_of", "has_rendering", "rendered_signals"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that the fail-safe leaves active, because they cause no motion. For
-example, a drone without commands stays in the air."""
+"""Inputs that the fail-safe leaves active, because they cause no motion. For example, a
+drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
 """Pattern for references to sensors that need numpy or Pillow."""

@@ -36,7 +36,7 @@ class AddressLookup:
 
         Raises:
             OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller must set
-            one.
+                one.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)

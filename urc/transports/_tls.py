@@ -215,7 +215,7 @@ def _load_own(
     key = _options.text(where, options, "key")
     if not certificate:
         if is_server or key:
-            raise TransportError(f"{where}: cert is missing")
+            raise TransportError(f"{where}: cert must contain a certificate")
         return
     try:
         # The library reads only from files, but a key may be a secret setting. The key is therefore

@@ -161,7 +161,7 @@ class SupportsSettle(Protocol):
         The wait is limited to a few seconds.
 
         Returns:
-            One line about the data that has not arrived; "" if all data has arrived, or if this is
+            One line about data that has not arrived; "" if all data has arrived or its state is
             unknown.
         """
 
@@ -171,7 +171,7 @@ class SupportsProbe(Protocol):
     """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
-        """Wait until the remote program sends data.
+        """Wait until the remote program sends data after this call.
 
         Raises:
             TransportError: the connection broke.

@@ -77,7 +77,7 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
         spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
         known = found.setdefault(path, spec)
         if (known.kind, known.every_s) != (spec.kind, spec.every_s):
-            raise TransportError(f"http cannot open {path!r} as two kinds of stream")
+            raise TransportError(f"http cannot open {path!r} as two different streams")
         found[path] = known._replace(topics=known.topics | {topic})
     if len(found) > MAX_STREAMS:
         raise TransportError(f"http supports at most {MAX_STREAMS} paths")

@@ -85,7 +85,7 @@ class TcpListener(StreamTransport):
         return place_of(self._bind or "*", self.port)
 
     async def open(self, timeout_s: float) -> None:
-        """Wait for a connection; raise `ConnectFailed` after `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for a connection, or raise `ConnectFailed`."""
         await super().close()
         self._stay_open()
         try:

@@ -160,7 +160,7 @@ async def test_robot_may_ask_for_our_certificate(authority: Authority) -> None:
     ("tls", "told"),
     [
         ({"ca": "/nowhere.pem"}, "tcp, tls: cannot use ca (no such file or directory)"),
-        ({"key": "/nowhere.key"}, "tcp, tls: cert is missing"),
+        ({"key": "/nowhere.key"}, "tcp, tls: cert must contain a certificate"),
         ({"verify": "no"}, "tcp, tls: verify must be true or false, not 'no'"),
         ("yes", "tcp: tls must be true, false or a mapping of options, not 'yes'"),
     ],

@@ -121,7 +121,7 @@ STREAMS: list[tuple[list[TopicSubscription], str]] = [
             TopicSubscription("/s#a", {"stream": "sse"}),
             TopicSubscription("/s", {"stream": "lines"}),
         ],
-        "http cannot open '/s' as two kinds of stream",
+        "http cannot open '/s' as two different streams",
     ),
     (
         [TopicSubscription(f"/{n}", {"stream": "lines"}) for n in range(17)],

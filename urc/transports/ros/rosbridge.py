@@ -106,7 +106,7 @@ class RosbridgeTransport:
             await session.end()
             await self._wire.close()
             if isinstance(fault, PeerClosed | TimeoutError):
-                told = str(fault) or "it accepts no data"
+                told = str(fault) or "it does not accept data"
                 message = f"{self._where} refused the subscriptions ({told})"
                 raise ConnectFailed(message) from fault
             raise
