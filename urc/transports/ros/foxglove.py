@@ -168,7 +168,7 @@ class FoxgloveTransport:
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
 
     async def probe(self) -> None:
-        """Probe the bridge; return as soon as the bridge has sent any data."""
+        """Probe the bridge; return when the bridge sends data."""
         await self._wire.probe()
 
     def unsent(self) -> int:

@@ -151,7 +151,7 @@ class RosbridgeTransport:
         return "" if self._session is None else await self._session.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge; return as soon as the bridge has sent any data."""
+        """Probe the bridge; return when the bridge sends data."""
         await self._wire.probe()
 
     def unsent(self) -> int:
