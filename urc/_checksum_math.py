@@ -55,7 +55,7 @@ class FoldSpec(NamedTuple):
     ored: int = 0
     """Bits that the last step sets in the result."""
     is_odd_xored: bool = False
-    """Whether a last byte that does not fill a number is XORed into the result."""
+    """Whether a trailing byte that does not fill a whole number is XORed into the result."""
 
 
 FOLDED: Final = {
@@ -65,7 +65,7 @@ FOLDED: Final = {
     "xor8": FoldSpec("xor"),
     "lrc": FoldSpec("sum", complement="twos"),
 }
-"""Parameters of common fold checksums, by name."""
+"""Parameters of common sum and XOR checksums, by name."""
 PLAIN_CHECKSUMS: Final = {
     "adler32": 32,
     "fletcher8": 8,
@@ -122,7 +122,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
 
     Args:
         spec: parameters or name of the checksum algorithm.
-        is_big: whether numbers are big-endian; used only by folds of numbers wider than one byte.
+        is_big: whether numbers are big-endian; matters only for numbers wider than one byte.
     """
     if isinstance(spec, str):
         return NAMED[spec]

@@ -25,7 +25,9 @@ VARIABLES: Final[Mapping[str, str]] = {
 }
 """Meaning of each URC variable, by name."""
 SYSTEM: Final[Mapping[str, str]] = {
-    "DISPLAY": "On Linux, `urc demo` opens a browser only if this or `WAYLAND_DISPLAY` is set.",
+    "DISPLAY": (
+        "On Linux, `urc demo` opens a browser only if this variable or `WAYLAND_DISPLAY` is set."
+    ),
     "LOCALAPPDATA": "On Windows, the folder that contains the default data folder.",
     "NO_COLOR": "If the variable is not empty, URC prints no colours.",
     "SSH_AUTH_SOCK": "Socket of the SSH agent with the keys for transports with `agent: true`.",

@@ -52,12 +52,12 @@ class Number(NamedTuple):
 
     @property
     def least(self) -> int:
-        """Minimum whole number of this type."""
+        """Smallest whole number that this type can represent."""
         return -(1 << self.bits - 1) if self.is_signed else 0
 
     @property
     def most(self) -> int:
-        """Maximum whole number of this type."""
+        """Largest whole number that this type can represent."""
         if self.kind == "boolean":
             return 1
         if self.kind == "bcd":

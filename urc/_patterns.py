@@ -184,8 +184,8 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
     Args:
         pattern: pattern to match.
         groups: text of each named group, by name.
-        variant: number of the text variant. Variant 0 omits optional parts that contain none of
-            `groups`, and uses the first alternatives and the first printable characters. Other
+        variant: number of the variant to return. Variant 0 omits optional parts that contain none
+            of `groups`, and uses the first alternatives and the first printable characters. Other
             variants use other alternatives, characters and numbers of repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
@@ -367,7 +367,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """Linear time is unproven for the pattern, but still possible."""
+    """Linear time could not be proven for the pattern, although it remains possible."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:

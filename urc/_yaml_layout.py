@@ -61,7 +61,7 @@ def column_hint(lines: Sequence[str], number: int) -> str:
 
 
 def _open_blocks(lines: Sequence[str], number: int) -> dict[int, int]:
-    """Return the columns in which a line may start, each with the nearest line that does."""
+    """Return the columns in which a line may start, each with the nearest line in that column."""
     blocks: dict[int, int] = {}
     least = _LONGEST
     for above in range(number - 1, -1, -1):
@@ -85,7 +85,7 @@ def _columns(text: str) -> tuple[int, ...]:
 
 
 def runaway_quote(lines: Sequence[str], number: int, column: int) -> tuple[int, int, str] | None:
-    """Return the line, column and quote of a text that ends only in another text.
+    """Return the position of a quoted text that lacks its closing quote.
 
     Args:
         lines: lines of the document.
@@ -93,7 +93,7 @@ def runaway_quote(lines: Sequence[str], number: int, column: int) -> tuple[int, 
         column: column of the error.
 
     Returns:
-        None if no text of an earlier line runs on to the error.
+        The line, column and quote of the text; None if no earlier text extends to the error.
     """
     for quote in ('"', "'"):
         if quote not in lines[number][:column]:
@@ -111,7 +111,7 @@ def runaway_quote(lines: Sequence[str], number: int, column: int) -> tuple[int, 
 
 
 def missing_comma(text: str, column: int) -> int | None:
-    """Return the column of a key inside ``{ }`` without a comma before it; None without one.
+    """Return the column of a key inside ``{ }`` that lacks a comma before it, or None.
 
     Args:
         text: line of the error.

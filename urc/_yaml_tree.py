@@ -26,7 +26,7 @@ long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 _OPENING: Final = ("“", "„", "‘", "‚", "«", "»", "”", "’")
 _CLOSING: Final = ("”", "“", "’", "‘", "»", "«")
-"""Typographic quotes of several languages; word processors write them instead of straight ones."""
+"""Typographic quotes of several languages; word processors use them for straight quotes."""
 
 
 class DocumentLimits(NamedTuple):
@@ -40,7 +40,7 @@ class DocumentLimits(NamedTuple):
 
 
 class StoppedError(Exception):
-    """Reading stopped at an error, which the reader's last problem describes."""
+    """Raised when an error stops the reader; the reader's last problem describes the error."""
 
 
 class _Built(NamedTuple):
@@ -299,7 +299,7 @@ class TreeReader:
         self._report(
             event,
             "unquoted",
-            "a comma ends a text inside { }, so this is a separate key",
+            "inside { }, a comma ends unquoted text, so this is a separate key",
             hint=f'quote the text: "{before.value}, {event.value}"',
             length=max(1, len(event.value)),
         )

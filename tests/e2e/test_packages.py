@@ -98,7 +98,7 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
     """Search, look at what it may do, install; then the repository is switched off."""
     fill(tmp_path / "lab")
     with repository(tmp_path / "lab") as url:
-        assert f"added {url}: Lab, 4 versions of packages" in person.does("repo", "add", url)
+        assert f"added {url}: Lab, 4 package versions" in person.does("repo", "add", url)
         assert person.does("repo", "list").startswith(f"{url}  signed by Keeper (SHA256:")
         assert person.does("repo", "search", "DIAL") == "widgets/dial 1.0.0  The widget dial.\n"
         assert "use --yes to confirm in advance" in person.does("install", "my-puppet", code=2)
@@ -173,7 +173,7 @@ def test_the_same_folder_works_on_any_static_server(
     fill(lab)
     key = tmp_path / "keeper.pem"
     new_signer("Keeper", key)
-    assert "4 versions of packages" in person.does("repo", "index", str(lab), "--key", str(key))
+    assert "4 package versions" in person.does("repo", "index", str(lab), "--key", str(key))
     first = (lab / "index.json").read_bytes()
     person.does("repo", "index", str(lab), "--key", str(key))
     assert (lab / "index.json").read_bytes() == first
@@ -182,7 +182,7 @@ def test_the_same_folder_works_on_any_static_server(
         lock = tmp_path / "bot.lock"
         person.does("install", "drivers/puppet", "--yes", "--lock", str(lock))
         write_package(lab, "widget", "dial", "1.1.0", more="new")
-        assert "5 versions of packages" in person.does("repo", "index", str(lab), "--key", str(key))
+        assert "5 package versions" in person.does("repo", "index", str(lab), "--key", str(key))
         assert person.does("search", "dial") == "widgets/dial 1.1.0  The widget dial.\n"
         assert person.does("list", "--updates") == (
             "drivers/puppet 1.0.0  with widgets/dial 1.0.0 → 1.1.0\n"

@@ -122,7 +122,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         "drivers/puppet 1.0.0 → 1.1.0  with widgets/dial 1.0.0 → 1.1.0\n"
     )
     assert "cannot ask without a terminal" in ben.does("update", code=2)
-    assert "it gains permissions" in ben.does("update", "--yes", code=1)
+    assert "the package gains permissions" in ben.does("update", "--yes", code=1)
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     told = ben.does("update", "puppet", "--yes", "--allow-more")
     for line in (

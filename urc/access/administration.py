@@ -206,7 +206,7 @@ def add_token(
     if not grants:
         raise AccessError("a token needs a role")
     if ends_at is not None and ends_at <= now:
-        raise AccessError("the token's end is in the past")
+        raise AccessError("the token's expiry time is in the past")
     with store.transaction():
         program = store.add("program", name, grants, now=now, commands=commands, ends_at=ends_at)
         _, token = store.open_sign_in(program.id, "token", now=now, ends_at=ends_at)

@@ -4,7 +4,8 @@ Layer 4. `CertificateAuthority` keeps one root certificate for years and uses it
 server's certificate. Users trust the root certificate once on each device. The root is limited to
 local network names (RFC 5280, 4.2.1.10), so a stolen key cannot impersonate public websites.
 
-On a machine without a clock, all dates start on the release day of this version.
+Every certificate is valid from one day before the release day of this version. If the machine's
+clock shows a time before the release day, the release day is used instead.
 """
 
 import ipaddress

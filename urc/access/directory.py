@@ -17,14 +17,14 @@ __all__ = ["NOBODY", "Directory", "Identity", "Kind", "Principal", "SignIn", "Wa
 
 Kind = Literal["person", "device", "program", "guest"]
 Way = Literal["key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
-"""How a sign-in was made; the audit log records this method for each command."""
+"""Sign-in method; the audit log records the method for each command."""
 
 
 class Principal(NamedTuple):
     """A person, a device, a program or a guest."""
 
     id: str
-    """Unique and never reused."""
+    """Unique identifier, never reused."""
     kind: Kind
     name: str
     """Display name, also used in the audit log, such as “Tablet in the lab”."""
@@ -43,7 +43,7 @@ class SignIn(NamedTuple):
     """The sign-in of one browser, or the token of one program."""
 
     id: str
-    """Unique, but not secret."""
+    """Unique identifier; not secret."""
     principal: str
     """Id of the principal."""
     way: Way
@@ -53,7 +53,7 @@ class SignIn(NamedTuple):
     used_at: float
     """UTC time of the last use, accurate to one minute."""
     ends_at: float | None
-    """UTC time at which the sign-in ends at the latest; None for no limit."""
+    """Latest UTC time at which the sign-in ends; None for no limit."""
     idle_s: float | None
     """Maximum time without use, in seconds; None for no limit."""
     place: str = ""
@@ -86,7 +86,7 @@ NOBODY: Final = Identity()
 
 
 def digest_of(secret: str) -> bytes:
-    """Return the form in which a random secret is stored.
+    """Return the hash under which a random secret is stored.
 
     A fast hash is sufficient for 256 random bits. Only user-chosen passphrases need a slow hash.
     """

@@ -1,4 +1,4 @@
-"""Accounts of identity providers and proxies, and the corresponding people.
+"""Accounts at identity providers and proxies, and the people to whom they belong.
 
 Layer 4. An account is identified by its issuer and subject, never by its name. Names can change,
 and another person on this server may have the same name. The functions block for a few
@@ -39,7 +39,7 @@ class ExternalAccount(NamedTuple):
     grants: tuple[Grant, ...]
     """Grants derived from the current claims."""
     ends_at: float
-    """UTC time at which the sign-in ends at the latest, in seconds since 1970."""
+    """Latest UTC time at which the sign-in ends, in seconds since 1970."""
 
 
 def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> Principal:

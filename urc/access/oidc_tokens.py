@@ -73,7 +73,7 @@ def _check_times(claims: Mapping[str, Any], now: float) -> None:
     ends, begins = _time(claims, "exp"), _time(claims, "iat")
     if now >= ends + LEEWAY_S or now < begins - LEEWAY_S:
         raise AccessError(
-            "the provider's token is not valid by the clock of this machine: check both clocks"
+            "the provider's token is not valid according to this machine's clock: check both clocks"
         )
 
 

@@ -1,4 +1,4 @@
-"""YAML files with sign-in options; every error message contains the line.
+"""YAML files with sign-in options; every error message contains the line number.
 
 Layer 4. The file contains no secrets. It names the files that contain the secrets; only their owner
 may read those files.

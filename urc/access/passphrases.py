@@ -60,7 +60,7 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
     if not passphrase.isprintable():
         raise AccessError("the passphrase contains unprintable characters")
     if len(set(passphrase)) < _FEWEST_DIFFERENT:
-        raise AccessError(f"the passphrase needs {_FEWEST_DIFFERENT} different characters")
+        raise AccessError(f"the passphrase needs at least {_FEWEST_DIFFERENT} different characters")
     if name and passphrase.casefold() == name.casefold():
         raise AccessError("the passphrase is the name; choose several words")
     if _is_common(passphrase, name):

@@ -37,7 +37,7 @@ class Throttle:
 
         Args:
             now: monotonic time in seconds.
-            keys: what identifies the attempt, such as its address and the attempted name.
+            keys: values that identify the attempt, such as its address and the attempted name.
         """
         return max((self._wait_s(now, key) for key in keys), default=0.0)
 

@@ -178,7 +178,7 @@ class AlarmList:
         self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
-        """Mark values as unknown after the link is lost or the values become stale; alarms stay."""
+        """Mark lost or stale values as unknown; their alarms stay in the list."""
         for signal in signals:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
@@ -292,7 +292,7 @@ class AlarmList:
     # Time
 
     def tick(self, now: float) -> None:
-        """Make all changes due at `now`."""
+        """Apply all changes that are due at `now`."""
         for record in [*self.records.values()]:
             if 0 < record.shelved_until <= now:
                 self._unshelve(record, None, now)

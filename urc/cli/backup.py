@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     data, file = arguments.data or data_folder(), arguments.file
     if file.exists() and not arguments.replace:
-        raise UrcError(f"{file} already exists; --replace replaces the file")
+        raise UrcError(f"{file} already exists; use --replace to overwrite the file")
     if not parts_in(data)[0]:
         raise UrcError(f"{data} has nothing to back up; select another folder with --data-dir")
     written, unknown = write_backup(data, file, BackupManifest(1, __version__, time.time()))

@@ -89,7 +89,7 @@ class DashboardAddress:
     notify: NotifyOptions | None = None
     """Hook for alarm notifications; None disables notifications."""
     foxglove: int | None = None
-    """Port for Foxglove viewers; None if they have no port of their own."""
+    """Port for Foxglove viewers; None if they use the dashboard's port."""
 
 
 def run_dashboard(

@@ -94,7 +94,7 @@ def _invite_phone(address: str) -> None:
 
     with opened(None) as store:
         invite_device(store, address.rstrip("/"), roles_in(["drive"]))
-    complain("another device: 'urc devices pair' in a second terminal")
+    complain("to pair another device, run 'urc devices pair' in a second terminal")
 
 
 def _port(arguments: argparse.Namespace) -> int:

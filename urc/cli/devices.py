@@ -47,8 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_roles(
         parser,
-        "pair, grant, revoke: watch, drive, maintain or administer; drive@cart is for one robot,"
-        " drive@#lab for a tag; repeatable (pair: drive; revoke without --role: all roles)",
+        "pair, grant, revoke: watch, drive, maintain or administer; drive@cart for one robot,"
+        " drive@#lab for a tag; repeatable (default for pair: drive;"
+        " revoke without --role: all roles)",
     )
     parser.add_argument(
         "--owner",

@@ -225,9 +225,9 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
         *([RISKS_FLAG] if has_risks and not arguments.takes_risks else []),
     ]
     if lacks:
-        what = "it gains permissions" if gains else "it specifies resources of this machine"
+        what = "gains permissions" if gains else "specifies resources of this machine"
         complain(
-            f"urc: {what}, and --yes does not accept this;"
+            f"urc: the package {what}, and --yes does not accept this;"
             f" add {' '.join(lacks)}, or remove --yes to be asked"
         )
     return not lacks

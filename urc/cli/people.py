@@ -174,9 +174,9 @@ def _typed(name: str) -> str:
         first = getpass(printable(f"New passphrase for {name}: "))
         again = getpass("The same again: ")
     except EOFError:
-        raise UrcError("no passphrase was typed; nothing is changed") from None
+        raise UrcError("no passphrase was typed; nothing was changed") from None
     if first != again:
-        raise UrcError("the two passphrases differ; nothing is changed")
+        raise UrcError("the two passphrases differ; nothing was changed")
     return first
 
 

@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--profile",
         metavar="PROFILE",
-        help="robot file to use for the display, with a changed interface or third-party widgets"
-        " (default: the profile in the recording)",
+        help="robot file to use for display, for example with a changed interface or third-party"
+        " widgets (default: the profile in the recording)",
     )
     parser.add_argument(
         "--speed",
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     recording = open_recording(arguments.recording, has_profile=bool(arguments.profile))
     start_s, length_s = arguments.start_s, recording.length_s
     if start_s > length_s:
-        raise Misuse(f"--from {start_s:g}s is after the end of the recording, at {length_s:.1f} s")
+        raise Misuse(f"--from {start_s:g}s is after the end of the recording ({length_s:.1f} s)")
     if recording.unread_bytes > 0:
         lost = f"the last {recording.unread_bytes} bytes cannot be read"
         complain(f"urc replay: {recording.file} is damaged or truncated: {lost}")

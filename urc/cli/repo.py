@@ -31,7 +31,10 @@ def token(arguments: argparse.Namespace) -> int:
     match arguments.words:
         case ["add", name]:
             if not arguments.may:
-                raise Misuse("'urc repo token add' requires --may with the packages for the token")
+                raise Misuse(
+                    "'urc repo token add' requires --may with the packages"
+                    " that the token may publish"
+                )
             print(tokens.add(name, tuple(arguments.may)))
         case ["remove", name]:
             tokens.remove(name)
@@ -149,7 +152,7 @@ def _add(arguments: argparse.Namespace) -> int:
     known = repositories()
     url, index = known.add(_one(arguments, "URL"))
     audit_packages("repository add", [url])
-    print(printable(f"added {url}: {index.name}, {len(index.packages)} versions of packages"))
+    print(printable(f"added {url}: {index.name}, {len(index.packages)} package versions"))
     keeper = next((one.keeper for one in known.all() if one.name == url), "")
     print(printable(f"its index is signed by {keeper}" if keeper else "its index is not signed"))
     if url.startswith("http:"):
@@ -195,7 +198,7 @@ def _index(arguments: argparse.Namespace) -> int:
     listing = make_index(folder, _name(arguments, folder), examine, codec)
     for fault in listing.faults:
         complain(f"not listed: {fault}")
-    print(f"{folder / 'index.json'}  {len(listing.listed.packages)} versions of packages")
+    print(f"{folder / 'index.json'}  {len(listing.listed.packages)} package versions")
     if codec is not None:
         print(f"signed by {codec.signer}; renew the signature within {arguments.valid / 2:g} days"
               " with 'urc repo index' or a running 'urc repo serve'")  # fmt: skip

@@ -26,7 +26,7 @@ def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
         raise Misuse("'urc repo block' requires --why with a reason for users of the package")
     folder, entry = _entry(arguments)
     index = block_builder.block(folder, entry, codec)
-    print(f"blocked {entry.subject}; the index has number {index.number}")
+    print(f"blocked {entry.subject}; the index number is now {index.number}")
     return 0
 
 
@@ -36,7 +36,7 @@ def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
     folder, entry = _entry(arguments)
     index = block_builder.unblock(folder, entry.subject, codec)
-    print(f"{entry.subject} is no longer blocked; the index has number {index.number}")
+    print(f"{entry.subject} is no longer blocked; the index number is now {index.number}")
     return 0
 
 

@@ -191,7 +191,7 @@ def _add_alarms(parser: argparse.ArgumentParser) -> None:
         "--notify-alarms",
         dest="notify",
         metavar="FILE",
-        help="file with a command or URL that gets new alarms: see docs/alarms.md",
+        help="file with a command or URL that receives new alarms: see docs/alarms.md",
     )
 
 

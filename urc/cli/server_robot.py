@@ -25,7 +25,7 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--server",
         metavar="URL",
-        help="use the robot PROFILE of a server, such as https://robots.lab:8080",
+        help="use the robot PROFILE on a server, such as https://robots.lab:8080",
     )
     parser.add_argument(
         "--token-file",
@@ -37,7 +37,7 @@ def add_server(parser: argparse.ArgumentParser) -> None:
         "--authority",
         metavar="FILE",
         type=Path,
-        help="PEM file with the local authority of the server (default: this system's trust store)",
+        help="PEM file with the server's local authority (default: this system's trust store)",
     )
     parser.add_argument(
         "--allow-unencrypted",
@@ -61,7 +61,7 @@ def refuse_local_options(arguments: argparse.Namespace, options: Sequence[str]) 
         return
     for option in ("--set", "--settings", *options):
         if _is_given(arguments, option):
-            raise Misuse(f"{option} does not work with --server: the server connects the robot")
+            raise Misuse(f"{option} does not work with --server: the server connects to the robot")
 
 
 def _is_given(arguments: argparse.Namespace, option: str) -> bool:

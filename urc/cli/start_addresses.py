@@ -31,7 +31,7 @@ class ReadyDashboard(NamedTuple):
     certificate: "LoadedCertificate | None" = None
     """HTTPS certificate; None for plain HTTP."""
     foxglove_port: int = 0
-    """Port for Foxglove viewers; 0 if they have no port of their own."""
+    """Port for Foxglove viewers; 0 if they use the dashboard's port."""
 
     @property
     def address(self) -> str:
@@ -90,7 +90,7 @@ def ready_addresses(
         access: the keys of the dashboard.
         certificates: HTTPS certificates; None for plain HTTP.
         tls: public names of a web server in front of the dashboard.
-        foxglove: port for Foxglove viewers; None if they have no port of their own.
+        foxglove: port for Foxglove viewers; None if they use the dashboard's port.
     """
     others = "" if is_loopback(host) else url
     if tls.public_names:

@@ -48,17 +48,20 @@ def add_tls(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tls",
         choices=("auto",),
-        help="HTTPS with a certificate of this machine's own authority"
+        help="HTTPS with a certificate from this machine's certificate authority"
         " (default for a --host that other machines can reach)",
     )
     parser.add_argument(
         "--tls-cert",
         metavar="FILE",
         type=Path,
-        help="HTTPS with this certificate in PEM, followed by intermediate certificates",
+        help="HTTPS with the certificate in this PEM file; intermediate certificates may follow it",
     )
     parser.add_argument(
-        "--tls-key", metavar="FILE", type=Path, help="key of --tls-cert in PEM, without passphrase"
+        "--tls-key",
+        metavar="FILE",
+        type=Path,
+        help="private key for --tls-cert, in PEM without a passphrase",
     )
     parser.add_argument(
         "--behind-proxy",

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_roles(
         parser,
-        "add: watch, drive, maintain or administer; drive@cart is for one robot, drive@#lab for a"
+        "add: watch, drive, maintain or administer; drive@cart for one robot, drive@#lab for a"
         " tag; repeatable",
     )
     parser.add_argument(
@@ -131,7 +131,7 @@ def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
     """Remove a program and its token."""
-    return remove(store, "program", arguments, "tokens", ": its token is invalid")
+    return remove(store, "program", arguments, "tokens", ": its token is no longer valid")
 
 
 def _commands(text: str) -> list[str]:
@@ -139,7 +139,7 @@ def _commands(text: str) -> list[str]:
     for one in found:
         if not one or len(one) > _LONGEST_COMMAND or not one.isprintable() or " " in one:
             raise argparse.ArgumentTypeError(
-                f"expected names of commands like goto,dock, found {text[:60]!r}"
+                f"expected command names such as goto,dock, found {text[:60]!r}"
             )
     return found
 

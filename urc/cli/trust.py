@@ -110,10 +110,10 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
             " either the robot was reinstalled, or an attacker is intercepting the connection"
         )
     if yes is None and not _is_confirmed():
-        print("nothing is stored")
+        print("nothing was stored")
         return 1
     if yes is not None and yes.rstrip("=") != offer.fingerprint:
-        raise UrcError(f"the key does not match {yes}; nothing is stored")
+        raise UrcError(f"the key does not match {yes}; nothing was stored")
     file = remember(address.host, address.port, offer.key)
     print(f"stored the key in {file}")
     return 0

@@ -59,7 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=FORMATS, default="text", help="format of the report (default: text)"
     )
-    parser.add_argument("--strict", action="store_true", help="also exit with an error on warnings")
+    parser.add_argument(
+        "--strict", action="store_true", help="exit with code 1 for warnings, not only for errors"
+    )
     parser.add_argument("--no-tests", action="store_true", help="skip the tests of the documents")
     parser.add_argument(
         "--coverage", action="store_true", help="list commands, polls and messages without a test"
@@ -67,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--watch",
         action="store_true",
-        help="repeat the check after every change of a document, until Ctrl-C",
+        help="repeat the check after every change to a document, until Ctrl-C",
     )
 
 

@@ -9,7 +9,7 @@ VERBS: dict[str, str] = {
     "demo": "emulate all shipped robots and open the dashboard in a browser",
     "serve": "serve the dashboard for real robots",
     "validate": "check documents and run their tests",
-    "explain": "explain a problem code and its correction",
+    "explain": "explain a problem code and how to correct the problem",
     "resolve": "print a profile as one document, with the origin of every key",
     "migrate": "replace old names of keys and values in documents",
     "docs": "print the manual page of a profile as Markdown",

@@ -37,7 +37,7 @@ class ServerAddress(NamedTuple):
         return self.url
 
     def socket(self, robot: str) -> str:
-        """Return the address of a robot's WebSocket; if `robot` is "", of the only robot's."""
+        """Return the address of a robot's WebSocket; "" means the server's only robot."""
         scheme = "wss" if self.scheme == "https" else "ws"
         query = f"?robot={quote(robot, safe='')}" if robot else ""
         return f"{scheme}://{self.netloc}/ws{query}"

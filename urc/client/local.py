@@ -1,4 +1,4 @@
-"""Opening a robot in this process, with the same profile and engine as the dashboard.
+"""Opens a robot in this process, with the same profile and engine as the dashboard.
 
     import asyncio
     from urc import connect

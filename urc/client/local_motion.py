@@ -92,7 +92,7 @@ class LocalMotion(ProgramControls):
             self.controller.detach()
 
     def admit(self, command: str, arguments: Mapping[str, Reading]) -> tuple[str, ...]:
-        """Return the names of those who confirm a command: only this program.
+        """Return the names of the command's confirmers: only this program.
 
         Raises:
             CommandFailed: the command is held, or STOP refuses its motion.

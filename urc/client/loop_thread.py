@@ -1,6 +1,6 @@
 """An event loop in a daemon thread, for programs without ``async``.
 
-Layer 5. The thread never keeps the process from ending. Every call has a time limit.
+Layer 5. The thread never prevents the process from exiting. Every call has a time limit.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ _Entered = TypeVar("_Entered")
 
 
 class LoopThread:
-    """A daemon thread with an event loop; it never keeps the process from ending."""
+    """A daemon thread with an event loop; the thread never prevents the process from exiting."""
 
     def __init__(self, timeout_s: float) -> None:
         self.timeout_s = timeout_s

@@ -108,7 +108,7 @@ class ProgramControls(ABC):
             raise MotionEnded(early)
 
     def stopped(self, command: str, reason: str) -> None:
-        """End motion that the guard stopped: the command's, or all motion if `command` is ""."""
+        """End a command's motion after the guard stopped it; if `command` is "", end all motion."""
         text = STOP_REASONS.get(reason, reason)
         for name, stick in self.sticks.items():
             if command not in ("", name):

@@ -64,7 +64,8 @@ class HubReadings:
 
         Raises:
             TimeoutError: the timeout has passed.
-            UrcError: the robot has no signal with this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended
+                permanently.
         """
         self._check(name)
         async with asyncio.timeout(timeout):
@@ -80,11 +81,12 @@ class HubReadings:
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
         """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        The current readings come first. Only the newest reading is kept, so a slow program skips
-        readings and never falls behind.
+        The stream begins with the current readings. Only the newest reading of each signal is kept,
+        so a slow program skips readings and never falls behind.
 
         Raises:
-            UrcError: the robot has no signal with this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended
+                permanently.
         """
         for name in names:
             self._check(name)
@@ -102,7 +104,7 @@ class HubReadings:
         A warning replaces lost lines and states their number.
 
         Raises:
-            UrcError: the connection has ended for good.
+            UrcError: the connection has ended permanently.
         """
         return self._lines(self.hub.notes_count)
 
@@ -129,7 +131,7 @@ class HubReadings:
         """Raise `ConnectionLost` if no further reading can arrive."""
 
     def shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
-        """While the context is open, request those of the signals `names` that are images."""
+        """Request the image signals among `names` while the context is open."""
         return nullcontext()
 
     def _check(self, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Opening a server's robot: values, log, commands and motion over one WebSocket.
+"""Opens a server's robot: values, log, commands and motion over one WebSocket.
 
     import asyncio
     import urc.client
@@ -10,7 +10,7 @@
 
     asyncio.run(main())
 
-Layer 5. A lost connection is reopened; motion never resumes by itself.
+Layer 5. A lost connection is reopened; motion never resumes automatically.
 """
 
 import asyncio
@@ -253,7 +253,7 @@ class RemoteRobot(HubReadings):
                 await self._linked.wait()
 
     def over(self, running: "asyncio.Task[None]") -> None:
-        """Record that the connection has ended for good, and wake all readers."""
+        """Record that the connection has ended permanently, and wake all readers."""
         fault = None if running.cancelled() else running.exception()
         if fault is not None and not isinstance(fault, ConnectionLost):
             log.error("the client of %s failed", self._address.url, exc_info=fault)
@@ -266,7 +266,7 @@ class RemoteRobot(HubReadings):
         return any(link.is_opening for link in self.hub.links.values())
 
     def check_open(self) -> None:
-        """Raise `ConnectionLost` if the connection has ended for good."""
+        """Raise `ConnectionLost` if the connection has ended permanently."""
         if self._over is not None:
             raise self._over
 
@@ -352,7 +352,7 @@ class RemoteRobot(HubReadings):
 
     @contextmanager
     def shown(self, names: tuple[str, ...]) -> Iterator[None]:
-        """Request the images among `names` while the context is open."""
+        """Request the image signals among `names` while the context is open."""
         signals = self.hub.signals
         images = [name for name in names if signals[name].type in ("image", "blob")]
         if images:

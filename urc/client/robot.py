@@ -1,4 +1,4 @@
-"""A robot's interface for Python programs, with the same meaning in every opening.
+"""A robot's interface for Python programs, with the same behaviour in every opening.
 
 Layer 5. `urc.connect` connects to a robot from this process, and `urc.client.open` uses a server's
 robot. Both return this interface, so a program switches between them by changing one line. The
@@ -19,10 +19,10 @@ __all__ = ["AccessDenied", "ConnectionLost", "RobotInterface"]
 
 
 class ConnectionLost(UrcError):
-    """The server is unreachable, or has ended the connection for good."""
+    """The server is unreachable, or has ended the connection permanently."""
 
     is_final = False
-    """Whether another attempt is useless."""
+    """Whether further attempts to connect are useless."""
 
 
 class AccessDenied(ConnectionLost):
@@ -88,7 +88,7 @@ class RobotInterface(Protocol):
         Raises:
             TimeoutError: the timeout has passed.
             UrcError: the robot has no signal with this name.
-            ConnectionLost: the server has ended the connection for good.
+            ConnectionLost: the server has ended the connection permanently.
         """
 
     def watch(self, *names: str) -> AsyncIterator[Sample]:
@@ -99,7 +99,7 @@ class RobotInterface(Protocol):
 
         Raises:
             UrcError: the robot has no signal with this name.
-            ConnectionLost: the server has ended the connection for good.
+            ConnectionLost: the server has ended the connection permanently.
         """
 
     def log(self) -> AsyncIterator[LogEntry]:
@@ -108,7 +108,7 @@ class RobotInterface(Protocol):
         A warning replaces lost lines and states their number.
 
         Raises:
-            ConnectionLost: the server has ended the connection for good.
+            ConnectionLost: the server has ended the connection permanently.
         """
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:

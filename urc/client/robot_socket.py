@@ -120,7 +120,8 @@ class RobotSocket:
         """Keep the connection open until cancelled.
 
         Raises:
-            ConnectionLost: the first attempt failed, or the server ended the connection for good.
+            ConnectionLost: the first attempt failed, or the server ended the connection
+                permanently.
         """
         wait_s, was_up = _FIRST_WAIT_S, False
         while True:
@@ -204,7 +205,7 @@ class RobotSocket:
         return fault
 
     def fail(self, reason: str) -> None:
-        """End the connection for good."""
+        """End the connection permanently."""
         self._final = reason
         self.abort()
 

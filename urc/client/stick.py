@@ -46,7 +46,7 @@ class MotionEnded(UrcError):
 
 
 class MotionLine(Protocol):
-    """The path that ticks take to the robot; each way to open a robot has its own class."""
+    """The path of ticks to the robot; each opening has its own implementation."""
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
         """Send one tick; return the reason for ending motion, or ""."""

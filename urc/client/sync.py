@@ -169,7 +169,8 @@ class SyncRobot:
 
         Raises:
             TimeoutError: the timeout has passed.
-            UrcError: the robot has no signal with this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended
+                permanently.
         """
         return self._thread.call(self._robot.wait_for(name, is_met), timeout)
 
@@ -181,7 +182,8 @@ class SyncRobot:
 
         Raises:
             TimeoutError: no reading arrived in time.
-            UrcError: the robot has no signal with this name, or the connection has ended for good.
+            UrcError: the robot has no signal with this name, or the connection has ended
+                permanently.
         """
         return self._steps(self._robot.watch(*names), timeout)
 
@@ -190,7 +192,7 @@ class SyncRobot:
 
         Raises:
             TimeoutError: no line arrived in time.
-            UrcError: the connection has ended for good.
+            UrcError: the connection has ended permanently.
         """
         return self._steps(self._here(self._robot.log), timeout)
 

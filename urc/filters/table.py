@@ -73,7 +73,7 @@ def _pow(left: Any, right: Any) -> Any:
         if base.bit_length() * abs(exponent) > MAX_BITS:
             raise ValueError("the number is too large")
     elif base < 0:
-        raise ValueError("a negative number has no fractional power")
+        raise ValueError("a negative number cannot be raised to a fractional power")
     return base**exponent
 
 

@@ -32,7 +32,7 @@ def block(folder: Path, new: Block, index_signer: IndexSigner | None) -> Index:
 
 
 def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Index:
-    """Withdraw an entry from the block list and sign the index; return the index.
+    """Remove an entry from the block list and sign the index; return the index.
 
     Raises:
         PackageError: as for `block`, or no entry has this subject.

@@ -1,8 +1,7 @@
-"""The block lists known on this machine, in ``blocks.json`` in the packages folder.
+"""The block lists on this machine, stored in ``blocks.json`` in the packages folder.
 
-A list stays known even if its repository is unreachable or removed, or has an expired index. An
-entry therefore applies until the package is removed, or until a newer list from the same maintainer
-omits the entry.
+A stored list remains in effect even if its repository is unreachable or removed, or has an expired
+index. An entry therefore applies until a newer list from the same maintainer omits the entry.
 """
 
 from collections.abc import Iterable
@@ -78,7 +77,7 @@ class BlockStore:
         return found.st_mtime_ns, found.st_size, found.st_ino
 
     def all(self) -> tuple[KnownBlocks, ...]:
-        """Return the known lists; raise `PackageError` for a damaged file."""
+        """Return the stored lists; raise `PackageError` for a damaged file."""
         stamp = self.stamp()
         if stamp is None:
             return ()
@@ -96,7 +95,7 @@ class BlockStore:
             place: the repository's URL, or the file's path.
 
         Raises:
-            PackageError: a newer list is known, or too many lists are known.
+            PackageError: a newer list is stored, or too many lists are stored.
         """
         new = KnownBlocks(by.by, by.key, number, listed, place)
         with self._changing():

@@ -73,7 +73,7 @@ class BlockList(msgspec.Struct, frozen=True):
     """One maintainer's entries."""
 
     id: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{32}\Z")]
-    """Random name of the list, because one maintainer may sign several repositories."""
+    """Random identifier of the list, because one maintainer may sign several repositories."""
     blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=_BLOCKS_MOST)] = ()
 
 

@@ -1,6 +1,6 @@
 """Ed25519 signatures for packages; each signature covers a statement in readable text.
 
-A signature states that the key's holder declares an archive's bytes to be a particular version of a
+A signature is the key holder's statement that an archive's bytes are a particular version of a
 package. URC does not verify the identity of the key's holder. The first installation of a package
 pins its key. Later versions signed with another key are rejected. SSH handles host keys in the same
 way.

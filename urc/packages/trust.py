@@ -65,7 +65,7 @@ class PinnedKey:
         return pin.number if pin is not None else 0
 
     def check(self, head: IndexHead | None) -> None:
-        """Raise `PackageError` for an invalid or outdated head, or one without the pinned key.
+        """Raise `PackageError` if the head is invalid, outdated or not signed with the pinned key.
 
         While no key is pinned, a missing head and an unsigned head are accepted.
 
@@ -96,7 +96,7 @@ class PinnedKey:
         if head.left_s(self._now()) <= 0:
             raise PackageError(
                 f"{self._url}: the index expired at {head.expires}; ask its maintainer to"
-                " renew the index, and check the clock of this machine; installed packages remain"
+                " renew the index, and check this machine's clock; installed packages still work"
             )
 
     def pin(self, head: IndexHead, work: Path) -> None:

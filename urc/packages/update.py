@@ -132,7 +132,7 @@ def plan_update(
     """
     found = without_blocked(offered(merged(sources, complain)), store)
     if old.key not in found:
-        raise PackageError(f"no repository has {old.root}; the installed version remains")
+        raise PackageError(f"no repository has {old.root}; the installed version remains in use")
     new = _lock(old, wanted, found)
     return None if new is None else plan_root(old.key, new.version, found, store)
 

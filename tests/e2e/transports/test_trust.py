@@ -86,7 +86,7 @@ async def test_key_is_kept_when_a_person_says_yes(controller: Desk) -> None:
     code, said = await controller.trusts(answer="no")
     assert (code, controller.kept) == (1, "")
     assert f"has the host key {controller.sshd.fingerprint} (ssh-ed25519)" in said
-    assert "nothing is stored" in said
+    assert "nothing was stored" in said
 
     code, said = await controller.trusts("jump", answer="yes")
     assert code == 0, said
@@ -109,7 +109,7 @@ async def test_script_must_name_the_fingerprint(controller: Desk, tmp_path: Path
     other = fingerprint_of(new_key(tmp_path / "other"))
     code, said = await controller.trusts("--yes", other)
     assert code == 1
-    assert f"the key does not match {other}; nothing is stored" in said
+    assert f"the key does not match {other}; nothing was stored" in said
     assert controller.kept == ""
     code, said = await controller.trusts("--yes", controller.sshd.fingerprint)
     assert code == 0, said

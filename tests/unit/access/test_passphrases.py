@@ -36,7 +36,7 @@ def test_a_passphrase_matches_its_hash_alone() -> None:
     [
         ("short", "the passphrase has 5 characters; at least 8 are needed"),
         ("x1" * 129, "the passphrase has 258 characters; at most 256 are allowed"),
-        ("aaabbbaaabbb", "the passphrase needs 4 different characters"),
+        ("aaabbbaaabbb", "the passphrase needs at least 4 different characters"),
         ("Margarethe", "the passphrase is the name; choose several words"),
         ("Margarethe1", "the passphrase is easy to guess; choose several words"),
         ("password1", "the passphrase is easy to guess; choose several words"),

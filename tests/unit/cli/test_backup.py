@@ -102,7 +102,7 @@ def test_wrong_use_is_one_line(urc: Urc, tmp_path: Path) -> None:
     code, _, errors = urc("backup", file, "--data-dir", old)
     assert (code, errors) == (
         1,
-        f"urc backup: {file} already exists; --replace replaces the file\n",
+        f"urc backup: {file} already exists; use --replace to overwrite the file\n",
     )
     assert urc("backup", file, "--data-dir", old, "--replace")[0] == 0
     code, _, errors = urc("restore", file, "--data-dir", old)

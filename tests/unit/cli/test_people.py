@@ -118,7 +118,7 @@ def test_a_passphrase_is_typed_twice_without_echo(
     monkeypatch.setattr(terminal, "isatty", lambda: True)
     monkeypatch.setattr(sys, "stdin", terminal)
     said = urc("people", "passphrase", "Ann")
-    assert said == (1, "", "urc people: the two passphrases differ; nothing is changed\n")
+    assert said == (1, "", "urc people: the two passphrases differ; nothing was changed\n")
     assert store.passphrase_of("Ann")[1] is None
     assert urc("people", "passphrase", "Ann").code == 0
     assert matches("correct horse", store.passphrase_of("Ann")[1])
