@@ -22,7 +22,7 @@ _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254"
 
 
 class _Interface(ctypes.Structure):
-    """First fields of the C type ``struct ifaddrs``; the other fields differ between systems."""
+    """Leading fields of the C type ``struct ifaddrs``; the other fields differ between systems."""
 
     _fields_ = (
         ("next", ctypes.c_void_p),
@@ -54,7 +54,7 @@ def is_of_this_machine(address: Address) -> bool:
 
 
 def unmapped(address: Address) -> Address:
-    """Return `address` without a scope; convert an IPv4-mapped IPv6 address to IPv4."""
+    """Return `address` without its scope ID; convert an IPv4-mapped IPv6 address to IPv4."""
     if address.version == 4:
         return address
     return address.ipv4_mapped or ipaddress.IPv6Address(int(address))

@@ -40,7 +40,7 @@ class CrcSpec(NamedTuple):
 
 
 class FoldSpec(NamedTuple):
-    """Parameters of a checksum that adds or XORs all numbers in a range."""
+    """Parameters of a checksum that adds or XORs all numbers in the data."""
 
     operation: Literal["sum", "xor"]
     bits: int = 8

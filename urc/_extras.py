@@ -1,4 +1,4 @@
-"""Optional packages: the command that installs an extra's packages.
+"""Optional packages, and the command that installs an extra's packages.
 
 Messages name the packages instead of ``urc[extra]``. For ``urc[extra]``, pip would search the index
 for `urc` itself, even if this URC was installed from a file or a checkout.

@@ -1,4 +1,4 @@
-"""Reads ordinary files up to a size limit, and rejects directories and pipes.
+"""Reads regular files up to a size limit, and rejects directories and pipes.
 
 Private to `urc.source`.
 """
@@ -12,7 +12,7 @@ __all__ = ["read_bytes", "refused", "similar_file", "too_large"]
 
 
 def read_bytes(path: str, most: int) -> bytes:
-    """Return the content of an ordinary file, as bytes.
+    """Return the content of a regular file, as bytes.
 
     Raises:
         ProblemsError: the file cannot be read, or has more than `most` bytes.

@@ -50,7 +50,7 @@ def item_hint(text: str) -> str:
 
 
 def column_hint(lines: Sequence[str], number: int) -> str:
-    """Return a hint with the probable column of a line; "" if the line fits one of its blocks."""
+    """Return a hint with the probable column of a line; "" if the line's column is possible."""
     own = _columns(lines[number])[-1]
     blocks = _open_blocks(lines, number)
     if own in blocks or not blocks:
@@ -78,7 +78,7 @@ def _open_blocks(lines: Sequence[str], number: int) -> dict[int, int]:
 
 
 def _columns(text: str) -> tuple[int, ...]:
-    """Return the columns of a line's key and of its dashes, the key first."""
+    """Return the column of a line's key, followed by the columns of its dashes."""
     found = _START.match(text)
     start = found[0] if found else ""
     return (len(start), *(at for at in range(len(start) - 1, -1, -1) if start[at] == "-"))

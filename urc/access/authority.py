@@ -43,7 +43,7 @@ RENEW_BEFORE: Final = timedelta(days=30)
 OLDEST: Final = RELEASED
 """Earliest plausible time of the machine's clock."""
 _BACK: Final = timedelta(days=1)
-"""Extra validity before the start date, for devices with a slow clock."""
+"""Extra validity before the start date, for devices whose clock is behind."""
 _LOCAL_NAMES: Final = ("localhost", "local", "lan", "internal", "home.arpa")
 _LOCAL_NETWORKS: Final = (
     "127.0.0.0/8", "10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16",

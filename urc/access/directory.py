@@ -1,8 +1,8 @@
 """The directory: a snapshot of all identities, sign-ins and tokens, with their current rights.
 
 Layer 4. Pure. The store creates a new directory after each change. A socket stores an `Identity`,
-but never its rights. It checks the rights in the current directory at each command, so a revocation
-takes effect immediately.
+but never its rights. The socket checks the rights in the current directory at each command, so a
+revocation takes effect immediately.
 """
 
 import hashlib

@@ -4,9 +4,9 @@ Layer 4. An account is identified by its issuer and subject, never by its name. 
 and another person on this server may have the same name. The functions block for a few
 milliseconds, so servers call them in a thread.
 
-Theory of operation. Each sign-in replaces the grants of the previous sign-in with those from its
+Theory of operation. Each sign-in replaces the grants of the previous sign-in with grants from the
 current claims. Grants from an administrator remain. All of the person's rights, including those of
-devices and passkeys, end with the sign-in. The next sign-in renews them. An account that its
+devices and passkeys, end with the sign-in. The next sign-in renews the rights. An account that its
 provider has blocked therefore loses all access.
 """
 

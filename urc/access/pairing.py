@@ -56,7 +56,7 @@ def pair(
         code: the code.
         name: name chosen on the device, used if the invitation has no name.
         now: UTC time in seconds since 1970.
-        origin: where the request came from.
+        origin: origin of the request.
 
     Raises:
         AccessError: the code is unknown, or the name is invalid or in use.
@@ -82,7 +82,7 @@ def join(
         code: the code of the invitation.
         kept: hash of the passphrase.
         now: UTC time in seconds since 1970.
-        origin: where the request came from.
+        origin: origin of the request.
 
     Raises:
         AccessError: the code is unknown, or the person was removed.

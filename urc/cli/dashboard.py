@@ -191,7 +191,7 @@ async def _serve(
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:
-    """Open the audit log until `stack` closes; return it, and the options with its recorder."""
+    """Open the audit log until `stack` closes; return the log, and options that record to it."""
     audit = AuditLog(own_folder(place.data) / FILE)
     stack.callback(audit.close)
     return audit, replace(place, recorder=ServerRecorder(audit.add))

@@ -14,7 +14,7 @@ _OWN = 0o700
 
 
 def own_folder(named: Path | None = None) -> Path:
-    """Return URC's data folder, without incomplete files; create it if necessary.
+    """Return URC's data folder; create it if necessary, and delete its incomplete files.
 
     The default folder becomes private, even if an older version created it with other permissions.
     The permissions of an existing custom folder remain unchanged, because the folder may be shared.

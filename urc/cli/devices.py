@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_roles(
         parser,
         "pair, grant, revoke: watch, drive, maintain or administer; drive@cart for one robot,"
-        " drive@#lab for a tag; repeatable (default for pair: drive;"
-        " revoke without --role: all roles)",
+        " drive@#lab for a tag; repeatable (default: drive for pair,"
+        " all roles for revoke)",
     )
     parser.add_argument(
         "--owner",

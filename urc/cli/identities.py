@@ -105,7 +105,7 @@ def opened(data: Path | None) -> Iterator["AccessStore"]:
 
 
 def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]:
-    """Return the words after the action; raise `Misuse` unless their number matches `names`."""
+    """Return the words after the action; raise `Misuse` unless there is one word for each name."""
     words: list[str] = arguments.words
     if len(words) != len(names):
         wanted = " ".join(("urc", verb, arguments.action, *names))

@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     audit_packages("install", plan.told)
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
-        print(f"{used} remains in use; the settings of the robot select the version")
+        print(f"{used} remains in use; the robot's settings select the version")
     return 0
 
 

@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_roles(
         parser,
-        "add, invite, grant, revoke: watch, drive, maintain or administer; drive@cart is for one"
-        " robot, drive@#lab for a tag; repeatable (revoke without --role: all roles)",
+        "add, invite, grant, revoke: watch, drive, maintain or administer; drive@cart for one"
+        " robot, drive@#lab for a tag; repeatable (default for revoke: all roles)",
     )
     parser.add_argument(
         "--valid",

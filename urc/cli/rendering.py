@@ -1,7 +1,7 @@
 """The warning about emulated robots whose cameras and laser scanners do not work.
 
-Layer 6. Simulated cameras and laser scanners need a separate extra, because real robots do not use
-it; see docs/decisions/0045.
+Layer 6. Simulated cameras and laser scanners require a separate extra, because real robots do not
+need the extra; see docs/decisions/0045.
 """
 
 from collections.abc import Iterable

@@ -31,7 +31,7 @@ def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
 
 def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """Withdraw an entry from a repository's block list."""
+    """Remove an entry from a repository's block list."""
     from urc.packages import block_builder
 
     folder, entry = _entry(arguments)
@@ -82,7 +82,7 @@ def blocks(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
             known.forget(key.rstrip("="))
             audit_packages("blocks forget", [key])
             print(
-                f"forgot the block lists of {key}; a repository with this key sends its list again"
+                f"deleted the block lists of {key}; a repository with this key sends its list again"
             )
         case _:
             raise Misuse(

@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--data-dir", "data folder for latched stops, audit log and settings"),
         (
             "--tiles",
-            "folder of map tiles in the form FOLDER/z/x/y.png, for the map widget's option tiles",
+            "folder of map tiles, FOLDER/z/x/y.png, for the option `tiles` of the map widget",
         ),
         ("--record", "record each session to a file in this folder, for 'urc replay'"),
     ):

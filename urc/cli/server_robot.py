@@ -37,7 +37,8 @@ def add_server(parser: argparse.ArgumentParser) -> None:
         "--authority",
         metavar="FILE",
         type=Path,
-        help="PEM file with the server's local authority (default: this system's trust store)",
+        help="PEM file with the certificate of the server's local authority"
+        " (default: this system's trust store)",
     )
     parser.add_argument(
         "--allow-unencrypted",
@@ -51,8 +52,8 @@ def refuse_local_options(arguments: argparse.Namespace, options: Sequence[str]) 
 
     Args:
         arguments: the parsed arguments.
-        options: options that work only without a server, such as ``--wire``. The attribute's name
-            is derived from the option.
+        options: options that work only without a server, such as ``--wire``. The name of each
+            attribute is derived from its option.
     """
     if arguments.server is None:
         for option in ("--token-file", "--authority", "--allow-unencrypted"):

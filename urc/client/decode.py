@@ -1,7 +1,7 @@
-"""Conversion of a server's messages into signals, readings, links and log lines.
+"""Converts a server's messages to signals, readings, links and log lines.
 
-Layer 5. Pure. Ages become times on this process's monotonic clock. A browser's JSON has no tuples
-and no integers beyond 2^53, so values are converted according to their signal's type.
+Layer 5. Pure. Ages are converted to times on this process's monotonic clock. A browser's JSON has
+no tuples and no integers beyond 2^53, so values are converted according to their signal's type.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

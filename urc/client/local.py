@@ -10,8 +10,8 @@
 
     asyncio.run(main())
 
-Layer 5. Lost connections are reopened. A guard process sends all motion to the robot, and stops it
-if this process hangs or dies.
+Layer 5. Lost connections are reopened. A guard process sends all motion to the robot, and stops the
+robot if this process hangs or dies.
 """
 
 import logging

@@ -1,4 +1,4 @@
-"""The driving context, shared by both ways to connect, with one stick for each held command.
+"""The driving context, shared by both openings, with one stick for each held command.
 
 Layer 5. The context takes the controls, samples its stick, and always ends with a release. The
 release is sent before any wait, even after an exception or a cancellation.

@@ -1,8 +1,8 @@
 """The controls of a server's robot: the lease, heartbeats, ticks and STOP.
 
-Layer 5. Each tick contains the lease epoch, a number, and the server's newest heartbeat, so that
-the server can refuse late and repeated ticks. If the connection is lost, motion never resumes:
-every stick ends, and the server stops the robot.
+Layer 5. Each tick contains the lease epoch, the tick's number, and the server's newest heartbeat,
+so that the server can refuse late and repeated ticks. If the connection is lost, motion never
+resumes: every stick ends, and the server stops the robot.
 """
 
 import asyncio

@@ -94,8 +94,8 @@ class RobotInterface(Protocol):
     def watch(self, *names: str) -> AsyncIterator[Sample]:
         """Yield readings of the named signals, or of all signals, until the caller stops.
 
-        The current readings come first. Only the newest reading is kept, so a slow program skips
-        readings and never falls behind.
+        The stream begins with the current readings. Only the newest reading of each signal is kept,
+        so a slow program skips readings and never falls behind.
 
         Raises:
             UrcError: the robot has no signal with this name.

@@ -105,8 +105,8 @@ class BlockStore:
                     others.append(one)
                 elif one.number > number or (one.number == number and one.listed != listed):
                     raise PackageError(
-                        f"{place}: the list of blocked packages has number {number}, but number"
-                        f" {one.number} of {one.maintainer} is already known"
+                        f"{place}: this block list has number {number}, but number {one.number} by"
+                        f" {one.maintainer} is already stored"
                     )
                 elif one.listed == listed and one.number == number:
                     return
@@ -120,7 +120,7 @@ class BlockStore:
             left = [one for one in self.all() if fingerprint(one.key) != key]
             if len(left) == len(self.all()):
                 known = ", ".join(one.maintainer for one in left) or "none"
-                raise PackageError(f"no block list is signed by {key}; known lists: {known}")
+                raise PackageError(f"no block list is signed by {key}; stored lists: {known}")
             self._write(left)
 
     def lines(self, lock: Lock, signature_of: SignatureOf) -> list[str]:

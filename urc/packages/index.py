@@ -81,7 +81,7 @@ class IndexEntry(msgspec.Struct, frozen=True):
 
 
 class Index(msgspec.Struct, frozen=True):
-    """All versions in a repository."""
+    """All package versions in a repository."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: _Text

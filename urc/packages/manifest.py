@@ -43,7 +43,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
     """Return a manifest's content.
 
     Raises:
-        PackageError: the manifest is invalid; the message contains the line.
+        PackageError: the manifest is invalid; the message contains the line number.
     """
     try:
         document = parse_document(content, file, DocumentLimits(size_bytes=65536))
@@ -71,7 +71,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
 
 
 class _Reader:
-    """A reader for manifest values; its errors contain the line."""
+    """A reader for manifest values; its errors contain the line number."""
 
     def __init__(self, document: Document) -> None:
         self._document = document

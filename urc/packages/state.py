@@ -46,7 +46,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         """Return the state before the update to `lock`. A second call undoes the first call.
 
         Raises:
-            PackageError: no update to `lock` is known.
+            PackageError: no update to `lock` is recorded.
         """
         old = self.before.get(lock.digest)
         if old is None:

@@ -45,7 +45,7 @@ class Store:
         self.folder = folder
         self.work = folder / "work"
         self.blocks = BlockStore(folder)
-        """Known lists of blocked packages."""
+        """Stored block lists."""
         self._state = folder / "state.json"
 
     def installed(self) -> tuple[Lock, ...]:

@@ -82,7 +82,7 @@ class PinnedKey:
             found = f"signed by another key, {signature}" if signature else "not signed"
             raise PackageError(
                 f"{self._url}: the index is {found}, but the key {fingerprint(pin.key)} is pinned;"
-                f" if the maintainer confirms the change: urc repo remove {self._url}, and add it"
+                f" if the maintainer confirms this, run 'urc repo remove {self._url}' and add it"
                 " again"
             )
         if head is None or signature is None:

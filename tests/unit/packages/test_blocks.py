@@ -150,7 +150,7 @@ def test_only_a_newer_list_of_the_same_key_withdraws_an_entry(
     know(store, mallory, number=9)  # another key, although the same name and list
     know(store, anna, number=9, list_id="f" * 32)  # another repository of the same maintainer
     for number in (4, 5):
-        with pytest.raises(PackageError, match=rf"has number {number}, but number 5 of Anna"):
+        with pytest.raises(PackageError, match=rf"has number {number}, but number 5 by Anna"):
             know(store, anna, number=number)
     assert store.blocked(lock)
     know(store, anna, number=6)
