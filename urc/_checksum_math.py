@@ -53,7 +53,7 @@ class FoldSpec(NamedTuple):
     added: int = 0
     """Number to add to the result after masking."""
     ored: int = 0
-    """Bits that the last step sets in the result."""
+    """Bits that the last step sets to 1 in the result."""
     is_odd_xored: bool = False
     """Whether a trailing byte that does not fill a whole number is XORed into the result."""
 

@@ -43,7 +43,7 @@ class PrincipalStatus(NamedTuple):
     passkeys: int = 0
     """Number of passkeys."""
     accounts: int = 0
-    """Number of accounts with identity providers (OpenID Connect)."""
+    """Number of accounts at identity providers (OpenID Connect)."""
     invited_until: float | None = None
     """UTC time at which the newest invitation expires, in seconds; None if there is no
     invitation."""
@@ -121,7 +121,7 @@ def change_grants(
     with store.transaction():
         found = store.directory().principals.get(principal)
         if found is None:
-            raise AccessError("it was already removed")
+            raise AccessError("this entry was already removed")
         grants = tuple(dict.fromkeys(change(found.grants)))
         store.set_grants(principal, grants)
     return grants

@@ -27,7 +27,7 @@ class _Entry(NamedTuple, Generic[_Value]):
 
 
 class Pending(Generic[_Value]):
-    """Values that are stored under random 256-bit keys."""
+    """Values stored under random 256-bit keys; each value can be retrieved once."""
 
     def __init__(self, lasts_s: float) -> None:
         """Initialize without values.
@@ -75,7 +75,7 @@ class Pending(Generic[_Value]):
 
 
 def place_of(address: str) -> str:
-    """Return the part of an address that identifies a visitor's network for the limits.
+    """Return the part of a visitor's address to which the limits apply.
 
     A device can use any of the 2⁶⁴ addresses in its IPv6 network, so the limit applies to the
     network.

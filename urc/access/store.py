@@ -316,7 +316,7 @@ class AccessStore:
         """Return a new code for `invitation`.
 
         Args:
-            invitation: the right that the code conveys.
+            invitation: the right that the code grants.
             now: UTC time in seconds since 1970, for deleting expired codes.
 
         Raises:
@@ -425,7 +425,7 @@ class AccessStore:
     def _update(self, statement: str, *values: object) -> None:
         with self._change():
             if self._base.execute(statement, values).rowcount == 0:
-                raise AccessError("it was already removed")
+                raise AccessError("this entry was already removed")
 
 
 def parse_name(name: str) -> str:

@@ -39,9 +39,9 @@ def clock_fault(now: float, known: Iterable[KnownTime] = ()) -> str:
         return ""
     return (
         f"the clock of this computer shows {_text(now)}, earlier than {newest.event}"
-        f" ({_text(newest.at)}): it is wrong now, or was wrong then. Sign-ins and tokens can last"
-        " too long, certificates can be invalid, and the audit log has wrong times. Set the clock,"
-        " or connect a time server"
+        f" ({_text(newest.at)}): the clock is wrong now, or was wrong then. Sign-ins and tokens can"
+        " last too long, certificates can be invalid, and the audit log has wrong times. Set the"
+        " clock, or connect a time server"
     )
 
 

@@ -12,7 +12,7 @@ __all__ = ["BURST_GAP_S", "FLOOD_BEGINS", "FLOOD_ENDS", "FLOOD_S", "FloodDetecto
 
 FLOOD_S: Final = 600.0
 FLOOD_BEGINS: Final = 10
-"""Highest number of alarms in `FLOOD_S` that is not yet a flood."""
+"""Largest number of alarms in `FLOOD_S` that does not count as a flood."""
 FLOOD_ENDS: Final = 5
 """A flood ends when fewer than this number of alarms occurred in `FLOOD_S`."""
 BURST_GAP_S: Final = 5.0

@@ -247,7 +247,7 @@ def show(
     Args:
         rows: one object for each entry, for JSON.
         table: the header row, followed by one row of strings for each entry.
-        arguments: arguments with `--format`.
+        arguments: parsed arguments, including `--format`.
         empty: message for an empty list.
     """
     if arguments.format == "json":

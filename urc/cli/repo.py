@@ -128,7 +128,7 @@ def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _days(text: str) -> int:
-    """Return a number of days; raise an argparse error with a one-line message."""
+    """Parse a number of days; raise an argparse error with a one-line message."""
     if text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 365:
         return int(text)
     raise argparse.ArgumentTypeError(f"expected 1 to 365 days, found {text[:20]!r}")

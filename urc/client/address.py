@@ -18,7 +18,7 @@ _MOST_BYTES = 4096
 
 
 class ServerAddress(NamedTuple):
-    """A checked server address."""
+    """A validated server address."""
 
     scheme: str
     """``http`` or ``https``."""

@@ -40,7 +40,7 @@ _LEVELS = ("info", "warning", "error")
 
 
 def decode_message(text: str | bytes) -> ServerMessage | None:
-    """Return a message; None for a message unknown to this version."""
+    """Decode a message; return None for a message that is invalid or unknown to this version."""
     try:
         return _decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError):
@@ -100,7 +100,7 @@ def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
 
 
 def entry_of(row: LogRow, now_s: float) -> LogEntry:
-    """Return one log line."""
+    """Return the log line in `row`."""
     level = row.level if row.level in _LEVELS else "info"
     return LogEntry(now_s - row.age / 1000, level, row.source, row.text)  # type: ignore[arg-type]
 

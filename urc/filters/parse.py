@@ -47,7 +47,7 @@ def _check_count(count: int, what: str) -> None:
 
 
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
-    """Return one column of all rows; `key` is a name, or a position in a list or split text."""
+    """Return one column of all rows; `key` is a name, or an index into a list or split text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):

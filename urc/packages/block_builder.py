@@ -35,7 +35,7 @@ def unblock(folder: Path, subject: str, index_signer: IndexSigner | None) -> Ind
     """Remove an entry from the block list and sign the index; return the index.
 
     Raises:
-        PackageError: as for `block`, or no entry has this subject.
+        PackageError: no entry has this subject; for other causes, see `block`.
     """
     return _change(folder, index_signer, subject, ())
 

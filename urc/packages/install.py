@@ -43,7 +43,7 @@ def plan_requirement(
     Args:
         required: the requirement.
         sources: package sources, in the order in which they are queried.
-        store: store with archives that need no download.
+        store: store whose archives need no download.
         complain: callback that receives warnings for the user.
         pinned: lock with the only accepted versions and digests, even if a version was withdrawn
             later.
@@ -101,11 +101,11 @@ def plan_root(
         root: the package.
         wanted: range of versions of the package.
         found: available packages, as returned by `merged`.
-        store: store with archives that need no download.
+        store: store whose archives need no download.
         pinned: expected result.
 
     Raises:
-        PackageError: as for `plan_requirement`.
+        PackageError: see `plan_requirement`.
     """
     chosen = settle(root, wanted, found)
     lock = lock_of(root, chosen)

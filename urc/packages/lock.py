@@ -37,7 +37,7 @@ class Lock(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         """Reject invalid names and versions."""
         if len(self.packages) > _PACKAGES_MOST or self.root not in self.packages:
-            raise ValueError(f"1 to {_PACKAGES_MOST} packages, including the root")
+            raise ValueError(f"expected 1 to {_PACKAGES_MOST} packages, including the root")
         for key, pin in self.packages.items():
             parse_key(key)
             parse_version(pin.version)

@@ -35,7 +35,7 @@ def choose(entries: Entries, required: PackageRequirement) -> PackageId:
     """Return the package for a requirement.
 
     Raises:
-        PackageError: no package has this name, or packages of several kinds do.
+        PackageError: no package has this name, or packages of several kinds have this name.
     """
     found = [
         key for key in entries if key.name == required.name and required.kind in ("", key.kind)

@@ -196,5 +196,5 @@ def test_an_error_undoes_the_whole_transaction(store: AccessStore) -> None:
     with pytest.raises(AccessError, match="refused"):
         fail()
     assert not store.directory().principals
-    with pytest.raises(AccessError, match="it was already removed"):
+    with pytest.raises(AccessError, match="this entry was already removed"):
         change_grants(store, "unknown", lambda own: own)

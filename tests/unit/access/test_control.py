@@ -85,7 +85,7 @@ async def test_people_and_the_local_user_stand_side_by_side(store: AccessStore) 
     await access.end_sign_in(sign_in.id)
     assert access.role(who) is None
     assert changes == ["changed"] * 2
-    with pytest.raises(AccessError, match="it was already removed"):
+    with pytest.raises(AccessError, match="this entry was already removed"):
         await access.end_sign_in(sign_in.id)
 
 

@@ -58,7 +58,7 @@ def test_a_removed_person_loses_sessions_and_devices(store: AccessStore) -> None
     assert (left.identify(secret, NOW), left.identify(key, NOW)) == (NOBODY, NOBODY)
     assert (left.principals, left.sign_ins) == ({}, {})
     assert store.redeem(code, NOW) is None
-    with pytest.raises(AccessError, match="it was already removed"):
+    with pytest.raises(AccessError, match="this entry was already removed"):
         store.remove(who.principal)
 
 
