@@ -168,7 +168,7 @@ FAMILIES: Mapping[str, Family] = {
     ),
     "commands": Family(
         "Keys of commands",
-        "Keys of actions: arguments, confirmation, interlocks, priority and retries.",
+        "Keys of commands: arguments, confirmation, interlocks, priority and retries.",
         _driver("commands command argument priority role rate confirm retries requires verify"),
         {"language/flow.md": "Requests, replies and sequences"},
     ),

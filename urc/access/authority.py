@@ -38,7 +38,7 @@ AUTHORITY_FOLDER: Final = "tls"
 """Subfolder in the data folder for certificates and keys."""
 AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
-"""Validity of a server certificate; browsers reject certificates with a longer validity."""
+"""Time from the issue of a server certificate to its expiry."""
 RENEW_BEFORE: Final = timedelta(days=30)
 OLDEST: Final = RELEASED
 """Earliest plausible time of the machine's clock."""

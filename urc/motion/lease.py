@@ -208,7 +208,7 @@ class Lease:
         to `client`. None means the current number.
         """
         if not includes(client.role, "drive"):
-            return LeaseRefused("viewers can stop the robot, but cannot reset it")
+            return LeaseRefused("watchers can stop the robot, but cannot reset it")
         if not self.state.latched_by:
             return LeaseRefused("nothing is stopped")
         if stops is not None and stops != self.state.stops:

@@ -192,7 +192,7 @@ export class OwnList extends Run {
     this.goOn?.();
   }
 
-  abort(why = this.ctx.t("somebody ended it")) {
+  abort(why = this.ctx.t("ended on request")) {
     this.ended = why;
     this.goOn?.();
   }

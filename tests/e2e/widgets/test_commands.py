@@ -355,7 +355,7 @@ async def test_a_sequence_is_gone_through_step_by_step(
         await fly.locator(".sequence-start").click()
         await fly.locator(".sequence-note", has_text="paused before step 1").wait_for()
         await other.locator("[data-cell='0'] .sequence-abort").click()
-        await fly.locator(".sequence-note", has_text="somebody ended it").wait_for()
+        await fly.locator(".sequence-note", has_text="ended on request").wait_for()
         assert robot.lines == []
 
         await own.locator(".sequence-start").click()

@@ -79,7 +79,7 @@ def test_it_can_be_ended_while_it_waits_and_while_it_is_paused() -> None:
     talk = begun(Dialogue(DRIVER).connect())
     pull(talk, "abort")
     assert talk.outcomes == {1: "aborted"}
-    assert talk.engine.programs["show"].sequence_control.reason == "somebody ended it"
+    assert talk.engine.programs["show"].sequence_control.reason == "ended on request"
     talk = Dialogue(DRIVER).connect()
     pull(talk, "step")
     begun(talk)

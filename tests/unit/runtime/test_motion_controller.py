@@ -157,7 +157,7 @@ def test_stop_needs_no_lease_stops_all_and_latches() -> None:
     assert it.heard() == ["stop drive lift"]
     assert it.tick(speed=0.5) == "Stopped by vic. Reset to drive again."
     assert it.drive("ann", "take") == "Stopped by vic. Reset to drive again."
-    assert it.drive("vic", "reset") == "viewers can stop the robot, but cannot reset it"
+    assert it.drive("vic", "reset") == "watchers can stop the robot, but cannot reset it"
     assert it.drive("bob", "reset") == ""
     assert it.controller.lease.state.holder is None
     assert it.heard() == []

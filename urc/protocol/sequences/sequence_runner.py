@@ -171,7 +171,7 @@ class SequenceRunner:
         """Apply the operator's control requests."""
         sequence_control = self.program.sequence_control
         if sequence_control.is_aborted:
-            self.stop("aborted", "somebody ended it")
+            self.stop("aborted", "ended on request")
         elif sequence_control.goes_on():
             self._resume()
 

@@ -39,8 +39,8 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
 
-    A setting without a declared group belongs to `CONNECTION` if it is an address, if a transport
-    uses it, or if the operator must fill it in. The transports of an emulated robot use no address.
+    A setting without a declared group belongs to `CONNECTION` in three cases: it is a host or port,
+    a transport uses it, or the operator must fill it in.
     """
     used = {
         name for spec in profile.driver.transports.values() for name in _used(dict(spec.options))

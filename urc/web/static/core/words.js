@@ -31,7 +31,7 @@ const SENTENCES = [
   mark("{name} has already asked for control"),
   mark("No screen is asking you for control"),
   mark("viewers cannot drive"),
-  mark("viewers can stop the robot, but cannot reset it"),
+  mark("watchers can stop the robot, but cannot reset it"),
   mark("Taking over needs the role maintain"),
   mark("nothing is stopped"),
   mark("STOP was pressed again: reset it again"),
