@@ -161,7 +161,7 @@ test("200 alarms are one line of the list, one announcement and one frame's work
   page.frame(200);
   const list = /** @type {FakeElement} */ (body.querySelector("[data-alarm-list]"));
   assert.equal(list.childElementCount, 1);
-  assert.match(list.textContent, /200 alarms of one burst.*first: Signal 0/);
+  assert.match(list.textContent, /200 alarms in one burst.*first: Signal 0/);
   assert.match(body.querySelector(".urc-alarm-note")?.textContent ?? "", /^200 alarms\. Flood/);
   list.querySelector("[data-key=burst-1]")?.fire("click");
   page.frame(201);

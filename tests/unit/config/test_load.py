@@ -100,7 +100,7 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
         )
     }
     assert profile.interfaces["default"].layouts == {
-        "landscape": Layout(2, 3, (Slot("battery", 1, 2),))
+        "landscape": Layout(3, 3, (Slot("battery", 1, 1),))
     }
     assert list(profile.widgets) == ["battery"]
     (test,) = profile.tests
