@@ -39,8 +39,8 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
 
-    A setting without a declared group belongs to `CONNECTION` in three cases: it is a host or port,
-    a transport uses it, or the operator must fill it in.
+    Without a declared group, three kinds of settings belong to `CONNECTION`: hosts and ports,
+    settings that a transport uses, and settings that the operator must fill in.
     """
     used = {
         name for spec in profile.driver.transports.values() for name in _used(dict(spec.options))
