@@ -329,18 +329,20 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
         part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
-    assert '[data-rest]{display:inline-flex;--urc-rest:"1";--urc-rest-names:"a"}' in text
+    shows = 'display:inline-flex;--urc-rest:"1";--urc-rest-first:"a";--urc-rest-others:""'
+    assert f"[data-rest]{{{shows}}}" in text
     assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
 
 
-def test_the_button_names_the_widgets_that_the_screen_lacks() -> None:
+def test_the_button_names_the_first_missing_widget_and_counts_the_others() -> None:
     """In reading order; a title of a document cannot end the style sheet."""
     wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
     low = Layout(1, 1, (Slot("b", 0, 0),))
     screens = Interface("i", layouts={"landscape": wide, "phone_landscape": low})
-    titles = {"a": "Brake", "c": '"}</style>\\'}
+    titles = {"a": '"}</style>\\', "c": "Brake"}
     text = grid_css(screens, ("a", "b", "c"), titles=titles)
-    assert r'--urc-rest-names:"Brake, \22 }\3c /style\3e \5c "' in text
+    assert r'--urc-rest:"2";--urc-rest-first:"\22 }\3c /style\3e \5c ";' in text
+    assert '--urc-rest-others:", 1 " attr(data-rest-more)}' in text
 
 
 def test_a_complete_screen_stays_as_it_is_on_the_second_page() -> None:

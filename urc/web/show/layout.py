@@ -149,11 +149,13 @@ def _button(
     """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
         missing = _missing(grids, screen)
-        names = ", ".join(titles.get(slot.name, slot.name) for slot in missing)
         shown = "display:none"
         if missing:
+            first, others = missing[0].name, len(missing) - 1
             shown = f'display:inline-flex;--urc-rest:"{len(missing)}"'
-            shown += f";--urc-rest-names:{_css_string(names)}"
+            shown += f";--urc-rest-first:{_css_string(titles.get(first, first))}"
+            count = f'", {others} " attr(data-rest-more)' if others else '""'
+            shown += f";--urc-rest-others:{count}"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
 
