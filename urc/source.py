@@ -4,6 +4,7 @@ This module is independent of robots. All errors are raised as `ProblemsError` w
 a hint. Reading takes bounded time and memory for any content.
 """
 
+import contextlib
 import re
 from collections.abc import Sequence
 from typing import Any, Final
@@ -34,6 +35,8 @@ _LIMITS: Final = DocumentLimits()
 # These patterns and the YAML reader use the same line ends, so marks count the same lines. The
 # Unicode patterns take milliseconds to compile, so they are compiled only for text that needs them.
 _LINE_END = re.compile("\r\n|[\r\n]")
+_NESTING: Final = "exceeded maximum nesting depth"
+"""Message of libyaml, since PyYAML 6.0.4, at 1,000 levels."""
 _LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _UNPRINTABLE_UNICODE: Final = "[^\t\r\n\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
@@ -207,7 +210,10 @@ def parse_document(content: bytes | str, file: str, limits: DocumentLimits = _LI
     except StoppedError:
         pass
     except yaml.YAMLError as error:
-        problems.append(_syntax_problem(error, file, lines))
+        if _NESTING in str(error):  # libyaml reads ahead; the reader's own limit names the place
+            reader = _depth_checked(text, lines, file, limits)
+        else:
+            problems.append(_syntax_problem(error, file, lines))
     if reader is not None:
         told = {problem.line for problem in reader.problems}
         # An unquoted value often causes a later parser error, and one problem per line is enough.
@@ -222,6 +228,16 @@ def parse_document(content: bytes | str, file: str, limits: DocumentLimits = _LI
             "a document starts with 'urc: 1' and 'kind: robot'",
         )
     return Document(file, text, lines, *found, tuple(problems))
+
+
+def _depth_checked(text: str, lines: list[str], file: str, limits: DocumentLimits) -> TreeReader:
+    """Return a reader that has stopped at the depth limit, for text that libyaml refuses."""
+    from urc._yaml_pure import PureParser
+
+    reader = TreeReader(PureParser(text), lines, file, limits)
+    with contextlib.suppress(StoppedError, yaml.YAMLError):
+        reader.read()
+    return reader
 
 
 def _parser(text: str) -> Any:

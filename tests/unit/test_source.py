@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
+import yaml
 
 from urc.problems import Problem, ProblemsError, to_text
 from urc.source import parse_document, read_document
@@ -189,6 +190,31 @@ def test_aliases_cannot_go_round_the_depth_limit() -> None:
 def test_what_is_no_document_is_refused_with_one_finding(content: bytes, code: str) -> None:
     """One line with a place, whatever the bytes are."""
     assert refused(content).code == code
+
+
+class ShallowParser:
+    """A parser that reads ahead and refuses deep nesting, as libyaml does since PyYAML 6.0.4."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def get_event(self) -> None:
+        """Raise libyaml's error."""
+        mark = yaml.Mark("", 1000, 0, 1000, None, None)
+        raise yaml.scanner.ScannerError(
+            "while increasing flow level", mark, "exceeded maximum nesting depth", mark
+        )
+
+
+def test_nesting_that_the_parser_refuses_is_reported_where_it_is_too_deep(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The same report, whatever the version of libyaml."""
+    text = "a: " + "[" * 1000
+    expected = refused(text)
+    assert (expected.code, expected.column) == ("too-deep", 67)
+    monkeypatch.setattr("urc.source._parser", ShallowParser)
+    assert refused(text) == expected
 
 
 def test_place_of_a_byte_that_is_not_utf_8() -> None:

@@ -252,8 +252,8 @@ def test_types_that_grow_exponentially_are_refused() -> None:
 
 def test_deeply_nested_sequences_are_refused_in_words() -> None:
     """Python itself limits how deep loops nest."""
-    levels = "".join(f"{'=' * 80}\nMSG: pkg/L{n}\nL{n + 1}[] a\nstring b\n" for n in range(22))
-    text = f"L0 x\n{levels}{'=' * 80}\nMSG: pkg/L22\nint8 x"
+    levels = "".join(f"{'=' * 80}\nMSG: pkg/L{n}\nL{n + 1}[] a\nstring b\n" for n in range(23))
+    text = f"L0 x\n{levels}{'=' * 80}\nMSG: pkg/L23\nint8 x"
     layout = layout_of("pkg/T", parse_msg("pkg/T", text))
     with pytest.raises(BadDefinition, match="nested too deeply"):
         build_read(layout, ALL)
