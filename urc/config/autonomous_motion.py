@@ -68,11 +68,12 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report a command that starts autonomous motion but that `part` would run automatically."""
+    """Report a command that would start autonomous motion if `part` ran it automatically."""
     if runs_what_moves(command, arguments):
         problems.error(
             part,
             "wrong-command",
             f"{command.name!r} starts autonomous motion, so it must not run automatically",
-            hint="run a command that starts no motion; only operators may start autonomous motion",
+            hint="run a command that does not start motion; only operators may start autonomous"
+            " motion",
         )

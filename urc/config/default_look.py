@@ -286,7 +286,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
     Displays are at the top, largest first. Steering controls are at the bottom right, near the
-    thumb. Other controls fill the free places. On a phone in landscape, steering controls are in
+    thumb. Other controls fill the free cells. On a phone in landscape, steering controls are in
     the first rows at the right and left edges; other widgets are between them and below.
     """
     ground = _ground(slots)
@@ -300,7 +300,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
 def _ground(slots: Mapping[str, WidgetUse]) -> str:
     """Return the background slot; "" if no widget is suitable.
 
-    A single slot needs no background, and too many other widgets would hide it.
+    A single slot needs no background, and too many other widgets would hide the background.
     """
     if not 1 < len(slots) <= _MOST_OVER + 1:
         return ""

@@ -1,7 +1,8 @@
 """Runs the passes that convert YAML documents to the model and collects their problems.
 
-The order of the passes is: compose, expand, shape, parse, link, rules. Every pass reports all its
-problems. A pass runs only if the earlier passes found no errors. Warnings do not stop a pass.
+The order of the passes is: compose, expand, shape, parse, link, rules. Each pass reports all
+problems that it finds. A pass runs only if the earlier passes found no errors. Warnings do not stop
+a pass.
 """
 
 from collections.abc import Iterable

@@ -74,7 +74,7 @@ def _replaced(written: str, new: str) -> str:
 
 
 def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
-    """Yield the content type and the path of each part of a document."""
+    """Yield the kind of content and the path of each part of a document."""
     kind = kind_of(document)
     data = document.data
     if kind == "robot" and isinstance(data, dict):

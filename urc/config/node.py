@@ -115,7 +115,7 @@ class Problems:
         return iter(self.problems)
 
     def error(self, part: Node, code: str, message: str, **place: Any) -> None:
-        """Add an error; `place` may have ``at`` (an inner key) and `Document.problem` arguments."""
+        """Add an error; `place` accepts ``at`` (an inner key) and `Document.problem` arguments."""
         self._add(part, code, message, "error", **place)
 
     def warn(self, part: Node, code: str, message: str, **place: Any) -> None:

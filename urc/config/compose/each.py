@@ -331,7 +331,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
-    """Report names that still contain braces, which the schemas do not reject."""
+    """Report names that still contain braces, because the schemas accept such names."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():

@@ -94,7 +94,7 @@ def link_requirements(linker: Linker, part: Node, command: Command) -> None:
 
 
 def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
-    """Report a command that needs two people but that `part` would run automatically."""
+    """Report a command that needs two people, because `part` would run it automatically."""
     if _needs_two(command):
         linker.problems.error(
             part,
@@ -128,8 +128,8 @@ def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
         linker.problems.error(
             part.must("run"),
             "wrong-command",
-            f"{poll.run!r} is {what}, but a poll must only read",
-            hint="run a command that only reads",
+            f"{poll.run!r} is {what}, but a poll may only read values",
+            hint="run a command that only reads values",
         )
         return
     link_arguments(linker.problems, part, command, part.named("args"), "run")

@@ -100,7 +100,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
 def _check_hold(
     part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
-    """Report a mismatch between hold-to-run output and held command; return whether they match."""
+    """Return whether a hold-to-run output has a held command; report a mismatch."""
     if port.is_held and command.hold is None:
         problems.error(
             part,

@@ -127,7 +127,7 @@ def _check_units(
 
 
 def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[str, str]]:
-    """Yield the description and unit of each signal or argument that a port is bound to."""
+    """Yield the description and unit of each signal or argument bound to an input or output."""
     single = use.inputs.get(port.name)
     for name in (single,) if single is not None else use.lists.get(port.name, ()):
         signal = driver.signals.get(name)

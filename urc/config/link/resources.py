@@ -27,7 +27,7 @@ FILE_TYPES: Final = (
     *(".urdf", ".stl", ".dae", ".glb", ".obj", ".mtl", ".md", ".txt", ".json", ".csv"),
     *(".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".wav", ".mp3", ".ogg"),
 )
-"""Served file types, without executable types."""
+"""File types that URC serves to pages; executable types are excluded."""
 
 PICTURE_TYPES: Final = (".svg", ".png", ".jpg", ".jpeg", ".webp", ".gif")
 """File types of a robot's picture, in order of preference."""
@@ -79,8 +79,9 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
 def find_picture(document: str) -> str:
     """Return the path of the robot's picture; "" without a picture.
 
-    The picture has the document's name, and is in the document's folder or in ``pictures`` there.
-    A missing picture is not an error, so a document can be copied without its picture.
+    The picture has the document's name, and is in the document's folder or its subfolder
+    ``pictures``. A missing picture is not an error, so a document can be copied without its
+    picture.
     """
     place = FilePath(document).absolute()
     for folder in (place.parent, place.parent / "pictures"):
@@ -111,7 +112,7 @@ def named_texts(
 
 
 def file_fault(name: str) -> str:
-    """Return the reason why a name cannot be that of a widget's file; "" for a possible name."""
+    """Return the reason why a widget's file cannot have this name; "" for an allowed name."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
         return "is not a path inside this folder"

@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the expected value at `part`; None if empty or invalid, or if `is_part` is set."""
+    """Return the expected value at `part`; None for null or an invalid value, or with `is_part`."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)
@@ -251,7 +251,7 @@ def _reply_to(
         problems.error(
             inner,
             "wrong-transport",
-            f"poll {waiting} waits on {poll.transport!r}, but this test does not feed"
+            f"poll {waiting} expects its reply on {poll.transport!r}, but this test does not feed"
             f" {poll.transport!r}",
         )
     return waiting

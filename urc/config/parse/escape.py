@@ -120,7 +120,7 @@ def _table(
 
 
 def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Problems) -> None:
-    """Report a replacement for an escaped byte if the replacement must be escaped itself."""
+    """Report a byte that replaces an escaped byte but must be escaped itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
         text = f"{wrong:02X} replaces an escaped byte, but must be escaped itself"

@@ -123,7 +123,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         )
     if retries and command.reply is None:
         problems.error(
-            part, "misplaced-key", "'retries' needs 'reply', because only a reply shows a failure",
+            part, "misplaced-key", "'retries' needs 'reply': a missing reply triggers a retry",
             at="retries", key=True,
         )  # fmt: skip
     if part.text("priority") == "realtime":
@@ -334,7 +334,7 @@ def _hold(part: Node, command: Command, problems: Problems) -> Hold:
 
 
 def _rest_of(command: Command) -> str:
-    """Return sample release values: zeros if 0 is within every argument's range, otherwise dots."""
+    """Return an example of `release`: zeros if 0 is in every argument's range, otherwise "…"."""
     ranges = [(one.min, one.max) for one in command.arguments.values()]
     is_both = all(low is not None and high is not None and low < 0 < high for low, high in ranges)
     names = [f"{name}: 0" for name in command.arguments] if is_both else []

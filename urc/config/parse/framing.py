@@ -185,7 +185,7 @@ def _is_switchable(kind: Node, problems: Problems) -> bool:
         kind,
         "misplaced-framing",
         f"a case of 'switch' cannot have the type {kind.data!r}",
-        hint=f"use a framing that finds the end of a frame itself: {listed(_SWITCHABLE)}",
+        hint=f"use a framing that detects the end of each frame: {listed(_SWITCHABLE)}",
     )
     return False
 

@@ -1,9 +1,9 @@
 """Rules for held commands: watchdog, lease, repetition and transport load.
 
 If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
-therefore declare the watchdog. It is an error if a lease or period contradicts the declared
-watchdog, because the motion would stutter or outlast the lease. All other problems with held
-commands are warnings.
+therefore declare the watchdog. A lease or period that is at least as long as the watchdog time is
+an error, because the watchdog would stop the robot first. Most other problems with held commands
+are warnings.
 """
 
 import math
@@ -188,7 +188,7 @@ def _check_will(
     problems.warn(
         part,
         "motion-without-will",
-        f"if the connection to the broker is lost, nothing ends {command.name!r}",
+        f"if the connection to the broker is lost, nothing stops the motion of {command.name!r}",
         key=True,
         hint=f"give {spec.name!r} a 'will' with the topic and payload of the stop, for the broker"
         " to publish",

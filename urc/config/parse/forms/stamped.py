@@ -42,7 +42,8 @@ def stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
         "bad-value",
         f"{kind!r} has no known stamped type, or 'json' is missing",
         at="stamped",
-        hint=f"geometry_msgs types to use with json: {', '.join(_FIELDS)}; write others in full",
+        hint=f"use 'json' with one of the geometry_msgs types {', '.join(_FIELDS)};"
+        " write other messages in full",
     )
     return None
 
