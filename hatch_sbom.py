@@ -35,7 +35,7 @@ class LockedPackage(NamedTuple):
     name: str
     version: str
     marker: str
-    """Environments with this version, as in PEP 508; "" for all environments."""
+    """Environments that use this version, as a PEP 508 marker; "" for all environments."""
     licence: str
     """SPDX expression."""
     hashes: tuple[str, ...]

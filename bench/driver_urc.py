@@ -1,4 +1,4 @@
-"""The driver of `bench.driver_hand` as a URC profile, run as it would be for an operator."""
+"""A URC profile with the function of `bench.driver_hand`, run in the same way as for operators."""
 
 import tempfile
 from collections.abc import AsyncIterator

@@ -25,7 +25,7 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Shortest delay that can cause a stop, in ms, and the time limit for that stop, in ns."""
+"""Machine delay above which a stop is excused, in ms, and the time before the stop, in ns."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Largest allowed number of stops per minute, by packet loss in percent.
 
@@ -76,7 +76,7 @@ def _is_still(rig: Rig, index: int) -> bool:
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
     """Drive every robot; return the minutes of motion, the stops, and the excused stops.
 
-    A stop is excused if the machine was delayed just before the stop.
+    A stop is excused if the machine was delayed by more than `LATE_MS` just before the stop.
     """
     until_s = time.monotonic() + seconds
     pages = {index: rig.drive(index, has_spare=has_spare) for index in rig.indexes}

@@ -27,7 +27,7 @@ TIMES_RELAY = 1.5
 TICKS, TICKS_IF_FULL = 150, 600
 ROUNDS, ROUNDS_IF_FULL = 3, 7
 TICK_NS = 20_000_000
-"""Tick interval in nanoseconds: shorter than a page's, longer than the profile's limit."""
+"""Tick interval in nanoseconds: shorter than a page's interval, longer than `hold.repeat`."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
 """Smallest share of ticks that must arrive; a busy machine drops some ticks."""

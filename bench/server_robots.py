@@ -97,7 +97,7 @@ def run(*, full: bool) -> Sequence[Result]:
         _result("processor time of the server / half a core", "server_core", CORE_SHARE, goal),
         _result(f"memory of the server / {RESIDENT_MB:g} MB", "server_mb", RESIDENT_MB, goal),
         # A server that is delayed by a busy machine uses less processor time.
-        _result("lines that did not reach a page / a tenth", "lost", LOST, goal),
+        _result("lines that did not reach a page / a tenth of all lines", "lost", LOST, goal),
     ]
 
 

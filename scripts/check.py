@@ -44,10 +44,9 @@ class Step:
     command: tuple[str, ...]
     timeout_s: float = HANGS_AFTER_S
     is_yielding: bool = False
-    """Whether the step runs with a lower priority, so that it does not delay steps that
-    measure times."""
+    """Whether the step has a low priority, because it must not delay steps that measure times."""
     is_measuring: bool = False
-    """Whether the step measures times, so that its session has priority over all others."""
+    """Whether the step measures times; if so, its session has priority over all other sessions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +70,7 @@ STATIC = (
 )
 PYTEST = (PYTHON, "-m", "pytest")
 PYTEST_COLUMNS = "250"
-"""Width of pytest's output, in characters; pytest truncates the errors of failed tests to it."""
+"""Width of pytest's output, in characters; pytest cuts a failed test's error to this width."""
 
 
 _HALF_OF_UNIT = (
@@ -268,7 +267,7 @@ async def _end_group(process: asyncio.subprocess.Process) -> None:
 def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, seconds: float) -> int:
     """Print a line for each step, the skipped and failed tests, and the result.
 
-    The failed tests are at the end, because many logs of a run keep only the last lines.
+    The failed tests are at the end, because many logs contain only the last lines of a run.
     Return the exit code.
     """
     print(f"\n== summary, after {seconds:.0f} s", flush=True)

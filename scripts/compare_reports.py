@@ -1,4 +1,4 @@
-"""Compare the results of two commits for the same documents, and treat renamed words as equal.
+"""Compare the results of two commits for the same documents; renamed words count as equal.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind

@@ -32,7 +32,7 @@ LANGUAGE_SERVER = (
     / "yaml-language-server"
 )
 _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
-"""Search path with the folders of server programs, which only root has in `PATH` by default."""
+"""Search path with the folders of server programs; by default, only root's `PATH` has them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
 CACHE = ROOT / "build" / "playground"
-"""Folder with the last build's compiled files, in an archive named by the hash of the sources."""
+"""Folder with the last build's compiled files, in an archive named after the sources' hash."""
 WHEELS = CACHE / "wheels"
 """Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800

@@ -70,7 +70,7 @@ class Part(NamedTuple):
     notice: str
     """Copyright notice."""
     marks: tuple[str, ...]
-    """Strings that the files contain."""
+    """Strings that identify the software in the files."""
 
 
 class Shipped(NamedTuple):

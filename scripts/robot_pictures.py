@@ -34,7 +34,7 @@ IMAGES = DOCS / "images" / "robots"
 TABLET = {"width": 1024, "height": 768}
 COLOURS = 128
 SETTLED_MS = 3000
-"""Longest wait for values before a picture is taken, in milliseconds."""
+"""Maximum time to wait for values before a picture is taken, in milliseconds."""
 READY_MS = 60_000
 
 

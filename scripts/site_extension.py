@@ -1,4 +1,4 @@
-"""The Sphinx extension for the documentation site: marks, glossary anchors, and llms.txt."""
+"""The Sphinx extension for the documentation site: anchors, links to the reference, llms.txt."""
 
 from html import escape
 from pathlib import Path

@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 def place_of(literal: str) -> Place | None:
-    """Return the place of a literal in the reference, or None if it has no place there."""
+    """Return the place in the reference that a literal links to; None for no link."""
     found = names().get(literal.rstrip(":"))
     if found is None and (command := _COMMAND.match(literal)):
         found = names().get(f"urc {command[1]}")

@@ -161,7 +161,7 @@ class CutRig:
         return range(len(self.kinds))
 
     def port(self, index: int) -> int:
-        """Return the port that identifies one robot's link when it is cut."""
+        """Return the port that identifies the robot's link in the order to cut this link."""
         first = FIRST_PORT.get(self.kinds[index])
         return self.robots.ports[index] if first is None else first + index
 
@@ -198,7 +198,7 @@ class CutRig:
             self.operators.kill(number)
 
     def drive_once(self, index: int, life_s: float) -> None:
-        """Make a page drive and release a robot.
+        """Make a page drive a robot, then release the control.
 
         The page continues to run and stays in control.
         """
@@ -341,13 +341,13 @@ def _fault(
     if any(text != "M 0" for text in texts[stop:]):
         return "the robot moved again after its stop"
     if len(moved) != len(set(moved)):
-        return "the same motion arrived twice"
+        return "the same motion value arrived twice"
     if bounds.most_late is not None and late > bounds.most_late:
-        return f"{late} late motions arrived"
+        return f"{late} late motion values arrived"
     if not bounds.is_repeated and len(texts) - stop > 2:
         return f"{len(texts) - stop} stops came"  # one may be in the kernel, one on the new link
     if not was_held and len(moved) > (bounds.most_late or 0):
-        return "motion arrived after its release" if is_noticed else ""
+        return "motion arrived after the control's release" if is_noticed else ""
     if is_noticed and bounds.is_told and stop > (bounds.most_late or 0):
         return "motion arrived before the stop"
     is_last = late == stop < len(texts)  # no fresh motion in between

@@ -282,7 +282,7 @@ class Rig:
         Args:
             from_ns: monotonic time at which the stop became due, in nanoseconds.
             until_ns: monotonic time at which the robot had received the stop, in nanoseconds.
-            watcher: the processes' watcher; by default that of the present server.
+            watcher: the watcher of the processes; by default the current server's watcher.
         """
         left_s = (until_ns + LOOK_NS - time.monotonic_ns()) / 1e9
         if left_s > 0:  # later, all waits until then are reported
@@ -293,6 +293,6 @@ class Rig:
 
 
 def _order(heard: Sequence[Heard]) -> str:
-    """Return a message if a value is older than one received before it, otherwise ""."""
+    """Return a message if a value is older than an earlier received value, otherwise ""."""
     sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
     return "" if sent == sorted(sent) else "an older value arrived after a newer value"

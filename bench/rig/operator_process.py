@@ -249,7 +249,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return the first frame's opcode and payload, and the remaining data; None if incomplete."""
+    """Return the first frame's opcode and payload and the remaining data; None if incomplete."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -344,7 +344,7 @@ def start(plan: Plan) -> int:
 
 
 def _end_with_parent() -> None:
-    """Make the kernel kill this process with its parent; a frozen process can't end itself."""
+    """Make the kernel kill this process when its parent ends; a frozen process can't end itself."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 

@@ -1,8 +1,8 @@
 """Times from revoking a right to the stop, for each kind of right that can end.
 
-In a round of trials, all robots are driven in parallel, each by its own person, device or program.
-This process then revokes the rights in the server's data folder, as ``urc people`` does, while the
-pages continue to send ticks.
+In a round of trials, all robots are driven in parallel, each by a different person, device or
+program. This process then revokes the rights in the server's data folder, as ``urc people`` does,
+while the pages continue to send ticks.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""The reference page for expressions and filters. URC computes each example's result itself."""
+"""The reference page for expressions and filters. URC computes the results of the examples."""
 
 from collections.abc import Mapping
 
@@ -18,14 +18,14 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "b64decode": ("'T0s=' | b64decode", "bytes decoded from Base64 text"),
     "b64encode": ("'OK' | b64encode", "Base64 encoding of bytes or text"),
     "ceil": ("1.2 | ceil", "number rounded up to a whole number"),
-    "checksum": ("'123456789' | checksum('crc16-modbus')", "checksum by a named algorithm"),
+    "checksum": ("'123456789' | checksum('crc16-modbus')", "checksum with a named algorithm"),
     "column": ("[[1, 2], [3, 4]] | column(1)", "one column of a list of rows"),
-    "cos": ("0 | cos", "cosine of radians"),
+    "cos": ("0 | cos", "cosine of an angle in radians"),
     "cut": ("['ab', 'cd'] | cut(1)", "slice of each text or list in a list"),
     "ddmm": ("'4730.0' | ddmm", "degrees from a number in the form DDMM.mmm, as in NMEA"),
     "default": ("none | default(5)", "replacement for a missing value"),
-    "degrees": ("0 | degrees", "radians converted to degrees"),
-    "digits": ("'0102' | digits(2, 10)", "list of numbers, each from a fixed number of digits"),
+    "degrees": ("0 | degrees", "angle in degrees, converted from radians"),
+    "digits": ("'0102' | digits(2, 10)", "list of numbers with a fixed number of digits each"),
     "exp": ("0 | exp", "exponential function"),
     "first": ("[4, 5] | first", "first element"),
     "fixed": ("2 | fixed(2)", "number with a fixed number of decimal places"),
@@ -46,11 +46,11 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "max": ("[4, 5] | max", "largest number"),
     "md5": ("'x' | md5", "MD5 hash, in hexadecimal digits"),
     "min": ("[4, 5] | min", "smallest number"),
-    "numbers": ("'4f4b' | hexbytes | numbers('u8')", "bytes decoded as numbers of one type"),
-    "pad": ("7 | pad(4)", "text with leading zeros, or another leading character"),
+    "numbers": ("'4f4b' | hexbytes | numbers('u8')", "list of numbers, decoded from bytes"),
+    "pad": ("7 | pad(4)", "text filled up with leading zeros or another leading character"),
     "pitch": ("[0, 0, 0, 1] | pitch", "pitch of a quaternion [x, y, z, w], in radians"),
-    "radians": ("0 | radians", "degrees converted to radians"),
-    "ramp": ("0 | ramp(0.5, 3)", "numbers that increase by a step"),
+    "radians": ("0 | radians", "angle in radians, converted from degrees"),
+    "ramp": ("0 | ramp(0.5, 3)", "list of numbers that increase by a fixed step"),
     "replace": ("'a-b' | replace('-', '_')", "text with replaced parts"),
     "roll": ("[0, 0, 0, 1] | roll", "roll of a quaternion [x, y, z, w], in radians"),
     "round": ("2.345 | round(1)", "rounded number"),
@@ -58,16 +58,16 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "sha256": ("'x' | sha256", "SHA-256 hash, in hexadecimal digits"),
     "sign": ("1.5 | fixed(2) | sign", "number with a sign, even if it is positive"),
     "signed": ("255 | signed(8)", "signed value of a two's complement number"),
-    "sin": ("0 | sin", "sine of radians"),
-    "split": ("'a,b' | split(',')", "parts of a text"),
+    "sin": ("0 | sin", "sine of an angle in radians"),
+    "split": ("'a,b' | split(',')", "list of the parts of a text, cut at a separator"),
     "sqrt": ("9 | sqrt", "square root"),
-    "string": ("1.0 | string", "text of a value"),
+    "string": ("1.0 | string", "value converted to text"),
     "sum": ("[4, 5] | sum", "sum of numbers"),
-    "tan": ("0 | tan", "tangent of radians"),
+    "tan": ("0 | tan", "tangent of an angle in radians"),
     "trim": ("' a ' | trim", "text without leading and trailing spaces"),
-    "unpack": ("'0102' | hexbytes | unpack('u16be', 0)", "number of a type at a byte offset"),
+    "unpack": ("'0102' | hexbytes | unpack('u16be', 0)", "number, decoded at a byte offset"),
     "upper": ("'on' | upper", "upper-case letters"),
-    "utf8": ("'OK' | utf8", "bytes of a text"),
+    "utf8": ("'OK' | utf8", "text encoded as UTF-8 bytes"),
     "yaw": ("[0, 0, 0, 1] | yaw", "yaw of a quaternion [x, y, z, w], in radians"),
 }
 """An example of each filter, and the filter's meaning."""
@@ -80,7 +80,7 @@ _OPERATORS = (
     ("`x[0]` `x[1:3]`", "element and slice"),
     ("`x is defined` `x is none`", "whether a value exists or equals `none`"),
     ("`x is number` `x is string`", "type"),
-    ("`x is match('^E')` `x is search('E')`", "whether a pattern matches at the start or anywhere"),
+    ("`x is match('^E')` `x is search('E')`", "whether a pattern matches the start or any part"),
 )
 
 
@@ -95,7 +95,7 @@ def page() -> str:
         "",
     ]
     lines += table(("written", "meaning"), _OPERATORS)
-    lines += ["## Filters", "", "URC computed each result on this page.", ""]
+    lines += ["## Filters", "", "URC computed the result of each example.", ""]
     for name, (example, meaning) in sorted(EXAMPLES.items()):
         result = compile_expression(example, allows_bytes=True).evaluate({})
         lines += [f"### {name}", "", f"{meaning[0].upper()}{meaning[1:]}.", ""]

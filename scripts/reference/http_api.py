@@ -19,7 +19,7 @@ def page() -> str:
     lines = [
         "# HTTP API reference",
         "",
-        "Every call of the [HTTP API](../api.md), with its right, body and responses.",
+        "Every call of the [HTTP API](../api.md), with the required right, body and responses.",
         "A running server serves the same content as OpenAPI at `/api/v1/openapi.json`.",
         "",
     ]

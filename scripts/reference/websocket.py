@@ -18,7 +18,7 @@ _PAGE = "Every message of the WebSocket `/ws?robot=NAME`, which the dashboard an
 def page() -> str:
     """Return the page: client messages, server messages, rows, close codes."""
     lines = ["# WebSocket messages", "", _PAGE]
-    lines += ["A message is a JSON object; the field `t` names its kind.", ""]
+    lines += ["A message is a JSON object; the field `t` contains the kind of the message.", ""]
     sent = typing.get_args(client_messages.ClientMessage)
     received = typing.get_args(server_messages.ServerMessage)
     lines += ["## From a client to the server", ""]

@@ -311,7 +311,7 @@ class Plot {
     } catch (error) {
       console.info("plot: no history:", error);
       this.face(false);
-      write(this.note, t("this installation stores no history"));
+      write(this.note, t("this installation does not store history"));
     }
   }
 

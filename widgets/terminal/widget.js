@@ -81,7 +81,7 @@ export default {
         const words = {
           empty: t("◆ type bytes, such as 06 05 FF"),
           odd: t("◆ a digit is missing: each byte has two digits"),
-          letters: t("◆ bytes contain only 0 to 9 and A to F"),
+          letters: t("◆ use only the digits 0 to 9 and A to F"),
           long: t("◆ too many bytes"),
         };
         fault = words[pairs.fault];

@@ -29,7 +29,7 @@ _MOST_BUSY_S = 600.0
 
 
 def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> Reply | None:
-    """Return the reply at `part`; None if `part` is None."""
+    """Return the reply at `part`; None without a `part`."""
     if part is None:
         return None
     own, context = parse_own_framing(part, problems, context)
