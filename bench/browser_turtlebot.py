@@ -39,7 +39,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PROFILE = ROOT / "robots/turtlebot4.yaml"
 TOPIC = "/oakd/rgb/preview/image_raw/compressed"
 THROTTLE_MS = "100"
-"""Shortest odometry interval, as in the robot's profile; camera and laser use longer ones."""
+"""Shortest odometry interval, as in the robot's profile; camera and laser send less often."""
 OURS, PICTURE, ROS = "URC", "picture alone", "roslib"
 MEASURED = ("renderer", "GPU")
 """Types of the measured processes, as Chromium names them."""

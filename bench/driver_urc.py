@@ -1,4 +1,4 @@
-"""A URC profile with the function of `bench.driver_hand`, run in the same way as for operators."""
+"""A URC profile that replaces the driver of `bench.driver_hand`, run as for an operator."""
 
 import tempfile
 from collections.abc import AsyncIterator

@@ -1,6 +1,6 @@
 """Time until a driven robot stops after its guard is killed.
 
-A new guard replaces the killed one within half a second. Before anything else, the new guard
+A new guard replaces the killed guard within half a second. Before anything else, the new guard
 sends the stop.
 """
 

@@ -3,7 +3,7 @@
 The page checks every broken document of the tests. The reports must match those of `urc validate`
 in line, column, severity, code and message. Then each round starts the emulated TurtleBot in a new
 browser profile, and drives it. A round measures the time from the click to the first camera image.
-While the stick is held, it measures the times between the dashboard's animation frames. An
+While the stick is held, the round measures the times between the dashboard's animation frames. An
 interrupted run can be continued.
 """
 
@@ -79,7 +79,7 @@ RECORD = """
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare all reports and time several starts; without `full`, a sample and fewer starts."""
+    """Compare all reports and time several starts; without `full`, compare only a sample."""
     documents = DOCUMENTS if full else Random(22).sample(DOCUMENTS, SAMPLE)  # noqa: S311
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:

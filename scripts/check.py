@@ -33,7 +33,7 @@ BUILT_SITE = "URC_BUILT_SITE"
 """Environment variable with the folder of the built site; without it, the tests build the site."""
 PROCESSORS = os.cpu_count() or 1
 HANGS_AFTER_S = 3600
-"""Timeout for a step, in seconds. A busy machine takes several times as long as an idle one."""
+"""Timeout for a step, in seconds. A busy machine takes several times as long as an idle machine."""
 
 
 @dataclass(frozen=True, slots=True)

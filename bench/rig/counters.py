@@ -130,7 +130,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control throughout and another at times; then release both, or stop sending."""
+    """Hold one control throughout and another one at times; then release both, or stop sending."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
     controller.join(Operator("hand", "hand", "drive"))
     controller.attach(session)

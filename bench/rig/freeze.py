@@ -99,8 +99,8 @@ async def freeze(
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
     If `via` is rosbridge, the robot's program is a substitute for rosbridge; if `via` is foxglove,
-    the program is the SDK's server. With `is_killed`, the program is killed instead, and a new one
-    starts after `lasts_s` seconds.
+    the program is the SDK's server. With `is_killed`, the program is killed instead, and a new
+    program starts after `lasts_s` seconds.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
@@ -162,7 +162,7 @@ class _Pause:
 
 
 class _Death:
-    """Kills the robot's program, and starts a new one on the same port."""
+    """Kills the robot's program, and starts a new program on the same port."""
 
     limit_ms = REVIVED_MS
 

@@ -227,7 +227,7 @@ class Others:
     def __init__(self, process: str) -> None:
         self.process = process
         self._everybody = [process]
-        """The process and its children, also after their parent has ended."""
+        """The process and its children, including children that outlive the process."""
         self._waited: dict[str, int] = {}
         self._has_looked = False
 

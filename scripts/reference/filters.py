@@ -47,7 +47,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "md5": ("'x' | md5", "MD5 hash, in hexadecimal digits"),
     "min": ("[4, 5] | min", "smallest number"),
     "numbers": ("'4f4b' | hexbytes | numbers('u8')", "list of numbers, decoded from bytes"),
-    "pad": ("7 | pad(4)", "text filled up with leading zeros or another leading character"),
+    "pad": ("7 | pad(4)", "text padded on the left with zeros or another character"),
     "pitch": ("[0, 0, 0, 1] | pitch", "pitch of a quaternion [x, y, z, w], in radians"),
     "radians": ("0 | radians", "angle in radians, converted from degrees"),
     "ramp": ("0 | ramp(0.5, 3)", "list of numbers that increase by a fixed step"),

@@ -46,7 +46,7 @@ export default {
       const left = leftS > 0 ? ` · ${leftS} s` : "";
       write(word, isOpen ? t("● may drive") + left : resting);
       attribute(note, "data-why", fault || (!isOpen && reason) ? "yes" : null);
-      write(note, fault || (!isOpen && reason ? `◆ ${reason}` : isOpen ? "" : t("nothing moves without it")));
+      write(note, fault || (!isOpen && reason ? `◆ ${reason}` : isOpen ? "" : t("nothing moves without this control")));
     }
 
     ctx.gate({

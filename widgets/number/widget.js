@@ -40,7 +40,7 @@ export default {
     function words(found) {
       if ("either" in found) {
         const [less, more] = found.either;
-        return t("◆ {less} or {more}? Type it without a comma", { less, more });
+        return t("◆ {less} or {more}? Type the number without a comma", { less, more });
       }
       const { fault: why } = found;
       if (why === "low") return t("◆ not below {limit}", { limit: setpoint.text(bounds.min) });

@@ -176,7 +176,7 @@ async def test_each_control_gives_exactly_its_command(
         await robot.until_got("VOLT 7.25")
         await page.fill(".number-field", "1,000")
         await page.keyboard.press("Enter")
-        note = page.locator(".number-note", has_text="1 or 1000? Type it without a comma")
+        note = page.locator(".number-note", has_text="1 or 1000? Type the number without a comma")
         await note.wait_for()
         await page.fill(".number-field", "3")
         await page.keyboard.press("ArrowUp")

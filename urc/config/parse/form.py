@@ -82,7 +82,7 @@ def read_form(part: Node) -> tuple[Node, ReadForm] | None:
 
 
 def write_form(part: Node) -> tuple[Node, WriteForm]:
-    """Return the value under ``send:`` or under the form's key inside it, and the form's module."""
+    """Return the value under ``send:``, or under the form's key there, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:

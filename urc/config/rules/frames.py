@@ -243,7 +243,7 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
                 "ambiguous-frame",
                 f"a successful reply also matches, such as {good.samples[0][:_SHOWN]!r}, and"
                 f" would count as {what}",
-                hint=f"make the pattern match {whose} only, because it is tried first",
+                hint=f"make the pattern match {whose} only, because this pattern is tried first",
             )
     _check_struct_refusals(part, reply, problems)
 

@@ -2,8 +2,7 @@
 
 If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
 therefore declare the watchdog. A lease or period that is at least as long as the watchdog time is
-an error, because the watchdog would stop the robot first. Most other problems with held commands
-are warnings.
+an error, because the watchdog would stop the robot first.
 """
 
 import math

@@ -199,7 +199,7 @@ def _unit_above(document: Document, path: Path) -> str:
 
 
 def inner_key_hint(document: Document, path: Path, known: Mapping[str, Any]) -> str:
-    """Return a hint for entries that belong inside the key before them; "" for other values.
+    """Return a hint for entries that belong inside the preceding key; "" for other values.
 
     Args:
         document: the document.
@@ -221,7 +221,7 @@ def inner_key_hint(document: Document, path: Path, known: Mapping[str, Any]) -> 
 
 
 def _mappings_above(document: Document, path: Path) -> list[Mapping[str | int, Any]]:
-    """Return the mappings on the way to a value, from the root, as far as they exist."""
+    """Return the existing mappings on the path to a value, starting at the root."""
     found: list[Mapping[str | int, Any]] = []
     inner: Any = document.data
     for part in path:

@@ -92,7 +92,7 @@ class ItemParser:
                     part.items()[place + 1],
                     "after-rest",
                     "the previous item takes the rest of the frame",
-                    hint="give the previous item a size, or put it last",
+                    hint="give the previous item a size, or move that item to the end",
                 )
 
     def _item(self, part: Node) -> Item | None:
@@ -124,7 +124,8 @@ class ItemParser:
                 part,
                 "bad-item",
                 f"expected a name or a constant after {word!r}",
-                hint=f"write '{word} speed', '{word} 8', or {{ size: {number.size} }} to skip it",
+                hint=f"write '{word} speed', '{word} 8', or {{ size: {number.size} }} to skip the"
+                " item",
             )
             return None
         constant = written_constant(rest)
