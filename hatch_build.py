@@ -1,10 +1,10 @@
-"""Build hook that adds the third-party browser modules and, to a real wheel, the data folders.
+"""Build hook that adds the browser modules and, to non-editable wheels, the data folders.
 
 npm installs the modules as pinned in the committed lock file. The modules form a separate top-level
 package, ``urc_vendor``. The modules are never written into the source tree, where the files could
 become outdated. An sdist contains the modules, so a build from an sdist needs neither npm nor the
-network. Only a real wheel contains the data folders: an editable installation reads these folders
-from the checkout. A real wheel also contains its SBOM, from hatch_sbom.py.
+network. Only a non-editable wheel contains the data folders, because an editable installation reads
+these folders from the checkout. A non-editable wheel also contains its SBOM, from hatch_sbom.py.
 """
 
 import json

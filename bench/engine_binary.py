@@ -105,7 +105,7 @@ def driver_of(text: str) -> Driver:
 
 
 class ByHand:
-    """A hand-written decoder from a byte stream to the samples of each frame."""
+    """A hand-written decoder that converts a byte stream to the samples of each frame."""
 
     def __init__(self) -> None:
         self._left = b""

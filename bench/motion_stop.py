@@ -2,8 +2,8 @@
 
 Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
 time is measured from the last effective tick to the first byte of the stop. With root access, a
-relay between network namespaces adds two kinds of link failure. Without root access, both are
-skipped with a message.
+relay between network namespaces adds two kinds of link failure. Without root access, these two
+kinds are skipped with a message.
 """
 
 import json

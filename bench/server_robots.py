@@ -79,7 +79,7 @@ LOADS = (
     Load(100, 20, 200),
     *(Load(robots, 20, robots, can_drive=True) for robots in (10, 25)),
 )
-"""All loads; one client may have at most 256 pages."""
+"""All loads to measure with `full`; one client may have at most 256 pages."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

@@ -1,6 +1,6 @@
 """All tests that `./dev test` samples: every case, and twelve times as many examples.
 
-A function with several cases is one step. A file's other functions together are one step. An
+A function with several cases is one step. All other functions of a file together form one step. An
 interrupted run can be continued.
 """
 

@@ -113,7 +113,7 @@ class Program:
                 raise AssertionError(f"{what}: not within {timeout_s:g} s; output:\n{said}")
 
     def wait_for(self, word: str, timeout_s: float = ANSWER_S, *, after: int = 0) -> list[str]:
-        """Return the words of the first line that begins with `word`, starting at index `after`."""
+        """Return the words of the first output line from index `after` that begins with `word`."""
 
         def found() -> list[str]:
             lines = (line.split() for line in self.lines[after:])

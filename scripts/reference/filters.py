@@ -25,7 +25,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "ddmm": ("'4730.0' | ddmm", "degrees from a number in the form DDMM.mmm, as in NMEA"),
     "default": ("none | default(5)", "replacement for a missing value"),
     "degrees": ("0 | degrees", "angle in degrees, converted from radians"),
-    "digits": ("'0102' | digits(2, 10)", "list of numbers with a fixed number of digits each"),
+    "digits": ("'0102' | digits(2, 10)", "list of numbers, each from a fixed number of digits"),
     "exp": ("0 | exp", "exponential function"),
     "first": ("[4, 5] | first", "first element"),
     "fixed": ("2 | fixed(2)", "number with a fixed number of decimal places"),
@@ -65,7 +65,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "sum": ("[4, 5] | sum", "sum of numbers"),
     "tan": ("0 | tan", "tangent of an angle in radians"),
     "trim": ("' a ' | trim", "text without leading and trailing spaces"),
-    "unpack": ("'0102' | hexbytes | unpack('u16be', 0)", "number, decoded at a byte offset"),
+    "unpack": ("'0102' | hexbytes | unpack('u16be', 0)", "number decoded from bytes at an offset"),
     "upper": ("'on' | upper", "upper-case letters"),
     "utf8": ("'OK' | utf8", "text encoded as UTF-8 bytes"),
     "yaw": ("[0, 0, 0, 1] | yaw", "yaw of a quaternion [x, y, z, w], in radians"),
@@ -78,9 +78,12 @@ _OPERATORS = (
     ("`x in [1, 2]`", "membership"),
     ("`'a' if test else 'b'`", "choice"),
     ("`x[0]` `x[1:3]`", "element and slice"),
-    ("`x is defined` `x is none`", "whether a value exists or equals `none`"),
+    ("`x is defined` `x is none`", "whether a value exists; whether a value is `none`"),
     ("`x is number` `x is string`", "type"),
-    ("`x is match('^E')` `x is search('E')`", "whether a pattern matches the start or any part"),
+    (
+        "`x is match('^E')` `x is search('E')`",
+        "whether a pattern matches at the start of a text; whether it matches anywhere",
+    ),
 )
 
 

@@ -29,7 +29,7 @@ class Limit(NamedTuple):
 
 def page() -> str:
     """Return the page: one table for each package of the code."""
-    lines = ["# Limits", "", "Fixed limits of URC. Nothing grows without bound.", ""]
+    lines = ["# Limits", "", "Fixed limits of URC, which bound its use of memory and time.", ""]
     every = list(limits())
     for part in sorted({one.part for one in every}):
         rows = [(one.meaning, _shown(one), f"`{one.place}`") for one in every if one.part == part]

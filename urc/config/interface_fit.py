@@ -19,7 +19,7 @@ __all__ = ["InterfaceFit", "fit_interface"]
 
 
 class InterfaceFit(NamedTuple):
-    """The widgets of a suitable interface, or the reason for the rejection."""
+    """The linked interface and its widgets, or the reason why the interface does not fit."""
 
     interface: Interface | None
     """The linked interface; None if the interface does not fit."""

@@ -192,7 +192,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first sequence with a loop among `start` and the sequences it runs; "" if none."""
+    """Return the first sequence with a loop among `start` and the sequences that it runs, or ""."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

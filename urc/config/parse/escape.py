@@ -135,6 +135,6 @@ def _check_doubled(part: Node, byte: int, marks: tuple[bytes, ...], problems: Pr
             problems.error(part, "does-not-fit", text, at="byte")
             return
         if len(mark) > 1 and mark[1] == byte:
-            text = f"the mark {mark.hex(' ')} looks like a doubled byte"
+            text = f"the mark {mark.hex(' ')} looks like a doubled escape byte"
             problems.error(part, "overlap", text, at="double")
             return

@@ -24,7 +24,7 @@ def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
     for name, inner in part.named("set").items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
-            hint = f"rename the field to _{name}, also in the expression"
+            hint = f"rename the field to _{name}, and use this name in the expression"
             problems.error(inner, "duplicate-name", text, key=True, hint=hint)
     heads = part.named("head") if "head" in part.data else {}
     for name, inner in heads.items():
@@ -53,7 +53,7 @@ def with_collected(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
     for name, inner in part.named("collect").items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
-            hint = f"rename the field to _{name}, and collect that field"
+            hint = f"rename the field to _{name}, and collect the renamed field"
             problems.error(inner, "duplicate-name", text, key=True, hint=hint)
         begin, end = inner.get("begin"), inner.get("end")
         if begin is None and end is None:
