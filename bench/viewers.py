@@ -1,9 +1,9 @@
 """Pages that only watch: they open WebSockets, select channels, and count received data.
 
 ``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. The client's number
-replaces ``{}`` in PATH. After each line on standard input and at the end of the input, the program
-prints a JSON list of the messages and bytes of each client. Frames are counted but not decoded,
-because only the server is measured.
+replaces ``{}`` in PATH. The program prints a JSON list of each client's messages and bytes after
+each line on standard input, and at the input's end. Frames are counted but not decoded, because
+only the server is measured.
 """
 
 import json

@@ -3,8 +3,8 @@
 mutmut generates the mutants and runs the tests, as configured in `[tool.mutmut]` of pyproject.toml,
 in a copy of the tree under `.mutate`. The results are stored in the copy, so an interrupted run can
 continue, and only the mutants affected by a change run again. `tests/mutants.toml` explains the
-mutants that no test can kill. The exit code is 0 if at least 90 % of the mutants are killed and all
-others are explained, 3 if mutants are untested, and 1 otherwise. Decision record:
+mutants that no test can kill. The exit code is 3 if mutants are untested, 0 if 90 % of all mutants
+are killed and the others explained, and 1 otherwise. Decision record:
 docs/decisions/0024-mutants-by-mutmut.md.
 """
 

@@ -1,7 +1,7 @@
 """Find and install the programs that the tests need besides Python.
 
-With root access, apt installs the programs. Without root, only a browser can be installed, from
-npm. The summary of ``./dev test`` lists all missing programs.
+With root access, apt installs the programs. Without root access, the script installs only a
+browser, from npm. The summary of ``./dev test`` lists all missing programs.
 """
 
 import os

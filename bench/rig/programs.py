@@ -231,7 +231,7 @@ class Robots(Program):
         """Return how long a tick may have waited for watched processes, in milliseconds.
 
         The path of a tick leads through several watched processes, and through one child of each.
-        The result is therefore the sum of their waits that overlap the span.
+        The result is therefore the sum of the processes' waits that overlap the span.
 
         Args:
             from_ns: start of the span.

@@ -46,8 +46,8 @@ def shipped_check() -> "QuickCheck":
 def fits(reference: str, value: object) -> bool:
     """Return True only if a value certainly matches the schema at ``file#/pointer``.
 
-    The passes before the shape pass call this function before they use a key. They ignore values
-    that do not match, and the shape pass reports the error.
+    The passes before the shape pass call this function before they use a key. These passes ignore
+    values that do not match, and the shape pass reports the error.
     """
     return shipped_check().is_valid_at(reference, value)
 

@@ -1,7 +1,7 @@
 """Rules for frames: patterns that match too much, and unused names.
 
-These rules only issue warnings. They report two declarations of the same frame only if an example
-frame matches both.
+These rules only issue warnings. The rules report two declarations of the same frame only if an
+example frame matches both.
 """
 
 import re

@@ -132,14 +132,14 @@ def _check_step(part: Node, hold: Hold, step_s: float, problems: Problems) -> No
             "step-backlog",
             f"the command is repeated every {shown_duration(hold.repeat_s)}, but a step takes"
             f" {shown_duration(step_s)}: a backlog of steps would move the robot after the release",
-            hint="repeat the command at the rate of the steps, or make the steps smaller",
+            hint="repeat the command at most once per step, or shorten the steps",
         )
     if step_s > LONG_LEASE_S:
         problems.warn(
             part.must("step"),
             "long-step",
             f"the robot keeps moving for {shown_duration(step_s)} after the release",
-            hint="make the steps smaller or faster: a step cannot be interrupted",
+            hint="shorten the steps, because a step cannot be interrupted",
         )
 
 

@@ -143,7 +143,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
     """Warn about a poll whose reply timeout is longer than its period.
 
-    A declared timeout that is no longer than the default causes no warning.
+    A declared timeout at or below the default causes no warning.
     """
     if poll.reply is None:
         return
