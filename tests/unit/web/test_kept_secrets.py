@@ -24,7 +24,7 @@ from urc.web.fleet.robots import Robot
 
 ADDRESS = "http://localhost:8080"
 PASSWORD = "open sesame"  # noqa: S105
-AGAIN = "Enter the value again: the stored value was entered for another destination or package."
+AGAIN = "Enter the value again: it was for another destination or package."
 
 
 class Wire:

@@ -200,7 +200,7 @@ class SettingsRoutes:
         )
         found = factory.resolved_settings(profile, kept)
         for name in untouched.keys() & found.withheld:
-            faults[name] = t("Enter it again: it was entered for another destination or package.")
+            faults[name] = t("Enter the value again: it was for another destination or package.")
         return msgspec.structs.replace(kept, destination=found.destination), faults
 
     async def _tried(
