@@ -109,7 +109,7 @@ async def test_screens_of_one_stranger_leave_seats_to_others(address: str) -> No
     try:
         said = [str(await line.recv()) for line in lines]
         assert ['"hello"' in text for text in said] == [True] * CLIENTS_OF_UNKNOWN + [False] * 3
-        assert "too many of your screens watch this robot" in said[-1]
+        assert "too many of your screens are watching this robot" in said[-1]
         assert (await asked(address, STOP, "POST"))[0] == 200
         key = headers_for(address)
         async with connect(url, origin=origin, additional_headers=key) as line:  # type: ignore[arg-type]

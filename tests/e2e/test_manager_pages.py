@@ -138,7 +138,7 @@ async def test_download_a_driver(
             await expect(dialog).to_contain_text(shop.gone_url)
             await dialog.get_by_role("button", name="Close").click()
             known = page.locator(f"[data-repository='{shop.gone_url}']")
-            await expect(known).to_contain_text("its last index is used")
+            await expect(known).to_contain_text("using its last index")
             assert installed(data) == []
             return
         await expect(dialog).to_contain_text("connects by tcp (wire): host from the settings")
@@ -149,7 +149,7 @@ async def test_download_a_driver(
         await offer.get_by_role("button", name="Install").click()
         await agree(page)
         mine = row(page, "installed", "drivers/rover")
-        await expect(mine).to_contain_text("came with: interfaces/plain 1.0.0, widgets/dial 1.0.0")
+        await expect(mine).to_contain_text("depends on: interfaces/plain 1.0.0, widgets/dial 1.0.0")
         await expect(page.locator(":focus")).to_have_count(1)
         assert installed(data) == ["drivers/rover 1.0.0"]
         await page.goto(address)
@@ -352,7 +352,7 @@ async def test_an_update_says_what_it_changes_and_can_be_taken_back(
             await page.goto(address)
             await expect(page.locator("main")).to_contain_text("drivers/rover 1.1.0")
             await page.goto(f"{address}drivers")
-            await mine.get_by_role("button", name="Back to 1.0.0").click()
+            await mine.get_by_role("button", name="Restore 1.0.0").click()
             await expect(mine).to_have_attribute("data-version", "1.0.0")
             assert installed(data) == ["drivers/rover 1.0.0", "interfaces/wide 1.0.0"]
 
@@ -392,7 +392,7 @@ async def test_back_stops_what_is_held_and_gives_the_controls_back(new_page: Pag
         await first.evaluate("document.querySelector('[data-back]').click()")
         await robot.until_stopped()
         await first.wait_for_url(address.removesuffix("robots/puppet/"))
-        await expect(second.locator("[data-who]")).to_have_text("Nobody drives")
+        await expect(second.locator("[data-who]")).to_have_text("No one is driving")
         assert robot.is_open
         await second.get_by_role("link", name="Back: disconnect").click()
         await until(lambda: not robot.is_open)

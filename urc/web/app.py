@@ -113,7 +113,7 @@ class DashboardOptions:
     data: Path | None = None
     """Folder for the latches and the audit log; with None, neither is stored."""
     audit: AuditLog | None = None
-    """The folder's audit log, already open; the application closes it at the end. With None, the
+    """Open audit log of the folder, which the application closes when it ends. With None, the
     application opens the log."""
     tiles: Path | None = None
     """Folder with map tiles, ``z/x/y.png``; None if the server has no tiles."""
@@ -128,7 +128,7 @@ class DashboardOptions:
     recordings: Path | None = None
     """Recordings folder; None disables recordings."""
     certificates: Certificates | None = None
-    """Certificates for HTTPS, with an authority that devices may trust; None for plain HTTP."""
+    """Certificates for HTTPS; None for plain HTTP."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
     """Options of the sign-in methods."""
     notifier: AlarmNotifier | None = None

@@ -42,7 +42,7 @@ COMMANDS_AT_ONCE = 16
 STALL_S = 15.0
 GOODBYE_S = 2.0
 
-SIGNED_OUT = "your sign-in has ended, or you may no longer watch this robot"
+SIGNED_OUT = "your sign-in has ended, or you no longer have the right to watch this robot"
 
 log = logging.getLogger(__name__)
 
@@ -86,9 +86,9 @@ class BrowserClient:
             names = ", ".join(setting.name for setting in missing)
             await self._refuse(wire.CLOSE_NOT_READY, f"missing settings: {names}")
         elif self._service.is_full:
-            await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
+            await self._refuse(wire.CLOSE_FULL, "too many clients are watching this robot")
         elif not self._service.has_room_for(self._peer):
-            await self._refuse(wire.CLOSE_FULL, "too many of your screens watch this robot")
+            await self._refuse(wire.CLOSE_FULL, "too many of your screens are watching this robot")
         else:
             with self._service.visit(self._peer.who):
                 await self._visit()
@@ -133,7 +133,7 @@ class BrowserClient:
         return None
 
     async def _read_early(self) -> str:
-        """Read while the session opens; return why the page must close, or "" if it disconnected.
+        """Read while the session opens; return why to close the page, or "" if it disconnected.
 
         STOP is handled immediately and cancels waiting requests about the lease, so that an earlier
         reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All other

@@ -35,7 +35,7 @@ __all__ = [
 
 
 def spoken(line: str) -> str:
-    """Return a line in the current language; texts other than a `Phrase` stay unchanged."""
+    """Return a `Phrase` as text in the current language; return any other text unchanged."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:

@@ -113,7 +113,7 @@ class Select {
     write(this.now, (state ? (now?.label ?? state.text) : "—") + sign);
     this.mark(shown, !giver.isReady);
     const wished = this.choices.find(({ value }) => value === wish.value)?.label ?? "";
-    const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports otherwise", { wish: wished }) : "";
+    const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";
     write(this.note, giver.note(missed, state ? noteOf(state, ctx.t) : ""));
   }
 

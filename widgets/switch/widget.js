@@ -121,7 +121,7 @@ class Switch {
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
     write(this.word, (isKnown ? words[shown ? 1 : 0] ?? "" : state?.text ?? "—") + sign);
     const wished = words[wish.value === true ? 1 : 0] ?? "";
-    const missed = wish.isMissed ? this.ctx.t("≠ requested {wish}; the robot reports otherwise", { wish: wished }) : "";
+    const missed = wish.isMissed ? this.ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";
     write(this.note, giver.note(missed, state ? noteOf(state, this.ctx.t) : ""));
   }
 }

@@ -31,7 +31,7 @@ export default {
       attribute(root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
       const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
       write(text, (isHoped ? String(wish.value) : (state?.text ?? "—")) + sign);
-      const missed = wish.isMissed ? t("≠ requested {wish}; the robot reports otherwise", { wish: String(wish.value) }) : "";
+      const missed = wish.isMissed ? t("≠ requested {wish}; the robot reports another value", { wish: String(wish.value) }) : "";
       write(note, [fault, giver.note(missed, state ? noteOf(state, t) : "")].filter(Boolean).join(" · "));
       if (!field) return;
       attribute(field, "aria-invalid", fault ? "true" : null);

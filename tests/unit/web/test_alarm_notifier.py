@@ -253,7 +253,7 @@ def test_the_file_is_read(tmp_path: Path) -> None:
         ("url: https://me:pass@x.example/a\n", "expected a URL"),
         ("url_file: missing\n", "cannot be read"),
         ("url_file: open\n", "all users of this machine can access"),
-        ("command: [a]\nsecret_file: token\n", "'secret_file' is only for a URL"),
+        ("command: [a]\nsecret_file: token\n", "'secret_file' needs a URL"),
         ("command: [a]\npriority: urgent\n", "expected low, medium or high"),
         ("command: [a]\nreturned: maybe\n", "expected true or false"),
         ("command: [a]\ntimeout_s: 0\n", "expected a number from 1 to 60"),

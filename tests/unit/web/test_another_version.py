@@ -255,7 +255,7 @@ def test_what_a_package_uses_by_itself_is_agreed_to_apart(tmp_path: Path) -> Non
         assert "shell logs in with the keys of your SSH agent" in job["risks"]
         refused = agree(client, job)
         assert refused.status_code == 422
-        assert "accesses this machine beyond its settings" in refused.json()["error"]
+        assert "uses files, programs or hosts without a setting" in refused.json()["error"]
         assert agree(client, job, takesRisks=True).json()["state"] == "done"
 
 

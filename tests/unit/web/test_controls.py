@@ -371,7 +371,7 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
         (tmp_path / "latches").unlink()
         it.say(bob, "reset")
         await file.settle()
-        assert it.hub.notes[-1].text == "STOP would again survive a restart of the server"
+        assert it.hub.notes[-1].text == "STOP is stored again and survives a restart of the server"
 
 
 async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_restart(

@@ -94,7 +94,7 @@ def test_bytes_are_pasted_as_hex_or_as_text() -> None:
         pasted_bytes("42 4", is_hex=True, encoding="utf-8")
     with pytest.raises(UrcError, match=r"character 2: .* found \\q"):
         pasted_bytes(r"a\q", is_hex=False, encoding="utf-8")
-    with pytest.raises(UrcError, match="cannot be written in ascii"):
+    with pytest.raises(UrcError, match="cannot be encoded as ascii"):
         pasted_bytes("ü", is_hex=False, encoding="ascii")
     with pytest.raises(UrcError, match="at most 65536 are parsed"):
         pasted_bytes("x" * 70_000, is_hex=False, encoding="utf-8")

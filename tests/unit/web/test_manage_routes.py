@@ -196,7 +196,8 @@ def test_what_is_installed_stands_on_the_menu(tmp_path: Path) -> None:
         assert "No driver yet" in client.get("/").text
         assert client.get("/robots/rover/settings").status_code == 404
         again = client.post("/api/v1/packages/remove", json={"package": "drivers/rover"})
-        assert again.json()["error"] == "drivers/rover is not installed, or only as a dependency"
+        text = "drivers/rover is not installed, or is installed only as a dependency"
+        assert again.json()["error"] == text
 
 
 def test_a_damaged_package_costs_its_own_card(tmp_path: Path) -> None:

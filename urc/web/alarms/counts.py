@@ -17,7 +17,7 @@ def count_of(
     """Return the counts of a robot's annunciated alarms.
 
     Args:
-        robot: the robot's name in paths.
+        robot: the robot's name in URLs.
         records: all alarms outside the normal state.
         is_monitored: whether the robot stays connected to monitor its alarms.
     """

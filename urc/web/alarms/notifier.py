@@ -69,7 +69,7 @@ class AlarmNotifier:
     """A queue of all robots' alarms, with a thread that calls the hook."""
 
     def __init__(self, options: NotifyOptions, now: Callable[[], float] = time.monotonic) -> None:
-        """Prepare the queue; the thread starts with the first alarm."""
+        """Prepare the queue; the thread starts when the first alarm is queued."""
         self._options = options
         self._now = now
         self._waiting: list[_QueuedAlarm] = []

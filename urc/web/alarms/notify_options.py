@@ -62,7 +62,7 @@ def read_notify_options(file: str) -> NotifyOptions:
         raise given.fault((), "expected exactly one of command, url and url_file", "missing-key")
     is_command = ways == ["command"]
     if is_command and "secret_file" in given.data:
-        text = "'secret_file' is only for a URL; a command reads its own secrets"
+        text = "'secret_file' needs a URL; a command must read its own secrets"
         raise given.fault(("secret_file",), text, is_key=True)
     priority = given.text("priority", "medium")
     if priority not in get_args(AlarmPriority):

@@ -70,7 +70,7 @@ class AlarmCalls:
         """Create the endpoints.
 
         Args:
-            services: function that returns the robots, keyed by their names in paths.
+            services: function that returns the robots, keyed by their names in URLs.
             store: the alarm store; None if the server has no data folder.
             recorder: receives an audit entry for each action.
             notifier: sender of alarm notifications; None if the server has no hook.

@@ -164,7 +164,7 @@ class AcknowledgeAsked(AlarmMessage, frozen=True):
     """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """`raised` number of each signal's alarm; an alarm that has been raised again is skipped."""
+    """`raised` number of the alarm, by signal. An alarm that has been raised again is skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):
@@ -185,6 +185,6 @@ class AlarmAction(AlarmMessage, frozen=True):
     """Result of an action on alarms."""
 
     signals: tuple[str, ...]
-    """Signals whose alarm changed."""
+    """Names of the signals whose alarms changed."""
     stored: bool
     """Whether the change is stored and survives a restart."""

@@ -39,7 +39,7 @@ def summary(
     """Return a robot's list entry.
 
     Args:
-        name: the robot's name in paths.
+        name: the robot's name in URLs.
         service: the robot.
         role: the visitor's role for the robot.
         times: when the robot was last used and last sent data.
@@ -78,7 +78,7 @@ def robot_info(
     """Return a robot with its signals and commands.
 
     Args:
-        name: the robot's name in paths.
+        name: the robot's name in URLs.
         service: the robot.
         role: the visitor's role for the robot.
         may_give: function that returns whether the visitor's token permits a command.

@@ -1,4 +1,4 @@
-"""A robot's document as one YAML file, without this machine's paths.
+"""A robot's document as one YAML file, without the server's folder paths.
 
 Layer 5. A document contains no setting values and therefore no secrets from settings. Call
 `document_of` in a thread, because it blocks while it reads the source files.
@@ -16,7 +16,7 @@ __all__ = ["document_of"]
 
 
 def document_of(profile: Profile) -> bytes:
-    """Return the profile merged with all its documents.
+    """Return a profile as one YAML file, merged with its driver, interfaces and other documents.
 
     The comments contain the file name and line of each key, without folders.
 

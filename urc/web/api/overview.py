@@ -66,7 +66,7 @@ def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
     alarms are not counted. The function needs no session.
 
     Args:
-        name: the robot's name in paths.
+        name: the robot's name in URLs.
         service: the robot.
     """
     records = service.alarms.list.records.values()

@@ -78,7 +78,7 @@ class RecordingCalls:
         """Create the endpoints.
 
         Args:
-            services: function that returns the robots, keyed by their names in paths.
+            services: function that returns the robots, keyed by their names in URLs.
             folder: recordings folder; None disables recordings.
             audit: receives an entry for each start, end and download.
         """
@@ -86,7 +86,7 @@ class RecordingCalls:
         self._audit = audit
         self._folder = folder
         self._running: dict[str, _Running] = {}
-        """Recordings started by programs, keyed by the robot's name in paths."""
+        """Recordings started by programs, keyed by the robot's name in URLs."""
 
     def endpoints(self) -> dict[str, Endpoint]:
         """Return the endpoints, keyed by call name."""

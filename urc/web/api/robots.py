@@ -78,7 +78,7 @@ class RobotCalls:
         """Create the endpoints.
 
         Args:
-            services: function that returns the robots, keyed by their names in paths.
+            services: function that returns the robots, keyed by their names in URLs.
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.
             times: function that returns when a robot was last used and last sent data.
@@ -207,7 +207,7 @@ class RobotCalls:
         """Run a command and return the values of its reply.
 
         Args:
-            name: name of the robot in paths.
+            name: name of the robot in URLs.
             service: the robot.
             peer: the visitor, who has the right `DRIVE` for the robot.
             wanted: name of the command.
@@ -244,7 +244,7 @@ class RobotCalls:
         known = session.service.robot.profile.driver.commands[wanted]
         questioned = questions(known, asked.arguments)
         if any(one.is_two_person for one in questioned):
-            text = "two people must confirm this command: run it on a page"
+            text = "two people must confirm this command: send it from a page"
             raise ApiError(428, text, "needs-two-people")
         if not questioned or not asked.confirmed:
             return ""

@@ -77,14 +77,14 @@ class ActiveAlarms(ApiMessage, frozen=True):
     count: int = 0
     """Number of annunciated alarms: all except normal, shelved and suppressed alarms."""
     worst: str = ""
-    """Highest priority of all alarms; "" if there are no alarms."""
+    """Highest priority of the annunciated alarms; "" if there are no such alarms."""
 
 
 class RobotSummary(ApiMessage, frozen=True):
     """A robot as a list entry."""
 
     name: str
-    """The robot's name in paths."""
+    """The robot's name in URLs."""
     title: str
     summary: str
     tags: tuple[str, ...]
@@ -153,7 +153,7 @@ class ArgumentInfo(ApiMessage, frozen=True):
     size: int | None
     """Required number of elements of an array; null for any number."""
     confirm: dict[str, ConfirmInfo]
-    """Confirmation questions by argument value."""
+    """Maps argument values to the confirmation questions that they require."""
 
 
 class HoldInfo(ApiMessage, frozen=True):
@@ -364,7 +364,7 @@ class RecordingInfo(ApiMessage, frozen=True):
     """A recording file."""
 
     file: str
-    """Name of the file, as used in paths."""
+    """Name of the file, as used in URLs."""
     robot: str
     """Name of the recorded robot."""
     began: str

@@ -1,8 +1,8 @@
 """The WebSocket that sends a robot's traffic to one developer page and answers the page's requests.
 
-Layer 5. Each page has its own backlog of traffic; if it is full, the oldest rows are dropped and
-counted. A page that reads no data for `STALL_S` seconds is disconnected. A thread handles the
-page's requests one by one; the number of pending requests is limited.
+Layer 5. Each page has its own backlog of traffic; when a backlog is full, its oldest rows are
+dropped and counted. A page that reads no data for `STALL_S` seconds is disconnected. A thread
+handles the page's requests one by one; the number of pending requests is limited.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""The developer start page: one robot with fixed values and a button to reload its documents.
+"""The developer start page: one robot with its fixed settings and a button to reload its documents.
 
 Layer 5. These routes exist only with ``--dev`` and require the start key. The developer page loads
 a document as soon as it is saved. The start page's button reloads all documents, even if the server
@@ -33,7 +33,7 @@ _NO_STORE = {"cache-control": "no-store"}
 
 @dataclass(frozen=True, slots=True)
 class PinnedRobot:
-    """One robot with its fixed values."""
+    """One robot with its fixed settings."""
 
     name: str
     title: str
@@ -46,7 +46,7 @@ class PinnedRobot:
 
 @dataclass(frozen=True, slots=True)
 class DevStartPage:
-    """Context for ``dev_start.html.j2``: the fixed values and the start button."""
+    """Context for ``dev_start.html.j2``: the fixed settings and the start button."""
 
     head: PageHead
     nav: Nav

@@ -60,7 +60,7 @@ class ParsedPiece(NamedTuple):
     """Reason why the bytes are not a frame; "" if they are a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
-    """Reason why each candidate does not match; empty if any candidate matches."""
+    """For each candidate, the reason why it does not match; empty if a candidate matches."""
 
 
 class ParseResult(NamedTuple):
@@ -174,7 +174,7 @@ def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:
-            raise UrcError(f"expected JSON for a message of {spec.type}: {error}") from None
+            raise UrcError(f"expected JSON for a {spec.type} message: {error}") from None
     if topic:
         return Envelope("message", {"topic": topic}, body)
     return Envelope("response", {"id": 1, "ok": True}, body)
@@ -269,7 +269,7 @@ def _candidates(
 
 
 def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
-    """Yield all expected replies on a transport, one for each stage and step."""
+    """Yield each reply expected on a transport, with its name, including stages and steps."""
     asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
     asked += [
         (f"reply to poll {one.name}", one.transport, one.reply)
@@ -324,7 +324,7 @@ def _from_text(text: str, encoding: str) -> bytes:
         return bytes(data + text[at:].encode(encoding))
     except UnicodeEncodeError as error:
         wrong = text[error.start : error.end]
-        raise UrcError(f"{wrong!r} cannot be written in {encoding}") from None
+        raise UrcError(f"{wrong!r} cannot be encoded as {encoding}") from None
 
 
 def _all(names: Mapping[str, object]) -> str:

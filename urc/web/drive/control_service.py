@@ -340,13 +340,13 @@ class ControlService:
         self._set_expiry()
 
     def _scope_refusal(self, operator: OperatorSession, verb: wire.Verb) -> str:
-        """Return why a token limited to certain commands forbids a request; "" if permitted."""
+        """Return why the token's command limit forbids a request; "" if it is permitted."""
         may_give = operator.rights.may_give
         if verb not in ("take", "ask", "force", "reset") or may_give(""):
             return ""
         if verb != "reset" and any(map(may_give, self.commands)):
             return ""
-        return OUT_OF_SCOPE if verb != "reset" else "a token for certain commands cannot reset STOP"
+        return OUT_OF_SCOPE if verb != "reset" else "a token with command limits cannot reset STOP"
 
     def _thin(self, operator: OperatorSession, tick: wire.Tick) -> None:
         now = self._clock.now()
@@ -449,7 +449,7 @@ class ControlService:
             for operator in self._operators.values():
                 operator.notice("latch", wire.encode_refused("latch", "", text))
         else:
-            self._log("info", "STOP would again survive a restart of the server")
+            self._log("info", "STOP is stored again and survives a restart of the server")
 
     def _held_up(self, late_s: float, is_first: bool) -> None:
         if late_s > TOO_LATE_S:

@@ -87,7 +87,7 @@ class OperatorSession:
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether a message's number shows that it is not a duplicate."""
+        """Return whether a message is new, according to its number."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:

@@ -85,12 +85,12 @@ class SocketFlow:
         self.resume()
 
     def pause(self) -> None:
-        """Record that the kernel's buffer is full."""
+        """Record that the kernel accepts no more data."""
         self._is_free = False
         self._writable.clear()
 
     def resume(self) -> None:
-        """Record that the kernel's buffer is empty."""
+        """Record that the kernel has accepted all written data."""
         self._is_free = True
         self._writable.set()
 

@@ -17,8 +17,8 @@ __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
 """Time limit for reusing an encoded image, in seconds. The message contains the image's age at the
-time of encoding. A reused message's age is a few milliseconds too low, which does not justify
-another copy of several kilobytes."""
+time of encoding. A reused message therefore states an age up to 50 ms too low; this small error
+does not justify another copy of several kilobytes."""
 
 
 class EncodedImage(NamedTuple):

@@ -120,7 +120,7 @@ class Fleet:
         return t("a pending stop") if service.is_open else ""
 
     def is_out_of_reach(self, name: str) -> bool:
-        """Return whether a robot has no operator, client or connection, as with a wrong address."""
+        """Return whether a robot has no operator, client or live connection."""
         service = self.services.get(name)
         if service is None or service.controls.controller.lease.state.holder is not None:
             return False

@@ -1,7 +1,7 @@
 """Calls of a robot's services by one visitor, with the checks of the HTTP API.
 
-Layer 5. A call is a command of the HTTP API in another form: it has the same rights, limits,
-interlock, confirmations and audit entries.
+Layer 5. A call runs a command with the same rights, limits, interlock, confirmations and audit
+entries as in the HTTP API.
 """
 
 from collections.abc import Callable, Mapping

@@ -44,7 +44,7 @@ RETRY_S: Final = 1.0
 GOODBYE_S: Final = 2.0
 _BURST: Final = 64
 """Maximum number of messages that are sent before other tasks run."""
-_SIGNED_OUT: Final = "your sign-in has ended, or you may no longer watch any robot"
+_SIGNED_OUT: Final = "your sign-in has ended, or you no longer have the right to watch a robot"
 
 log = logging.getLogger(__name__)
 
@@ -281,7 +281,7 @@ class FoxgloveClient:
         return found is not None and found[1].command == STOP
 
     def _stop(self, said: wire.ServiceCall) -> None:
-        """Press STOP now; respond when the robot has received it or a short wait has ended."""
+        """Press STOP immediately; respond after the robot received it, or after a short wait."""
         offer, _ = self._offers.services[said.service]
         try:
             self._calls.press_stop(offer)

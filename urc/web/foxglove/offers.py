@@ -1,7 +1,7 @@
-"""The channels and services that the server offers to one visitor, by the visitor's current rights.
+"""The channels and services that one visitor's current rights permit.
 
-Layer 5. Pure, except for the tasks that the client adds. Channel and service ids come from one
-counter, so no id is ever reused.
+Layer 5. Pure, except that the client stores a task in each `Offer`. Channel and service ids come
+from one counter, so no id is ever reused.
 """
 
 import asyncio
@@ -33,7 +33,8 @@ class RobotContents(NamedTuple):
 class RobotCatalogue:
     """The topics and services of all robots, created once for all clients.
 
-    Creating them for a hundred robots would block the event loop for too long.
+    Creating the topics and services of a hundred robots for each client would block the event loop
+    for too long.
     """
 
     def __init__(self) -> None:

@@ -67,7 +67,7 @@ class Outbox:
         self._wake()
 
     def warn(self, robot: str, text: str) -> None:
-        """Add the status of a robot, unless the client already knows it."""
+        """Add the status of a robot, unless its last status has the same text."""
         if self._warned.get(robot) != text:
             self._warned[robot] = text
             self.tell(f"robot {robot}", text)
@@ -93,7 +93,7 @@ class Outbox:
     # What is sent
 
     def frames(self, *, has_messages: bool) -> Iterator[bytes]:
-        """Remove and yield WebSocket frames; `has_messages` includes the robots' messages."""
+        """Remove and yield WebSocket frames; with `has_messages`, also the robots' messages."""
         while (frame := self._next(has_messages=has_messages)) is not None:
             yield frame
             self._report_dropped()

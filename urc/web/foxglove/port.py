@@ -1,7 +1,7 @@
 """A separate port for the Foxglove server, for viewers that expect an address without a path.
 
-Layer 5. The port belongs to the dashboard's server, so its sign-in, certificates and limits apply.
-Only the path differs: on this port, each WebSocket is a Foxglove client.
+Layer 5. The port belongs to the dashboard's server, so the server's sign-in, certificates and
+limits apply. Only the path differs: on this port, each WebSocket is a Foxglove client.
 """
 
 from starlette.responses import PlainTextResponse

@@ -116,7 +116,7 @@ class RobotFeed:
     # -- events of the hub
 
     def _sort(self) -> None:
-        """Find the subscribed signals and slots that each signal changes."""
+        """Map each signal to the subscribed signals and slots that it changes."""
         self._sources = {}
         for source in self._waiting:
             names = {source.name}

@@ -1,8 +1,8 @@
 """A robot's commands as Foxglove services.
 
 Layer 5. Pure. Held commands are not offered, because a call cannot report that the operator has
-released the control. STOP is a service of every robot that can move. Its name is in capitals, so no
-command can have the same name.
+released the control. STOP is a service of every robot that can move. Command names are in lower
+case, so no command can have the name ``STOP``.
 """
 
 import json
@@ -45,7 +45,7 @@ class RobotServiceType(NamedTuple):
 
 
 def robot_services(robot: str, driver: Driver) -> tuple[RobotServiceType, ...]:
-    """Return the services of a robot, whose name in URLs is `robot`, for a visitor with all roles.
+    """Return a robot's services for a visitor with all roles; `robot` is the robot's name in URLs.
 
     Each visitor is offered `STOP` and only the commands that the visitor may run.
     """
@@ -69,7 +69,7 @@ def request_of(data: bytes) -> tuple[Arguments, bool]:
         data: JSON text; empty text means no arguments.
 
     Raises:
-        BadRequest: the text is not a JSON object of plain arguments.
+        BadRequest: the text is not a JSON object, or an argument has an unsupported type.
     """
     try:
         fields = _arguments.decode(data) if data.strip() else {}

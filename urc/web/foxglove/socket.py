@@ -1,8 +1,9 @@
 """The socket of the Foxglove server, and the token in its address.
 
 Layer 5. Viewers such as Foxglove run in browsers, where a program cannot add a header to a
-WebSocket. The address may therefore contain the token: ``/api/v1/foxglove?token=TOKEN``. A page
-from another site does not know the token, so such a request may come from any site.
+WebSocket. The address may therefore contain the token: ``/api/v1/foxglove?token=TOKEN``. A request
+with a token in its address may come from any site, because pages from other sites do not know the
+token.
 """
 
 import secrets

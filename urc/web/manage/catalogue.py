@@ -77,7 +77,7 @@ class PackageCatalog:
         return search(entries, words.split())
 
     def versions(self, key: PackageId) -> list[IndexEntry]:
-        """Return all versions of a package that are not withdrawn, newest first."""
+        """Return all versions of a package except withdrawn versions, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 

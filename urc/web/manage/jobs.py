@@ -53,7 +53,7 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """The package's access to this machine beyond its settings, one line per access."""
+    """Files, programs and hosts that the package uses without a setting, one per line."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
@@ -74,7 +74,7 @@ class Job:
     number: int
     title: str
     state: JobState = "working"
-    line: str = phrase("asking the repositories")
+    line: str = phrase("contacting the repositories")
     done: int = 0
     of: int = 0
     notes: list[str] = field(default_factory=list)
@@ -122,7 +122,7 @@ class _ReportingSource:
 
     def entries(self) -> tuple[IndexEntry, ...]:
         self._check()
-        self._job.line = phrase("asking {place}", place=self._source.name)
+        self._job.line = phrase("contacting {place}", place=self._source.name)
         return self._source.entries()
 
     def fetch(self, entry: IndexEntry) -> bytes:
@@ -192,8 +192,8 @@ class Jobs:
 
         Args:
             number: number of the job.
-            takes_risks: whether the user also approved the access to this machine beyond the
-                settings.
+            takes_risks: whether the user also approved the files, programs and hosts that the
+                package uses without a setting.
             unsigned: names of unsigned packages that the user accepts.
 
         Raises:
@@ -206,7 +206,8 @@ class Jobs:
             raise Busy("no job is waiting for approval: start a new job")
         if planned.risks and not takes_risks:
             raise PackageError(
-                f"{planned.plan.lock} accesses this machine beyond its settings: approve this too"
+                f"{planned.plan.lock} uses files, programs or hosts without a setting:"
+                " approve this too"
             )
         plan = planned.plan._replace(waived=frozenset(unsigned))
         if lacks := [one for one in planned.unsigned if one not in plan.waived]:

@@ -230,7 +230,7 @@ class Manager:
             and required.range in ("*", lock.version)
         ]
         if not meant:
-            raise PackageError(f"{required} is not installed, or only as a dependency")
+            raise PackageError(f"{required} is not installed, or is installed only as a dependency")
         return meant
 
     def forgettable(self, required: PackageRequirement) -> list[str]:

@@ -207,7 +207,7 @@ class ManageRoutes:
         """
         said = await body_of(request, RefreshRequest)
         self._manager.catalogue.refresh(force=said.force and _may_manage(request))
-        return answer(ResultLine(t("asking the repositories")), 202)
+        return answer(ResultLine(t("contacting the repositories")), 202)
 
     @_api
     async def connect(self, request: Request) -> Response:
@@ -264,7 +264,7 @@ class ManageRoutes:
         said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
         self._record(request, "restore", [str(old)])
-        return answer(RemovedPackages((), t("{name} is back", name=old)))
+        return answer(RemovedPackages((), t("restored {name}", name=old)))
 
     @_api
     async def remove(self, request: Request) -> Response:

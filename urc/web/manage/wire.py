@@ -81,7 +81,7 @@ class JobDecision(ManageMessage, frozen=True):
 
     number: int
     takes_risks: bool = False
-    """Whether the user also approved the package's access to this machine beyond its settings."""
+    """Whether the user also approved everything in the job's `risks`."""
     unsigned: Annotated[tuple[_Short, ...], msgspec.Meta(max_length=128)] = ()
     """Unsigned packages that the user accepts, such as ``widgets/dial``."""
 
@@ -99,15 +99,15 @@ class JobNews(ManageMessage, frozen=True):
     """The job's current activity or result, in one line."""
     done: int
     of: int
-    """Number of steps in the job; 0 while the number is unknown."""
+    """Number of downloads in the job; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
     """Origin and signer of each package; for an update, the changed versions."""
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """The package's access to this machine beyond its settings, one line per access; for an update,
-    only additional access."""
+    """Files, programs and hosts that the package uses without a setting, one per line; for an
+    update, only additional ones."""
     unsigned: tuple[str, ...] = ()
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""

@@ -114,7 +114,7 @@ class PeoplePages:
 
 
 class CodePages:
-    """The routes of the pages that code links open for new devices, invited people and guests."""
+    """The routes of the pages that open from links with codes, such as invitations."""
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes."""

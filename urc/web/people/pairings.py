@@ -1,6 +1,6 @@
 """The administrators' pending pairings, one for each displayed code.
 
-Layer 5. Pure. The store contains the codes. This module keeps only their digests.
+Layer 5. Pure. Like the store, this module keeps only the digests of the codes.
 """
 
 import secrets

@@ -32,8 +32,8 @@ DEVICE: Final = "urc-device-"
 SECURE: Final = "__Host-"
 """Prefix of all cookie names over TLS (RFC 6265bis, 4.1.3.2)."""
 OLD_COOKIES: Final = 8
-"""Maximum number of cookies from earlier starts in one browser. Above the limit, all such cookies
-are deleted."""
+"""Maximum number of cookies from earlier server starts in one browser. Above the limit, all such
+cookies are deleted."""
 COOKIE_S: Final = 400 * 24 * 3600
 """Lifetime of sign-in cookies, in seconds; the server decides when a sign-in ends."""
 CLOCK_S: Final = 60.0
@@ -134,8 +134,8 @@ class Access:
     def _holder(self, cookies: Iterable[tuple[str, str]], name: str) -> Identity:
         """Return the identity from the cookies with a given name, or `NOBODY`.
 
-        All cookies with the name are tried, because programs on other ports of a machine may set
-        some of them.
+        All cookies with the name are tried, because programs on other ports of the same host can
+        set cookies with this name.
         """
         for stored, secret in cookies:
             if stored == name:

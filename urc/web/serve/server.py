@@ -241,18 +241,18 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
             super().data_received(data[at:])
 
     def pause_writing(self) -> None:
-        """Notify the client that the kernel's buffer is full."""
+        """Notify the client that the kernel accepts no more data."""
         super().pause_writing()
         self._urc_flow.pause()
 
     def resume_writing(self) -> None:
-        """Notify the client that the kernel's buffer is empty."""
+        """Notify the client that the kernel has accepted all written data."""
         super().resume_writing()
         self._urc_flow.resume()
 
 
 def _kept(stack: contextlib.ExitStack, host: str, port: int, flag: str) -> socket.socket:
-    """Listen until `stack` closes; no transport may connect to the port."""
+    """Listen until `stack` closes; the robots' transports cannot connect to this port."""
     listener = _listen(host, port, flag)
     stack.callback(listener.close)
     stack.enter_context(OWN_DOORS.kept(listener))

@@ -72,7 +72,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             self._on_data()
 
     def eof_received(self) -> bool | None:
-        """Close the connection, because data without a TLS closing message may be incomplete."""
+        """Close the connection, because data without a TLS close message may be incomplete."""
         self._in.write_eof()
         if isinstance(self._protocol, asyncio.Protocol) and not self._is_closing:
             self._protocol.eof_received()
@@ -88,7 +88,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             protocol.connection_lost(exc)
 
     def pause_writing(self) -> None:
-        """Notify the upper protocol that the kernel's buffer is full."""
+        """Notify the upper protocol that the kernel accepts no more data."""
         if self._protocol is not None:
             self._protocol.pause_writing()
 

@@ -16,8 +16,9 @@ from urc.web.serve.tls_connection import TlsConnection
 __all__ = ["HANDSHAKES", "HANDSHAKE_S", "SHARE", "FirstBytes", "Handshakes"]
 
 HANDSHAKES = 128
-"""Maximum number of unfinished handshakes. Above the limit, the address with the most handshakes
-loses one: the oldest that has sent no complete message, or else the oldest."""
+"""Maximum number of unfinished handshakes. Above the limit, URC closes one connection from the
+address with the most handshakes: the oldest without a complete first message, or else the
+oldest."""
 HANDSHAKE_S = 5.0
 """Time limit from opening a connection to the end of its handshake, in seconds."""
 SHARE = 0.25

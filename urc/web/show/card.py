@@ -1,4 +1,4 @@
-"""The content of a robot's menu card: a camera image, its picture, its world, or the main values.
+"""The content of a robot's menu card: a camera image, a picture, a simulated world, or values.
 
 Layer 5. A card never connects to a robot. The card of a robot with a picture shows the picture or,
 while the robot is connected, its camera image. The card of an emulated robot without a picture

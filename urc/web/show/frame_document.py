@@ -29,7 +29,7 @@ class FramePage:
 
     title: str
     import_map: Markup
-    """Exact text of the JSON; the policy contains the text's digest."""
+    """Exact JSON text of the import map; the policy contains the text's digest."""
     style: str
     """URL of the widget's style sheet."""
     place: str

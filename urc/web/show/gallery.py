@@ -177,7 +177,7 @@ class DemoPage:
     faults: tuple[WidgetProblem, ...]
     """Problems in widgets that cannot be shown."""
     stamp_url: str
-    """URL of the files' stamp, for reloads after an edit; "" for a page that does not reload."""
+    """URL that returns the newest `stamp`, for reloads after an edit; "" to disable reloading."""
     stamp: str
     """Stamp of the widget files, computed before the files were read."""
 

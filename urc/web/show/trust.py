@@ -135,7 +135,7 @@ class TrustPage:
     """Whether the server has a local authority for devices to trust."""
     certificate_url: str
     secure_url: str
-    """HTTPS URL of this server; "" if the page came over HTTPS, or the server has no HTTPS."""
+    """HTTPS URL of this server; "" if the page is loaded over HTTPS, or the server has no HTTPS."""
     guides: tuple[DeviceGuide, ...]
 
 

@@ -37,7 +37,7 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
     """Return the problems in the files of a widget with a valid manifest.
 
     Args:
-        widget: the widget, from any source.
+        widget: the widget, either URC's own or third-party.
         with_demo: whether to check the demo; pages do not need the demo.
     """
     problems: list[Problem] = []
@@ -172,7 +172,7 @@ class _TemplateCheck:
 
 
 def _asked(tree: nodes.Template) -> set[int]:
-    """Return the template nodes whose existence the template tests."""
+    """Return the ids of the nodes that the template checks for existence."""
     tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
     filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
     return {id(node) for node in (*tests, *filters)}

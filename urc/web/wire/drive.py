@@ -88,7 +88,7 @@ def encode_beat(number: int) -> str:
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
-    """Return the message that reports a control stopped before its release."""
+    """Return the message that reports that a control was stopped before its release."""
     return encoded(StoppedMessage(command, reason))
 
 

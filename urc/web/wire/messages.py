@@ -171,7 +171,7 @@ class Indexes:
 def encode_values(
     samples: Iterable[Sample], indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
 ) -> bytes:
-    """Return one frame of readings; `firsts` contains the number of each signal's first reading."""
+    """Return one frame of readings; `firsts` maps each signal to its first reading's number."""
     values: Sequence[object]
     names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]

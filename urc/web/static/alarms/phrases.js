@@ -33,7 +33,7 @@ export const EVENTS = Object.freeze({
   returned: mark("back to normal"),
   acknowledged: mark("acknowledged"),
   shelved: mark("shelved"),
-  unshelved: mark("shelf ended"),
+  unshelved: mark("no longer shelved"),
   suppressed: mark("suppressed by design"),
   unsuppressed: mark("no longer suppressed"),
   unknown: mark("value unknown"),

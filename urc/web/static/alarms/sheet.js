@@ -241,7 +241,7 @@ export class AlarmSheet {
           { class: "urc-alarm-deeds" },
           isWaiting && this.button(t("Acknowledge"), `see-${signal}`, () => this.deeds.acknowledge([row])),
           state === "shelved"
-            ? this.button(t("End shelf"), `back-${signal}`, () => this.deeds.unshelve([signal]))
+            ? this.button(t("Unshelve"), `back-${signal}`, () => this.deeds.unshelve([signal]))
             : state !== "suppressed" && this.shelf(row, titleOf(row, store)),
         ),
     );

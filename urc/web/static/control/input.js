@@ -66,7 +66,7 @@ export class Input {
     screen.orientation?.addEventListener("change", all(t("the screen was rotated")));
     addEventListener("gamepaddisconnected", all(t("the gamepad was disconnected")));
     document.addEventListener("freeze", all(t("the page was frozen")));
-    document.addEventListener("fullscreenchange", all(t("full screen began or ended")));
+    document.addEventListener("fullscreenchange", all(t("full-screen mode changed")));
     document.addEventListener("visibilitychange", () => {
       if (document.hidden) this.letGo(t("the page was hidden"));
     });

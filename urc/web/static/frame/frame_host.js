@@ -418,7 +418,7 @@ export class FrameHost extends Cell {
     this.followed.clear();
     this.edition = -1; // a new frame gets all values
     this.seenOutlets = null;
-    this.remark(t("◌ restarting: another widget had stopped it"));
+    this.remark(t("◌ restarting: another widget blocked it"));
   }
 
   unmount() {

@@ -92,7 +92,7 @@ function show(shelf) {
 
 /** @param {Shelf} shelf */
 function countText({ total, available, isAsking, repositories }) {
-  if (isAsking) return t("asking the repositories …");
+  if (isAsking) return t("contacting the repositories …");
   if (repositories.length === 0) return t("Add a repository to see its packages.");
   if (total > available.length) return t("{shown} of {total} are shown: search for more", { shown: available.length, total });
   return t("{total} found", { total });

@@ -125,15 +125,15 @@ export function installedRow(one, act, remove) {
     line(one.fault && `▲ ${one.fault}`, "urc-bad"),
     ...one.withdrawn.map((text) => made("p", { class: "urc-bad" }, `▲ ${text}`)),
     line(one.fits.length ? t("offered on: {names}", { names: one.fits.join(", ") }) : ""),
-    line(one.kind === "interface" && !one.fits.length ? t("◆ fits no robot on this server") : "", "urc-caution"),
-    line(one.brings.length ? t("came with: {names}", { names: one.brings.join(", ") }) : ""),
+    line(one.kind === "interface" && !one.fits.length ? t("◆ no compatible robot on this server") : "", "urc-caution"),
+    line(one.brings.length ? t("depends on: {names}", { names: one.brings.join(", ") }) : ""),
     made(
       "div",
       { class: "urc-ways" },
       link(one.url, one.kind === "widget" ? t("Show") : t("Open"), one.name),
       link(one.settingsUrl, t("Settings"), one.name),
       act && one.newer && button(t("Update to {version}", { version: one.newer }), `update ${wish}`, () => void act("packages/update", { package: wish }), says(t("Update to {version}", { version: one.newer }))),
-      act && one.before && button(t("Back to {version}", { version: one.before }), `back ${wish}`, () => void act("packages/back", { package: wish }), says(t("Back to {version}", { version: one.before }))),
+      act && one.before && button(t("Restore {version}", { version: one.before }), `back ${wish}`, () => void act("packages/back", { package: wish }), says(t("Restore {version}", { version: one.before }))),
       act && button(t("Remove"), `remove ${wish}`, () => remove(wish), says(t("Remove"))),
     ),
   );
@@ -174,7 +174,7 @@ export function placeRow(one, act) {
   const state = !one.fault
     ? t("● {count} package versions", { count: one.count })
     : one.isKept
-      ? t("◆ unreachable; its last index is used: {count} package versions", { count: one.count })
+      ? t("◆ unreachable; using its last index: {count} package versions", { count: one.count })
       : t("▲ not reached");
   const kind = !one.fault ? "" : one.isKept ? "urc-caution" : "urc-bad";
   return made(

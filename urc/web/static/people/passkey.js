@@ -116,7 +116,7 @@ async function dialog(open) {
     if (name === "SecurityError") throw new Error(t("The browser does not allow passkeys on this page."));
     if (name !== "NotAllowedError" && name !== "AbortError") throw error;
   }
-  throw new Error(t("The passkey dialog was closed, or took too long."));
+  throw new Error(t("The passkey dialog was closed or timed out."));
 }
 
 /**

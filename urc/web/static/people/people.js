@@ -142,10 +142,10 @@ function roles(one) {
   const fields = made("div", { class: "urc-form" }, roleFields.content.cloneNode(true));
   const draw = () => {
     const taken = grants.map((grant) => made("li", { class: "urc-row urc-pair" }, made("span", { class: "urc-grow" }, roleText(grant)),
-      button(t("Take away"), `take ${grant}`, () => {
+      button(t("Remove"), `take ${grant}`, () => {
         grants = grants.filter((other) => other !== grant);
         draw();
-      }, { "aria-label": t("Take away {role}", { role: roleText(grant) }) })));
+      }, { "aria-label": t("Remove {role}", { role: roleText(grant) }) })));
     put(rows, taken.length ? taken : [quiet(t("no role"))]);
   };
   fields.append(button(t("Add"), "add", () => {

@@ -162,7 +162,7 @@ export class Setpoint {
     const { wish, giver, ctx } = this;
     const wished = wish.value === null ? "" : this.text(Number(wish.value));
     const waiting = this.wishState === "waiting" && !this.isOptimistic ? ctx.t("requested {wish}", { wish: wished }) : "";
-    const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports otherwise", { wish: wished }) : "";
+    const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";
     const outcome = this.state && giver.phase === "done" ? "" : giver.outcome;
     const hindrance = giver.reason ? `◆ ${giver.reason}` : "";
     const state = this.state ? noteOf(this.state, ctx.t) : "";
