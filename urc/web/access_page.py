@@ -120,7 +120,7 @@ class AccessMiddleware:
         return any(one.matches(scope)[0] is Match.FULL for one in self._open)
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
-        """Return the response to a request whose query contains a start key."""
+        """Return the response to a request whose query contains a start key or single-use code."""
         rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
         # The path must not begin with "//", which would name another host.
         path = "/" + quote(scope["path"].lstrip("/"))

@@ -142,8 +142,8 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     """Return the application that serves `robots`, which are keyed by their names in URLs.
 
     Raises:
-        UrcError: two robots use different widgets with the same name, or a sign-in method needs an
-            extra package.
+        UrcError: two robots use different widgets with the same name, or an extra that a sign-in
+            method needs is not installed.
     """
     access, data, notifier = options.access or Access(), options.data, options.notifier
     audit = options.audit

@@ -220,7 +220,7 @@ class BrowserClient:
         self._news.set()
 
     def _send_shared(self, live: LiveSession) -> None:
-        """Send the data that all pages share, then images until the kernel's buffer is full."""
+        """Send the data that all pages share, then images until the kernel accepts no more data."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
         while self._place.subscription.names and self._flow.is_free():

@@ -43,7 +43,7 @@ class NotifyOptions:
 
     @property
     def place(self) -> str:
-        """The program, or the URL's scheme and host; logs must not show more."""
+        """The program, or the URL's scheme and host; logs must not contain the rest."""
         if self.command:
             return self.command[0]
         url = httpx2.URL(self.url)

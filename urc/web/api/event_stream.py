@@ -100,7 +100,7 @@ class EventStream:
         if leaving.done() and not leaving.cancelled():
             return
         if closing.done() and not closing.cancelled():
-            self._reason = "the server ends"
+            self._reason = "the server is shutting down"
         if not isinstance(outcome, TimeoutError):
             # This is the last event. An unresponsive reader gets some time to receive it.
             body = _event("end", {"reason": self._reason})

@@ -250,7 +250,7 @@ async def opened(service: RobotService, peer: SocketPeer, stack: ExitStack) -> L
         names = ", ".join(setting.name for setting in missing)
         raise ApiError(409, f"settings are missing: {names}", "not-ready")
     if service.is_full or not service.has_room_for(peer):
-        raise ApiError(429, "too many clients use this robot", "too-many")
+        raise ApiError(429, "too many clients are using this robot", "too-many")
     stack.enter_context(service.visit(peer.who))
     try:
         return await service.live()

@@ -68,7 +68,7 @@ class BatteryLevel(ApiMessage, frozen=True):
     unit: str
     """Unit symbol of the signal, such as ``%`` or ``V``."""
     alarm: Alarm = ""
-    """Alarm limit that the signal exceeds."""
+    """Exceeded limit, or severity of an alarm state; "" if there is no alarm."""
 
 
 class ActiveAlarms(ApiMessage, frozen=True):
@@ -210,7 +210,7 @@ class SignalInfo(ApiMessage, frozen=True):
     limits: dict[str, float]
     """Alarm limits by name: ``lolo``, ``low``, ``high``, ``hihi``."""
     stale_after_s: float
-    """Age in seconds after which a value is stale."""
+    """Age in seconds after which a value is stale; 0 if values never become stale."""
     axes: str
     """Axis convention of the value, such as ``FLU``; "" if undeclared."""
     items: str

@@ -1,8 +1,8 @@
-"""The developer start page: one robot with its fixed settings and a button to reload its documents.
+"""The developer start page: robots with their fixed settings, and a button to reload documents.
 
 Layer 5. These routes exist only with ``--dev`` and require the start key. The developer page loads
-a document as soon as it is saved. The start page's button reloads all documents, even if the server
-has not noticed a change.
+a document as soon as it is saved. The start page's button reloads all documents of a robot, even if
+the server has not noticed a change.
 """
 
 import asyncio
@@ -97,7 +97,7 @@ class DevStart:
         return HTMLResponse(render("dev_start.html.j2", page), headers=_NO_STORE)
 
     async def start(self, request: Request) -> Response:
-        """Reload all documents and return the URL of the robot."""
+        """Reload all documents of a robot and return the robot's URL."""
         name = request.path_params["name"]
         if name not in self._remake or name not in self._fleet.robots:
             return told(404, "this server has no robot with that name")

@@ -118,7 +118,7 @@ class TwoPersonRule:
         return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
 
     async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
-        """Request approval from all other pages that may drive; return the second person's name.
+        """Request approval from all pages that may approve; return the second person's name.
 
         `run` is the asking page's number for this run of the command.
 

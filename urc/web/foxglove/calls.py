@@ -82,7 +82,7 @@ class FoxgloveCalls:
         press_stop(offer.name, offer.service, self._visitor(offer.name), self._recorder)
 
     async def delivered_stop(self, offer: Offer) -> bytes:
-        """Return, as JSON text, whether the robot has received a STOP; wait briefly."""
+        """Wait briefly for the robot to receive a STOP; return the result as JSON text."""
         result = await delivered_stop(offer.service)
         return as_json({"latched": result.latched, "confirmed": result.confirmed})
 

@@ -40,7 +40,7 @@ MOST_ENDED: Final = 4096
 """Maximum number of stored subscriptions that ended together with their channels."""
 STALL_S: Final = 15.0
 RETRY_S: Final = 1.0
-"""Interval between attempts to open a session, and between checks for changed robots."""
+"""Interval between attempts to open a session and between checks for changed robots, in seconds."""
 GOODBYE_S: Final = 2.0
 _BURST: Final = 64
 """Maximum number of messages that are sent before other tasks run."""
@@ -159,7 +159,7 @@ class FoxgloveClient:
                 await self._news.wait()
 
     def _send(self) -> bool:
-        """Send messages while the kernel accepts them; return whether messages may remain."""
+        """Send messages while the kernel accepts them; return whether some may be left."""
         frames = self._outbox.frames(has_messages=not self._closing)
         for _ in range(_BURST):
             if not self._flow.is_free():

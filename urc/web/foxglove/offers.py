@@ -125,7 +125,7 @@ class Offers:
 
     @property
     def is_let_in(self) -> bool:
-        """Whether the visitor may still watch any robot."""
+        """Whether the visitor may still watch at least one robot."""
         return self._source.is_let_in()
 
     @property

@@ -20,7 +20,7 @@ __all__ = ["FIRST_NOTES", "MOST_WAITING", "RobotFeed"]
 MOST_WAITING: Final = 16
 """Maximum number of unsent readings per signal; for an image signal, only the newest is kept."""
 FIRST_NOTES: Final = 50
-"""Number of earlier log entries that a new subscription receives."""
+"""Maximum number of earlier log entries that a new subscription receives."""
 
 
 class RobotFeed:

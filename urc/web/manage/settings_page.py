@@ -49,7 +49,7 @@ class Field:
     about: str
     """Description of the setting, including its range."""
     kind: str
-    """Type of the field: ``text``, ``password``, ``choice`` or ``switch``."""
+    """Type of the field: ``text``, ``password`` or ``choice``."""
     keys: str
     """HTML ``inputmode`` of the field; "" for the default keyboard."""
     value: str

@@ -62,8 +62,8 @@ class BrowserSignIns:
         Args:
             access: identities and rights.
             recorder: recorder that writes sign-ins to the audit log.
-            throttle: count of failed attempts with all sign-in methods; None to create a separate
-                count.
+            throttle: counter of failed attempts, shared by all sign-in methods; None to create a
+                counter.
             clock: function that returns the monotonic time, in seconds.
         """
         self.access = access
@@ -212,5 +212,5 @@ def address_of(request: Request) -> str:
 
 
 def agent_of(request: Request) -> str:
-    """Return a request's browser and operating system in words, such as “Chrome on Android”."""
+    """Return a request's browser and operating system as text, such as “Chrome on Android”."""
     return browser_name(request.headers.get("user-agent", "")[:_LONGEST_AGENT])

@@ -68,7 +68,7 @@ class CodeRequest(PeopleMessage, frozen=True):
 
 
 class CodeInfo(PeopleMessage, frozen=True):
-    """The right granted by a code."""
+    """The rights granted by a code."""
 
     kind: str
     """``device`` or ``person``."""
@@ -196,7 +196,7 @@ class SignInInfo(PeopleMessage, frozen=True):
     kind: str
     way: str
     agent: str
-    """Browser and operating system in words."""
+    """Browser and operating system, such as “Chrome on Android”."""
     place: str
     """Network address at sign-in."""
     created_at: float
@@ -204,7 +204,7 @@ class SignInInfo(PeopleMessage, frozen=True):
     used_at: float
     """Time of the last request, in seconds since 1970 (UTC)."""
     ends_at: float | None
-    """Time at which the sign-in ends if it is not used again."""
+    """Time at which the sign-in ends if it is not used again; null if it never ends."""
     is_own: bool
     """Whether the current request uses this sign-in."""
 
@@ -236,7 +236,7 @@ class RenameRequest(PeopleMessage, frozen=True):
 
 
 class RolesRequest(PeopleMessage, frozen=True):
-    """Request to replace the rights of a person, device, program or guest."""
+    """Request to replace the rights of a person, device or program."""
 
     id: _Short
     roles: _Roles

@@ -5,8 +5,8 @@ other part of the server can see or trust a forged header.
 
 Theory of operation. Each request contains a secret that proves that it comes from the proxy. A
 browser's first request opens a sign-in, whose secret never leaves this process. The middleware adds
-the secret to the request's cookie, so the same rules for rights, origin and revocation apply as for
-a browser.
+the sign-in's secret to the request's cookies, so the same rules for rights, origin and revocation
+apply as for a browser.
 """
 
 import asyncio
@@ -132,7 +132,7 @@ class ProxyMiddleware:
             return secret
 
     def _known(self, browser: _Browser) -> str | None:
-        """Return the secret of the browser's open sign-in; None if its person was renamed."""
+        """Return the secret of the browser's sign-in; None if it ended or its person was renamed."""
         secret = self._secrets.get(browser)
         who = self._sign_ins.control.identify(secret) if secret is not None else NOBODY
         if who == NOBODY or who.name.casefold() != browser.user:

@@ -45,7 +45,7 @@ class FurtherWays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """Context for ``door.html.j2``: STOP buttons, and the sign-in methods or a link to the page."""
+    """Context for ``door.html.j2``: STOP, and sign-in methods or a link to the requested page."""
 
     head: PageHead
     url: str

@@ -40,7 +40,7 @@ class WaysIn:
             options: the options.
 
         Raises:
-            AccessError: an extra package is missing.
+            AccessError: an extra that a sign-in method needs is not installed.
         """
         self.options = options
         recorder.hide(one.secret.decode() for one in options.proxies)

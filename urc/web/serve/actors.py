@@ -58,7 +58,7 @@ def record_admission(recorder: ServerRecorder, who: Identity, place: str, agent:
         recorder: writer of the audit entries.
         who: the new identity; `NOBODY` for a wrong key.
         place: network address.
-        agent: browser and operating system in words.
+        agent: browser and operating system, such as “Chrome on Android”.
     """
     if who == NOBODY:
         recorder.sign_in_failed("key", place, "the start key is wrong, or from an earlier start")

@@ -39,7 +39,7 @@ class LoadedCertificate(NamedTuple):
     name: str
     """A host name or address from the certificate."""
     authority: bytes
-    """The local authority in PEM format, for devices to trust; b"" for a given certificate."""
+    """The local authority's certificate in PEM format; b"" for a given certificate."""
     notes: tuple[str, ...] = ()
     """Notes for the operator, for example about a new authority."""
 
@@ -92,7 +92,7 @@ class LocalCertificate:
         if authority.left_out:
             left_out = ", ".join(authority.left_out)
             notes.append(
-                f"the authority's limits exclude {left_out}; to create a new authority,"
+                f"the certificate authority cannot certify {left_out}; to create a new authority,"
                 " use --allow-host with this name"
             )
         return LoadedCertificate(

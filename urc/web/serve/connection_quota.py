@@ -14,10 +14,11 @@ from urc.web.serve.visitor import Visitor
 __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
-"""Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
-sockets and six requests, so the limit permits several pages and a few people behind one address."""
+"""Maximum number of concurrent requests and sockets of all unknown visitors at one address. A page
+uses up to two sockets and six requests, so the limit permits several pages and a few people behind
+one address."""
 KNOWN_PLACES = 256
-"""Maximum number of concurrent requests and sockets from one known person, device or program. A
+"""Maximum number of concurrent requests and sockets of one known person, device or program. A
 known visitor may watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")

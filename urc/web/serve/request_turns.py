@@ -31,12 +31,12 @@ class RequestTurns:
         self._is_scheduled = False
 
     def take(self, connection: object, read: Callable[[], None]) -> bool:
-        """Call `read` now or in its turn; a waiting connection keeps its place.
+        """Call `read` now, or at the connection's turn; a waiting connection keeps its place.
 
-        Return whether `read` was called.
+        Return whether `read` was called immediately.
 
         Args:
-            connection: the connection, which waits for at most one turn.
+            connection: the connection, which has at most one place in the queue.
             read: function that reads the connection's requests.
         """
         if self._waiting or not self._left:

@@ -76,8 +76,8 @@ async def serve(
         on_ready: callback that is called once, with the first of `reachable_urls`, such as
             ``http://127.0.0.1:8080/``.
         request_s: time limit for receiving a complete request, in seconds.
-        connections: maximum number of open connections; above this number, new connections get
-            status 503.
+        connections: maximum number of open connections; above this number, a new connection
+            replaces an idle connection or gets status 503.
         certificates: certificates for HTTPS; None for plain HTTP.
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
         handshakes: limits on unfinished handshakes; None for the default limits.
@@ -292,8 +292,8 @@ def reachable_urls(host: str, port: int, scheme: str = "http") -> tuple[str, ...
     """Return the URLs of a dashboard that listens on `host`.
 
     For ``0.0.0.0`` and ``::``, the URLs contain the network addresses of this machine, or the
-    loopback address if it has none. For any other host, the only URL contains `host`. The function
-    sends no packets.
+    loopback address if this machine has none. For any other host, the only URL contains `host`. The
+    function sends no packets.
 
     Args:
         host: the address or name on which the server listens.

@@ -3,7 +3,8 @@
 Layer 5. The standard library's `ssl.SSLObject` encrypts the data. An event loop's own TLS layer has
 a buffer above the TCP transport and reports a full buffer one write too late. The dashboard would
 then write one more frame, which becomes outdated in the buffer. This class passes each write to TCP
-immediately, so TCP's callbacks arrive at the right time and paused data stays in the kernel.
+immediately, so TCP's callbacks arrive at the right time. During a pause, received data stays in the
+kernel.
 """
 
 import asyncio
@@ -21,7 +22,7 @@ HANDSHAKE_BYTES = 64 * 1024
 
 
 class TlsConnection(asyncio.Transport, asyncio.Protocol):
-    """A protocol above a TCP transport and a transport below the upper protocol."""
+    """A protocol for the TCP transport, and a transport for the upper protocol."""
 
     def __init__(
         self,

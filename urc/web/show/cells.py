@@ -93,7 +93,7 @@ def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust
     """Render the markup of all third-party widgets on a page in one step, to save time.
 
     Args:
-        uses: the widget uses in cell order, each with its robot's profile.
+        uses: for each cell, in cell order, the `WidgetUse` and the robot's profile.
         trust: rule that identifies third-party widgets.
     """
     wanted = []

@@ -1,7 +1,7 @@
 """The CSS layout of an interface: the position of each cell for each kind of screen.
 
-Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
-element.
+Layer 5. Pure. The rules contain only numbers and escaped titles, so no text from a document can
+close the style element.
 
 A row or column without a slot is a margin. The margin keeps its position, at an eighth of the
 normal size. Phones show no margins. A phone in portrait shows the first available grid of
@@ -279,7 +279,7 @@ def _ground(covered: int) -> str:
 
 
 def _leading_values(grid: Layout, canvas: _Canvas) -> int:
-    """Return the number of rows at the top with only values, at most `_MOST_COVERED`."""
+    """Return the number of top rows that contain only values, at most `_MOST_COVERED`."""
     tall = _used((slot.row, slot.row_span) for slot in grid.slots if slot.row_span > 1)
     is_value = [
         row not in tall and _kinds(row, grid, canvas) == {"value"} for row in range(grid.rows)

@@ -1,7 +1,7 @@
 """The pages of the dashboard. Each Jinja template has one dataclass as its context.
 
-Layer 5. Templates receive only the dataclass, as ``page``. Templates contain only ``for`` and
-``if``. All other logic is in this module, and `urc.web.show.cells` builds a page's cells.
+Layer 5. Templates receive only the dataclass, as ``page``. The only logic in templates is ``for``
+and ``if``. All other logic is in this module, and `urc.web.show.cells` builds a page's cells.
 """
 
 import json
@@ -63,7 +63,7 @@ class PageHead:
     widget_styles: tuple[str, ...] = ()
     """URLs of widget style sheets."""
     grid_css: str = ""
-    """CSS rules for the positions of cells; the rules contain only numbers."""
+    """CSS rules for the positions of cells; titles in the rules are escaped."""
     version: str = __version__
 
 
