@@ -132,7 +132,7 @@ class ProxyMiddleware:
             return secret
 
     def _known(self, browser: _Browser) -> str | None:
-        """Return the secret of the browser's sign-in; None if it ended or its person was renamed."""
+        """Return the browser's sign-in secret; None if it ended or its person was renamed."""
         secret = self._secrets.get(browser)
         who = self._sign_ins.control.identify(secret) if secret is not None else NOBODY
         if who == NOBODY or who.name.casefold() != browser.user:

@@ -194,7 +194,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
 
 
 class Policy:
-    """Middleware for the page policy, which stores ``nonce`` and ``visitor`` in the request state."""
+    """Middleware for the page policy; stores ``nonce`` and ``visitor`` in the request state."""
 
     def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app
