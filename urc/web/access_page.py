@@ -1,7 +1,7 @@
 """Access control for pages: visitors with a role are admitted; others get the sign-in page.
 
 Layer 5. The ASGI middleware of this module runs inside the middleware of the page policy. A visitor
-without a role reaches only routes with the right `ANYONE`, such as STOP and the sign-in page's
+without a role can reach only routes with the right `ANYONE`, such as STOP and the sign-in page's
 files.
 """
 

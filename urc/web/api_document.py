@@ -149,7 +149,11 @@ def _right(right: Right) -> str:
         return "none; a sign-in is not required"
     if right.is_local:
         return "the start key"
-    where = {"robot": "for this robot", "server": "for all robots", "anywhere": "for any one robot"}
+    where = {
+        "robot": "for this robot",
+        "server": "for all robots",
+        "anywhere": "for at least one robot",
+    }
     return f"{right.role} {where[right.scope]}"
 
 

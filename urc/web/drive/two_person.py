@@ -1,4 +1,4 @@
-"""The two-person rule: a command fails unless a second page approves it.
+"""The two-person rule: a command fails unless a second person approves it.
 
 Layer 5. All pages and devices of one person count as one person and cannot approve that person's
 commands. Programs are not people, so a token cannot approve a command. The local user counts as one
@@ -151,7 +151,7 @@ class TwoPersonRule:
         return second.client.name
 
     def stop(self) -> None:
-        """End all questions and revoke all tokens, because STOP was pressed."""
+        """Cancel all questions and revoke all tokens, because STOP was pressed."""
         self._tokens.clear()
         for one in self._questions.values():
             if not one.answer.done():

@@ -90,7 +90,7 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum numbers of a robot's clients: per address of unknown visitors, per signed-in visitor."""
+"""Maximum clients of a robot: per address of unknown visitors, and per signed-in visitor."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0

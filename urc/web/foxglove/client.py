@@ -281,7 +281,7 @@ class FoxgloveClient:
         return found is not None and found[1].command == STOP
 
     def _stop(self, said: wire.ServiceCall) -> None:
-        """Press STOP immediately; respond after the robot received it, or after a short wait."""
+        """Press STOP immediately; respond once the robot has received it, or after a short wait."""
         offer, _ = self._offers.services[said.service]
         try:
             self._calls.press_stop(offer)

@@ -1,7 +1,7 @@
 """The frames to be sent to one Foxglove client, in order.
 
-Layer 5. Pure. Announcements are sent first, then responses, then statuses, then the robots'
-messages, in turn. The number of frames of each kind is limited.
+Layer 5. Pure. Announcements are sent first, then responses, then statuses, and finally the robots'
+messages, one robot after another. The number of frames of each kind is limited.
 """
 
 from collections import deque

@@ -1,4 +1,4 @@
-"""The socket of the Foxglove server, and the token in its address.
+"""The socket of the Foxglove server, and the token in the socket's address.
 
 Layer 5. Viewers such as Foxglove run in browsers, where a program cannot add a header to a
 WebSocket. The address may therefore contain the token: ``/api/v1/foxglove?token=TOKEN``. A request

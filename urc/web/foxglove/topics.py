@@ -58,7 +58,7 @@ class TopicMessage(NamedTuple):
 
 
 def robot_topics(robot: str, profile: Profile) -> tuple[RobotTopic, ...]:
-    """Return the topics of a robot, whose name in URLs is `robot`."""
+    """Return a robot's topics; `robot` is the robot's name in URLs."""
     driver = profile.driver
     found = [
         _topic(f"/{robot}/{signal.name}", TopicSource("signal", signal.name), signal_schema(signal))

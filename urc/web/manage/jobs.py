@@ -207,7 +207,7 @@ class Jobs:
         if planned.risks and not takes_risks:
             raise PackageError(
                 f"{planned.plan.lock} uses files, programs or hosts without a setting:"
-                " approve this too"
+                " approve them too"
             )
         plan = planned.plan._replace(waived=frozenset(unsigned))
         if lacks := [one for one in planned.unsigned if one not in plan.waived]:

@@ -115,7 +115,7 @@ _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 
 
 def _api(handler: _Handler) -> _Handler:
-    """Turn a handler's `UrcError` into a response with one line of text."""
+    """Convert a handler's `UrcError` to a response with one line of text."""
 
     @wraps(handler)
     async def handle(self: "ManageRoutes", request: Request) -> Response:

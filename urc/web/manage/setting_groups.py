@@ -39,8 +39,8 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
 
-    Without a declared group, three kinds of settings belong to `CONNECTION`: hosts and ports,
-    settings that a transport uses, and settings that the operator must fill in.
+    Settings without a declared group belong to `CONNECTION` if they are hosts or ports, are used by
+    a transport, or must be filled in.
     """
     used = {
         name for spec in profile.driver.transports.values() for name in _used(dict(spec.options))

@@ -45,7 +45,7 @@ class AccountRoutes:
 
         Args:
             sign_ins: the sign-ins of all browsers.
-            links: the maker of pairing links.
+            links: object that creates pairing links.
         """
         self._sign_ins = sign_ins
         self._links = links

@@ -67,7 +67,7 @@ class AdminRoutes:
         Args:
             sign_ins: the sign-ins of all browsers.
             pairings: the administrators' pending pairings.
-            links: the maker of pairing, invitation and guest links.
+            links: object that creates pairing, invitation and guest links.
         """
         self._sign_ins = sign_ins
         self._pairings = pairings

@@ -1,4 +1,4 @@
-"""A maker of links for other devices: pairing codes, invitations and guest links.
+"""Creation of links for other devices: pairing codes, invitations and guest links.
 
 Layer 5. The methods block, because they read files. A link contains its code in the fragment, which
 browsers never send to a server.
@@ -28,7 +28,7 @@ _SCALE: Final = 8
 
 
 class LinkMaker:
-    """A maker of links to one server."""
+    """Creates links to one server."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, data: Path | None) -> None:
         """Create the maker.

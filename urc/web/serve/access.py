@@ -281,7 +281,7 @@ def _untagged(_: str) -> Collection[str]:
 
 
 def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
-    """Yield each cookie's name and value; names may repeat."""
+    """Yield each cookie's name and value; a name can occur more than once."""
     for name, value in headers:
         if name == b"cookie":
             for part in value.decode("latin-1").split(";"):

@@ -1,4 +1,4 @@
-"""One HTTP connection with request turns, a request time limit, and headers in every refusal.
+"""One HTTP connection: it takes turns, limits request times and adds headers to refusals.
 
 Layer 5. The module is a thin layer over uvicorn's protocol, used only by `server`. The library
 uvicorn refuses invalid HTTP and connections above its limit. Without this layer, uvicorn's refusals

@@ -37,7 +37,7 @@ class FramePage:
 
 
 class FrameDocuments:
-    """A maker of frame documents.
+    """Creates frame documents.
 
     Args:
         modules: the pages' import map.

@@ -92,7 +92,7 @@ class Card:
     fault: str = ""
     """Reason why the robot cannot be used; "" if it can."""
     recorded: str = ""
-    """Start time of the recording; "" for a robot."""
+    """Start time of the recording; "" if the card does not show a playback."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,7 +137,7 @@ class _TemplateCheck:
         unknown = find_undeclared_variables(tree).difference(known)
         for node in tree.find_all(nodes.Name):
             if node.ctx == "load" and node.name in unknown and id(node) not in asked:
-                text = f"there is no variable {node.name!r} in a template"
+                text = f"templates have no variable {node.name!r}"
                 yield self._unknown(text, node.lineno, node.name, known)
 
     def _keys(

@@ -49,7 +49,7 @@ def encode_asked(number: int) -> str:
 
 
 def encode_token(run: int, token: str) -> str:
-    """Return the message with the token that permits the command `run` once, for a short time."""
+    """Return the message with the token for one run of a command, identified by `run`."""
     return encoded(TokenMessage(run, token))
 
 

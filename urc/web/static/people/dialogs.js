@@ -88,7 +88,7 @@ export class PeopleDialog {
     const endMs = performance.now() + code.lastsS * 1000;
     const look = async () => {
       const seconds = Math.max(0, Math.ceil((endMs - performance.now()) / 1000));
-      left.textContent = t("Valid once, for {seconds} s", { seconds });
+      left.textContent = t("Single use; expires in {seconds} s", { seconds });
       let now;
       try {
         now = await ask(`/api/v1/pairings/${code.id}`);
