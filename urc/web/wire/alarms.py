@@ -26,7 +26,7 @@ def encode_alarms(
 
     Args:
         records: changed alarms.
-        gone: signals whose alarms have left the list, because they are normal again.
+        gone: signals whose alarms are no longer in the list.
         signals: the robot's signals, with causes and operator actions.
         now: UTC time in seconds since 1970.
         is_full: whether `records` contains all alarms.
