@@ -223,7 +223,7 @@ def test_a_fault_in_a_template_is_found_when_it_is_compiled(
         ("x.__class__", "no key '__class__'"),
         ("word.upper", "no key 'upper'"),
         ("word > 3", "not supported"),
-        ("word | replace('', 'x')", "a text to search for"),
+        ("word | replace('', 'x')", "needs text to search for"),
         ("x[0:1]", "expected text, a list or bytes, found"),
         ("row['a':]", "expected a whole number as index"),
         ("word | join", "expected a list"),

@@ -1,12 +1,12 @@
 """One robot's alarms: a state machine for each signal with limits, as in ISA-18.2.
 
-Layer 3. Pure. The inputs are sample alarms, suppression, lost values and operator actions, each
-with its time. The outputs are the records and the history events.
+Layer 3. Pure. The inputs are the alarm of each sample, suppressed conditions, lost values and
+operator actions, each with its time. The outputs are the records and the history events.
 
-An alarm leaves the list only after an acknowledged return to normal, or when a new document no
-longer declares it. An alarm stays in the list if its value becomes unknown. A chattering alarm (3
-activations in a minute) ends only after 10 s of normal values, so it does not flash or fill the
-history.
+An alarm leaves the list only when its value is normal and it is acknowledged, or when a new
+document no longer declares it. An alarm stays in the list if its value becomes unknown. A
+chattering alarm (3 activations in a minute) ends only after 10 s of normal values, so it does not
+flash or fill the history.
 """
 
 from collections import deque
@@ -56,15 +56,16 @@ class AlarmList:
         """Continue with the alarms from an earlier run.
 
         Args:
-            limits: limits by signal; alarms for other signals are not allowed.
-            records: the records from the last run; the values of these alarms are now unknown.
+            limits: limits, keyed by signal; `judge` accepts only these signals.
+            records: the records from the last run; their values count as unknown until the next
+                sample.
         """
         self.records: dict[str, AlarmRecord] = {
             one.signal: one._replace(is_known=False) for one in records
         }
         """Non-normal alarms, by signal."""
         self.revision = 0
-        """Number of changes so far."""
+        """Number of changes to the alarms and to the flood so far."""
         self.changed: dict[str, int] = {}
         """Revision of the last change to each signal's alarm, including removed alarms."""
         self._limits = limits
@@ -82,7 +83,7 @@ class AlarmList:
 
     @property
     def is_flooded(self) -> bool:
-        """Whether more alarms occur than an operator can handle."""
+        """Whether a flood is in progress: more alarms than one operator can handle."""
         return self._flood.is_flooded
 
     @property
@@ -94,7 +95,7 @@ class AlarmList:
         return min((*shelves, *self._settling.values(), *more), default=None)
 
     def take_events(self) -> list[AlarmEvent]:
-        """Return the events since the last call."""
+        """Return and clear the events since the last call."""
         events, self._events = self._events, []
         return events
 
@@ -149,7 +150,7 @@ class AlarmList:
         self._raise(fresh, now)
 
     def _raise(self, record: AlarmRecord, now: float) -> None:
-        """Request an acknowledgement, unless the alarm is shelved or suppressed."""
+        """Mark the alarm as unacknowledged, and record that it was raised."""
         # A time, so that numbers from an earlier run are never reused.
         self._raised = max(self._raised + 1, round(now * 1000))
         record = self._judged(
@@ -231,7 +232,7 @@ class AlarmList:
         Args:
             raised: the attribute `raised` of each alarm that the operator saw, by signal. An alarm
                 that has been raised again since then is not acknowledged.
-            actor: the person or program.
+            actor: the person, device or program that acknowledges the alarms.
             now: UTC time in seconds.
         """
         done = []

@@ -12,9 +12,9 @@ __all__ = ["BURST_GAP_S", "FLOOD_BEGINS", "FLOOD_ENDS", "FLOOD_S", "FloodDetecto
 
 FLOOD_S: Final = 600.0
 FLOOD_BEGINS: Final = 10
-"""Largest number of alarms in `FLOOD_S` that does not count as a flood."""
+"""A flood begins when more than this number of alarms occur within `FLOOD_S` seconds."""
 FLOOD_ENDS: Final = 5
-"""A flood ends when fewer than this number of alarms occurred in `FLOOD_S`."""
+"""A flood ends when fewer than this number of alarms have occurred within `FLOOD_S` seconds."""
 BURST_GAP_S: Final = 5.0
 """Longest time between two alarms of one burst, in seconds."""
 

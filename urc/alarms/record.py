@@ -41,7 +41,7 @@ class AlarmRecord(NamedTuple):
 
     signal: str
     condition: str
-    """Crossed limit or alarm state, now or before the return to normal."""
+    """Crossed limit or alarm state; after a return to normal, the condition that ended."""
     priority: AlarmPriority
     number: int
     """Number of the activation, counted per robot; these numbers give the first-out order."""
@@ -69,7 +69,7 @@ class AlarmRecord(NamedTuple):
 
     @property
     def state(self) -> AlarmState:
-        """State of the alarm; shelving and suppression hide the other states."""
+        """State of the alarm; ``shelved`` and ``suppressed`` take precedence over other states."""
         if self.shelved_until:
             return "shelved"
         if self.is_active:
@@ -80,7 +80,7 @@ class AlarmRecord(NamedTuple):
 
     @property
     def is_annunciated(self) -> bool:
-        """Whether operators must see the alarm."""
+        """Whether the alarm must be shown to operators."""
         return self.state in ("unacknowledged", "acknowledged", "returned")
 
 
@@ -97,12 +97,12 @@ class AlarmEvent(NamedTuple):
     state: AlarmState = "normal"
     """State of the alarm after the event."""
     who: str = ""
-    """Name of the person or program that acted; "" if the robot caused the event."""
+    """Name of the person, device or program that acted; "" if the robot or a timer acted."""
     principal: str = ""
     until: float = 0.0
-    """Time at which shelving ends."""
+    """Time at which shelving ends; 0 if the alarm is not shelved."""
     times: int = 1
-    """Number of identical activations that the event represents."""
+    """Number of activations since the alarm was last normal."""
 
 
 def condition_of(alarm: Alarm, value: Reading, limits: AlarmLimits) -> str:

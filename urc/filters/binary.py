@@ -114,7 +114,7 @@ BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
     "hexbytes": _hexbytes,
     "utf8": _data,
 }
-"""Filters that return bytes and take no argument."""
+"""Filters that return bytes; they have no arguments."""
 TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "b64encode": (_b64encode, 0),
     "hmac_sha256": (_hmac_sha256, 1),

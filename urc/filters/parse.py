@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """Error for data that has too few bytes for the number."""
+    """The data has too few bytes for the number."""
 
 
 @cache  # there are few type names

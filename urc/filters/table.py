@@ -173,7 +173,7 @@ def _length(value: Any) -> int:
 def _replace(value: Any, old: Any, new: Any) -> str:
     text, found, put = _require_text(value), _require_text(old), _require_text(new)
     if found == "":
-        raise ValueError("'replace' needs a text to search for")
+        raise ValueError("'replace' needs text to search for")
     if len(text) + text.count(found) * (len(put) - len(found)) > MAX_TEXT:
         raise ValueError(f"the text has more than {MAX_TEXT} characters")
     return text.replace(found, put)

@@ -137,7 +137,7 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether any condition or formula in the driver depends on the newest samples."""
+        """Whether any of the driver's conditions or steps depends on earlier samples."""
 
     # -- methods
 
@@ -363,7 +363,7 @@ class Engine:
                 runner.check_conditions(now)
 
     def _advance(self, now: float) -> list[LineEvent]:
-        """Advance all sequences until every sequence is waiting."""
+        """Advance every sequence until it waits or ends; return the resulting events."""
         pending: list[LineEvent] = []
         for runner in tuple(self._runners):
             pending += runner.advance(now)

@@ -59,7 +59,7 @@ class Close(NamedTuple):
 
     transport: str
     reason: str = ""
-    """Reason for a failure; "" means the normal end of a per-request connection."""
+    """Reason for a failure; "" means an orderly close, also of a per-request connection."""
 
 
 class Ready(NamedTuple):
@@ -72,7 +72,7 @@ class Samples(NamedTuple):
     """Samples, in order, from frames that arrived together; computed signals are included."""
 
     transport: str
-    """Name of the transport; "" for an alarm that began without a frame."""
+    """Name of the transport; "" for samples that changed without a frame (a delayed alarm)."""
     samples: tuple[Sample, ...]
 
 
@@ -92,7 +92,7 @@ class Failed(NamedTuple):
     code: str
     """Failure code: ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
     ``at-work``, ``unknown-command``, ``superseded``, ``not-allowed``, ``not-confirmed``,
-    ``not-verified`` or ``failed``."""
+    ``not-verified``, ``stopped``, ``aborted`` or ``failed``."""
     message: str
 
 
@@ -101,8 +101,9 @@ class Violation(NamedTuple):
 
     transport: str
     code: str
-    """Violation code: ``frame-too-long``, ``no-match``, ``bad-value``, ``bad-text``, ``cut-frame``,
-    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``, ``silent`` or ``failed``."""
+    """Violation code: the code of a framing violation, or ``no-match``, ``bad-value``,
+    ``bad-text``, ``cut-frame``, ``reply-timeout``, ``late-reply``, ``retransmitted``,
+    ``motion-refused``, ``refused``, ``bad-argument`` or ``no-data``."""
     message: str
 
 

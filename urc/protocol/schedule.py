@@ -141,7 +141,7 @@ class KeepaliveState:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the end of the keepalive's command; the command itself reports any failure."""
+        """Record the end of the keepalive request or command; its outcome is ignored."""
         self._is_asked = False
         return []
 

@@ -208,7 +208,7 @@ REFUSED = [
     (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n': this would make"
      " two frames"),
     ("{ type: datagram, checksum: { algorithm: sum8, from_hex: true } }", b"xy",
-     "the checksum needs hex digits, found other bytes"),
+     "the checksum covers hex digits, found other bytes"),
 ]  # fmt: skip
 
 

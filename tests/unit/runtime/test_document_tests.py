@@ -213,7 +213,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(run="say", arguments={"word": "hi"}, sent={"wire": "say\nhi"}),
-            r"wire: b'say\nhi' contains the delimiter b'\n': this would make two frames",
+            r"wire: b'say\nhi' contains the delimiter b'\n', so it would be sent as two frames",
         ),
         (trial(run="say", sent={"wire": "x"}), None),
     ],

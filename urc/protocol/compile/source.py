@@ -23,7 +23,7 @@ def function_of(
     Args:
         name: name of the function, a Python identifier.
         arguments: parameter list of the function, in Python syntax.
-        lines: lines of the function body, indented by at least four spaces.
+        lines: source lines of the function body, indented by at least four spaces.
         scope: global variables of the function, keyed by name.
     """
     import linecache  # imported here, because functions are generated only in live sessions

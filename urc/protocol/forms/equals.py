@@ -33,7 +33,7 @@ class EqualsReader:
         return NOTHING if frame.payload == self._payload else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return that frame."""
+        """Return the expected frame."""
         return self._payload
 
 

@@ -89,7 +89,7 @@ class ShapedReader:
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return the first unusable operand; None if an operand is missing; otherwise the error."""
+    """Return the first unusable operand, None if an operand is missing, or else the error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

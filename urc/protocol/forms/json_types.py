@@ -36,7 +36,7 @@ class _Shape:
         return self.element
 
     def is_plain(self) -> bool:
-        """Return whether the shape has exactly one type at each level."""
+        """Return whether the value at each path has exactly one required type."""
         kinds = self.is_leaf + bool(self.names) + (self.element is not None)
         inner = [*self.names.values(), *([self.element] if self.element else [])]
         return (

@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
 A pattern becomes a regular expression that runs in linear time. Every quantifier is possessive and
-repeats only characters that cannot come next.
+repeats only characters that cannot begin the next part.
 """
 
 import re

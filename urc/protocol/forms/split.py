@@ -25,7 +25,7 @@ class SplitReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the parts, keyed by name; None if the number of parts is wrong."""
+        """Return the parts, keyed by name; return None if the number of parts is wrong."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -41,7 +41,7 @@ class SplitReader:
         }
 
     def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
-        """Return the parts, keyed by name; the last name has a list of all remaining parts."""
+        """Return the parts, keyed by name; the last name maps to a list of all remaining parts."""
         first, strip = len(self._names) - 1, self._strip
         if len(parts) < first:
             return None
@@ -105,7 +105,7 @@ class KeyvalueReader:
         return found or None
 
     def _bare(self, pairs: list[str]) -> dict[str, object] | None:
-        """Remove and return the leading parts; None if a leading part is a key-value pair."""
+        """Remove and return the leading parts; None if one is missing or a key-value pair."""
         parts = [part for part in pairs if part.strip(self._strip)]
         front = parts[: len(self._first)]
         if len(front) < len(self._first) or any(self._separator in part for part in front):

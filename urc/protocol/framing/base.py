@@ -62,7 +62,7 @@ class Decoder(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may complete a frame; None if completion requires more bytes."""
+        """Time at which `tick` may complete a frame; None if only more bytes can complete it."""
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
         """Append received bytes; return the completed frames and violations in order."""
@@ -143,7 +143,7 @@ class StreamDecoder:
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return the number of bytes before the next `mark`, which may still be incomplete."""
+        """Return the number of bytes before the next complete or partial `mark`."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:
@@ -153,12 +153,13 @@ class StreamDecoder:
         return found - stream.at
 
     def _skip(self, count: int) -> FrameFault | None:
-        """Discard `count` bytes outside any frame; return a violation unless already reported."""
+        """Discard `count` bytes outside any frame; return a violation unless one was reported."""
         stream = self._stream
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count
         return self._lost(
-            "no-frame", f"no frame begins with {first.hex()}; bytes before the next frame skipped"
+            "no-frame",
+            f"no frame begins with {first.hex()}; the bytes before the next frame were skipped",
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:

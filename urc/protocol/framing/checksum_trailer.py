@@ -1,7 +1,8 @@
 """Checksums after variable-length text.
 
-Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes it.
-Without the checksum, all parts of the content have fixed positions.
+Pure. On sending, a `ChecksumTrailer` adds the checksum to the content between a frame's markers; on
+receipt, it removes the checksum. Once the checksum is removed, all other parts of the content have
+fixed positions.
 """
 
 from urc.model.framing import TrailerSpec

@@ -51,7 +51,8 @@ class Checksum:
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
         """Return the bytes of the correct checksum, computed over `window`.
 
-        If the salt is unknown, the result may be None; the frame is then accepted unchecked.
+        Return None if the salt table has no row for the frame but permits such frames; the receiver
+        then skips the check.
         """
         data = window
         if self.spec.is_from_hex:
@@ -80,7 +81,7 @@ class Checksum:
         return BadFrame("bad-checksum", message, closes=self.spec.closes)
 
     def saltless(self, frame: bytes | bytearray) -> BadFrame:
-        """Return the error for sending a frame with an unknown salt."""
+        """Return the error for a frame to send that has no row in the salt table."""
         number = self.spec.salt.number(frame)
         return BadFrame("no-salt", f"the salt table of the checksum has no row {number}")
 
@@ -122,7 +123,9 @@ def _from_hex(digits: bytes) -> bytes:
     try:
         return binascii.unhexlify(digits)
     except binascii.Error:
-        raise BadFrame("bad-checksum", "the checksum needs hex digits, found other bytes") from None
+        raise BadFrame(
+            "bad-checksum", "the checksum covers hex digits, found other bytes"
+        ) from None
 
 
 def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:

@@ -37,7 +37,7 @@ class DelimiterFraming(NamedTuple):
         frame = payload if self.codec is None else encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
-                f"{payload!r} contains the delimiter {self.tx!r}: this would make two frames"
+                f"{payload!r} contains the delimiter {self.tx!r}, so it would be sent as two frames"
             )
         return frame + self.tx
 
@@ -113,8 +113,8 @@ class DelimiterDecoder(StreamDecoder):
     def ahead(self) -> list[bytes]:
         """Return all complete frames if several are buffered, without removing them.
 
-        The returned list is empty if any frame requires a check. `skip` removes processed frames
-        from the stream.
+        The returned list is empty if any frame requires a check or exceeds the size limit. `skip`
+        removes processed frames from the stream.
         """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:

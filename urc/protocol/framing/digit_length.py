@@ -1,7 +1,7 @@
 """Length fields with a variable number of digits: ``#3512``, ``512:``.
 
-Pure. The payload starts after the last digit, so the length and `adjust` count from the end of the
-length field.
+Pure. The payload starts after the last digit or the terminator, and the length and `adjust` count
+from there.
 """
 
 from urc.model.framing import LengthSpec
@@ -11,7 +11,7 @@ __all__ = ["DigitLength"]
 
 
 class DigitLength:
-    """A length field in digits, with a leading digit count or a terminator."""
+    """A length field in ASCII digits, with a leading digit count or a terminator."""
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec

@@ -140,7 +140,7 @@ class FrameCodec:
         return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
 
     def _read(self, frame: bytes) -> bytes:
-        """Return a received frame without the trailing checksum and with decoded digits."""
+        """Return a received frame with its checksum trailer removed and its digits decoded."""
         start, end = self.layout.start, self.layout.end
         if len(frame) < len(start) + len(end):
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
@@ -181,7 +181,7 @@ def _digits_of(data: bytes, digits: Digits) -> bytes:
 
 
 def length_of(spec: LengthSpec) -> "LengthField | DigitLength":
-    """Return a length field of the kind declared by `spec`."""
+    """Return the length field that `spec` declares, of fixed or variable size."""
     return DigitLength(spec) if spec.is_loose else LengthField(spec)
 
 

@@ -1,4 +1,4 @@
-"""The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
+"""The framings ``fixed`` and ``length``: frames of fixed size or with a length field.
 
 Theory of operation. If the framing has start bytes, the decoder advances to the next start bytes;
 otherwise, every byte may begin a frame. If the length, the end bytes or the checksum is wrong, only
@@ -113,7 +113,7 @@ class _MeasuredDecoder(StreamDecoder):
         return self._leave(gone) if gone else None
 
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
-        """Return the payload, a violation, or None for an already reported violation."""
+        """Return the payload or a violation; None for a violation that was already reported."""
         try:
             payload = self._codec.open(frame)
         except BadFrame as error:

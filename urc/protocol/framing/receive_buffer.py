@@ -1,6 +1,6 @@
 """The receive buffer of one connection and the budget for rescanning bytes.
 
-The module is pure, and `urc.protocol.framing.table` uses it.
+Pure. The decoders in `urc.protocol.framing` use both.
 """
 
 from typing import Final

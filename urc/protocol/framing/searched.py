@@ -26,7 +26,7 @@ Search = Callable[[bytes | bytearray, int], Any]
 """Search function that returns the next `re` or RE2 match after a start offset, or None."""
 
 _SMALL: Final = 256
-"""Maximum size of a buffer that is searched whenever bytes arrive, in bytes."""
+"""Maximum size of a buffer that is searched each time bytes arrive, in bytes."""
 _GROWTH: Final = 8
 """A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005
@@ -58,7 +58,9 @@ class RegexFraming(NamedTuple):
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
-                raise FramingError(f"{payload!r} contains {self.tx!r}: this would make two frames")
+                raise FramingError(
+                    f"{payload!r} contains {self.tx!r}, so it would be sent as two frames"
+                )
             return frame + self.tx
         found = self.search(frame, 0)
         if found is None or found.span() != (0, len(frame)):
@@ -159,7 +161,7 @@ class _RegexDecoder(StreamDecoder):
         return None
 
     def _wait(self) -> FrameFault | None:
-        """Keep only the newest bytes, which may contain the start of a frame."""
+        """Keep the newest bytes up to the frame size limit, because a frame may begin in them."""
         fault = None
         surplus = len(self._stream) - self._max_bytes
         if surplus > 0:

@@ -1,9 +1,9 @@
 """Declared byte stuffing: escape sequences for bytes with a special meaning in the framing.
 
-Pure. Three methods of byte stuffing are sufficient for common robots. Method 1: an escape byte
-precedes a replaced byte, as in HDLC and PPP (7D and the byte xor 20) and in SLIP (a table). Method
-2: an escape byte is doubled (DLE DLE). Method 3: an additional byte follows a sequence (FD after FF
-FF FD).
+Pure. Three methods of byte stuffing cover the protocols of common robots. Method 1: an escape byte
+precedes a replaced byte, as in HDLC and PPP (0x7D, then the byte XOR 0x20) and in SLIP (a table).
+Method 2: an escape byte is doubled (DLE DLE). Method 3: an additional byte follows a sequence (FD
+after FF FF FD).
 """
 
 import re
@@ -25,7 +25,7 @@ class Stuffing:
         self.spec = spec
         self.escape = bytes((spec.byte,))
         self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
-        """Whether the escape byte may also begin a marker."""
+        """Whether the escape byte is escaped by doubling, so that it may also begin a marker."""
         self.meant = _meant(spec)
         """Decoded byte for each byte that may follow the escape byte."""
         if spec.after:
@@ -82,8 +82,7 @@ class Unstuffer:
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest decoded bytes, which are used to recognise the sequence before an inserted
-        byte."""
+        """Newest decoded bytes, for recognising the sequence before an inserted byte."""
 
     def feed(self, byte: int) -> bool:
         """Process one byte; return False for an invalid byte."""

@@ -31,7 +31,7 @@ class SwitchFraming(NamedTuple):
     otherwise: Framing | None = None
     """Framing for frames that match no case; None makes these frames invalid."""
     is_robot: bool = False
-    """Whether the framing is for the robot's end of the connection, in an emulated robot."""
+    """Whether the framing is for the robot's end of the connection, as in an emulated robot."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":
@@ -136,7 +136,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """End the case after the result `found`; return None for a violation already reported."""
+        """End the case after the result `found`; return None if it repeats a reported violation."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False

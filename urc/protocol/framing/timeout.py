@@ -1,10 +1,10 @@
-"""Timeouts for any framing and removal of terminal escape sequences.
+"""Timeouts for any framing, and removal of terminal escape sequences.
 
 Theory of operation. An incomplete frame blocks all later frames. For example, a corrupted length
-field may require bytes that never arrive. With a timeout, silence after the newest byte ends the
-wait. After the timeout, bytes are dropped one by one, until the remaining bytes contain valid
-frames. Terminal escape sequences are removed before framing, because they could split a marker or
-other text.
+field may require bytes that never arrive. With a timeout, the wait ends after a period of silence.
+After the timeout, bytes are dropped one by one, until the remaining bytes contain valid frames.
+Terminal escape sequences are removed before framing, because they could split a marker or other
+text.
 """
 
 import re
@@ -20,8 +20,8 @@ _SEQUENCE: Final = re.compile(
     rb"\x1b(?:\[[0-?]{0,64}[ -/]{0,8}[@-~]|\][^\x07\x1b]{0,256}(?:\x07|\x1b\\)"
     rb"|[ -/]{0,8}[0-Z\\^-~])"
 )
-"""ECMA-48 escape sequence: a control sequence, an operating system command such as a title, or a
-single escape."""
+"""ECMA-48 escape sequence: a control sequence, an operating system command such as a window title,
+or a two-character escape."""
 _MOST_TRIES: Final = 4096
 """Maximum number of attempts to find the start of the next frame; each attempt may scan all
 remaining bytes."""

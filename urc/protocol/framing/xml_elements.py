@@ -19,7 +19,7 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""Terminators of sections without tags, keyed by the section's first characters."""
+"""Terminators of comments, CDATA sections and declarations, keyed by their first characters."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
@@ -77,7 +77,7 @@ class _XmlDecoder(StreamDecoder):
         """Offset of an incomplete tag; -1 outside tags."""
         self._quote = b""
         self._until = b""
-        """Terminator of the current comment, declaration or plain text."""
+        """Terminator of the current comment, CDATA section or declaration; empty outside them."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         """Remove and return the next frame or violation; return None if it is incomplete."""

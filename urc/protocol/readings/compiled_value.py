@@ -35,7 +35,7 @@ _JSON_TYPES: Final = {
 
 
 class Value(NamedTuple):
-    """The source text for converting one field to a sample."""
+    """Source text that converts one field to a sample."""
 
     signal: Signal
     convert: str

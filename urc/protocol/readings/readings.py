@@ -34,7 +34,7 @@ class _Computed(NamedTuple):
 
 
 class Readings:
-    """The conversion of fields to samples, with formula inputs and alarm states.
+    """A converter from fields to samples, which keeps the formula inputs and the alarm states.
 
     Args:
         signals: loaded signals, keyed by name; no computed signal may depend on itself.
@@ -130,7 +130,8 @@ class Readings:
     def tick(self, now: float) -> list[Sample]:
         """Return the samples that have changed by `now` without new data, with their arrival times.
 
-        The result contains the newest samples of signals with a new alarm, and debounced samples.
+        The result contains the newest samples of signals whose alarm has changed, and debounced
+        samples.
         """
         samples: list[Sample] = []
         if self._change_filter:

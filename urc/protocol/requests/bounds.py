@@ -1,4 +1,4 @@
-"""Limits of a command: maximum duration and transports in use.
+"""Bounds of a command: its maximum duration and the transports that it uses.
 
 Pure. Every wait in an engine has a timeout. The maximum duration of a command is the sum of all its
 timeouts.
@@ -152,7 +152,7 @@ def _step_s(step: Step, spec: TransportSpec | None) -> float:
 
 
 def lines_of(name: str, driver: Driver) -> frozenset[str]:
-    """Return the names of the transports that a sequence and its nested sequences use."""
+    """Return the names of the transports that a command and its nested commands use."""
     found: set[str] = set()
     names, seen = [name], set[str]()
     while names:

@@ -135,7 +135,7 @@ def _check(variable: str, kind: str) -> str:
 
 
 def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
-    """Return the delimiter as text; None if the frame content may contain the delimiter."""
+    """Return the delimiter as text; raise `_Unsupported` if the frame content may contain it."""
     literals = [one.value for one in pieces if isinstance(one, ast.Constant)]
     texts = [text.encode(encoding) for text in literals if isinstance(text, str)]
     if any(tx and tx in text for text in texts) or not _IN_NUMBERS.isdisjoint(tx):

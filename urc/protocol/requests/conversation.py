@@ -291,8 +291,9 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream and report their samples together.
 
-        Processing short frames one by one takes almost twice as long as in batches (decision 27). A
-        batch ends after the expected reply or a rejected value, or before another kind of frame.
+        Processing short frames one by one takes almost twice as long as processing them in batches
+        (decision 27). A batch ends after the expected reply or a rejected value, or before another
+        kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,

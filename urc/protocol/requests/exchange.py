@@ -61,7 +61,7 @@ class CompiledRequest(NamedTuple):
     """A compiled request for a command, poll, keepalive or step."""
 
     label: str
-    """Label of the request in messages: the name of the command, or ``polls.0``."""
+    """Label of the request in messages: the name of the command or poll, such as ``polls.0``."""
     encode: Encode
     answers: tuple[CompiledReply, ...] = ()
     """Expected replies, one for each stage; () means no reply."""
@@ -90,7 +90,7 @@ class CompiledRequest(NamedTuple):
     queue_s: float = 0.0
     """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader for the reply if the request has a single reply that contains only samples; otherwise
+    """Reader for the reply if the only reply is one frame that contains only samples; otherwise
     None."""
     is_miss_harmless: bool = False
     """Whether missing replies are counted only for the poll and never indicate a lost

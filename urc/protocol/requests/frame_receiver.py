@@ -64,7 +64,7 @@ class SentSecrets:
 new = tuple.__new__
 """Fast constructor of named tuples, used for every frame."""
 _SHOWN_BYTES = 20
-"""Number of bytes from an unknown frame to include in a message."""
+"""Maximum number of bytes of an unknown frame that a message shows."""
 _NO_MATCH = "no declaration matches "
 
 
@@ -136,7 +136,7 @@ class FrameReceiver:
 
         Args:
             since: start time of the wait, in seconds.
-            instead: the reason why the frame is unexpected, such as "no answer to home".
+            instead: text to follow "which is" in the clause, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:

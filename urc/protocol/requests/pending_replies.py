@@ -41,7 +41,7 @@ class PendingReply:
         self.due = now + ask.answers[0].timeout_s
         """Time at which the reply becomes overdue, or a late transmission is removed."""
         self.size = 0
-        """Size of the request in the robot's receive buffer, in bytes."""
+        """Number of bytes that the request takes in the robot's receive buffer."""
         self.since = now
         """Start time of the wait for the current reply, in seconds."""
         self.is_extended = False
@@ -149,7 +149,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def waiting(self) -> int:
-        """Number of pending replies, excluding real-time requests."""
+        """Number of pending replies, excluding late replies and replies to real-time requests."""
         return sum(
             1 for pending in self if not pending.is_late and not pending.exchange.is_realtime
         )
@@ -201,11 +201,11 @@ class PendingReplies(list[PendingReply]):
         return None
 
     def collects_lines(self) -> bool:
-        """Return whether any received frame might be part of a pending multi-frame reply."""
+        """Return whether a multi-frame reply is pending, so that any frame may be part of it."""
         return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
-        """Return the only transmission if its pending reply contains only samples, else None."""
+        """Return the only transmission if its reply contains only samples; otherwise None."""
         if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
             return None
         return self[0]

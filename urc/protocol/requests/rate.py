@@ -65,7 +65,7 @@ class FrameCounters:
 
     @property
     def count(self) -> Count:
-        """How the frame changes the connection's counters."""
+        """Changes that the frame makes to the connection's counters."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 

@@ -1,4 +1,4 @@
-"""Expected replies: the matching of frames, and the collection of several frames.
+"""Expected replies: matching of single frames, and collection of multi-frame replies.
 
 Pure. A `Matcher` decodes one kind of frame. A `CompiledReply` is the reply that a request expects.
 An `Expectation` collects the frames of one reply. The conversation of the transport
@@ -89,7 +89,7 @@ class CompiledReply(NamedTuple):
     asides: tuple[tuple[Aside, Matcher], ...] = ()
     """Provisional replies, as pairs of kind and matcher."""
     extend_s: float = 0.0
-    """Maximum total extension of the timeout, in seconds."""
+    """Maximum total wait for a reply whose timeout is extended, in seconds."""
     is_silence: bool = False
     """Whether silence until the reply timeout counts as success."""
     takes_redirects: bool = False

@@ -145,7 +145,7 @@ def layout_of(name: str, definitions: Definitions, *, is_ros1: bool = False) -> 
     Args:
         name: type name in any form.
         definitions: definitions of the type and of all nested types.
-        is_ros1: whether empty types take no space.
+        is_ros1: whether to use the ROS 1 format, in which empty types take no space.
 
     Raises:
         BadDefinition: a type is missing, nested too deeply, or too large.

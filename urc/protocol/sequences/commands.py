@@ -152,7 +152,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return an argument value as it would be written in a document key."""
+    """Return an argument value in the notation of a document's keys."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)

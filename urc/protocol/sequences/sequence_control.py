@@ -13,8 +13,9 @@ PAUSE_S: Final = 600.0
 other sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
-"""A control request from the operator. ``step`` runs one outermost step and then pauses. If
-``step`` is requested before the start, the sequence pauses before its first step."""
+"""A control request from the operator. On a paused sequence, ``step`` runs one outermost step and
+pauses again. Otherwise, ``step`` pauses the sequence before its next outermost step, which may be
+its first."""
 
 
 class SequenceControl:

@@ -56,7 +56,8 @@ def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
 def raw_of(item: Item) -> Callable[[Any], Any]:
     """Return a function that converts the value to the raw form, or raises `NotWritable`.
 
-    Numbers are rounded to the nearest whole number; halves are rounded to the nearest even number.
+    Values of integer items are rounded to the nearest whole number; halves are rounded to the
+    nearest even number.
     """
     numbers = {word: number for number, word in item.enum}
     number, valid, scale, offset = item.number, item.valid, item.scale, item.offset

@@ -2,8 +2,8 @@
 
 Pure. These closures are the inverse of the closures in `urc.protocol.struct.read`. Theory of
 operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values
-leave a gap in the frame until the missing number can be computed. For the size of a later item, the
-`Backpatch` is stored in the scope. Values that depend on the size of the whole frame are stored in
+leave a gap in the frame until the missing number can be computed. Gaps for the size of a later item
+are stored in the scope. Gaps for values that depend on the size of the whole frame are stored in
 `FrameBuilder.late`.
 """
 

@@ -183,7 +183,7 @@ def _to_base(base: int) -> Step:
 
 
 def _absent(values: tuple[Value, ...]) -> Step:
-    """Return the step that converts `values` to None, including ``inf`` and ``all_ones``."""
+    """Return the step that converts NaN and `values` (also ``inf``, ``all_ones``) to None."""
     texts = {value for value in values if isinstance(value, str)}
     booleans = {value for value in values if isinstance(value, bool)}
     numbers = {

@@ -25,7 +25,7 @@ __all__ = [
 
 
 class BadText(ValueError):
-    """The frame is not valid text in the connection's encoding; the message states the position."""
+    """The frame is not valid text in the connection's encoding; the message shows the bytes."""
 
 
 class BadItem(BadText):
