@@ -55,7 +55,7 @@ class AlarmStore:
         self.fault = ""
         """Reason why alarms currently cannot be stored, or ""."""
         self.lost = 0
-        """Number of events that the history has lost since the start."""
+        """Number of events dropped since the start, because too many were waiting."""
         self._most_events = most_events
         self._known: dict[str, dict[str, AlarmRecord]] | None = None
         """Newest record of each alarm, keyed by robot and signal; None before the first `load`."""
@@ -108,7 +108,7 @@ class AlarmStore:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait for all writes; return whether they are done.
+        """Wait until all changes are written; return False after a timeout.
 
         Never call this method on the event loop.
         """
@@ -148,7 +148,7 @@ class AlarmStore:
                 base.close()
 
     def _next_batch(self) -> tuple[_Records, list[tuple[str, AlarmEvent]]] | None:
-        """Wait for changes and return them; return None after `close`."""
+        """Wait for changes and return them; None once the store is closed and has none left."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()

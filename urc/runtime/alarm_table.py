@@ -37,7 +37,7 @@ FILE: Final = "alarms.sqlite"
 MOST_EVENTS: Final = 100_000
 """Number of newest events to keep in the history."""
 _SPARE: Final = 1000
-"""Number of excess events that are deleted together."""
+"""Number of events beyond the maximum that triggers a deletion."""
 _VERSION: Final = 1
 _LONGEST_S: Final = 5.0
 """Maximum duration of one search, in seconds."""
@@ -147,7 +147,7 @@ def append_events(base: sqlite3.Connection, events: Iterable[tuple[str, AlarmEve
 
 
 def prune_events(base: sqlite3.Connection, most: int = MOST_EVENTS) -> None:
-    """Delete the oldest events beyond `most`, inside a transaction."""
+    """Delete the oldest events beyond `most` once `_SPARE` have accumulated, in a transaction."""
     first, last = base.execute("SELECT min(id), max(id) FROM events").fetchone()
     if first is not None and last - first >= most + _SPARE:
         base.execute("DELETE FROM events WHERE id <= ?", (last - most,))

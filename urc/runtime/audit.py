@@ -10,7 +10,7 @@ first.
 
 Each row contains a hash of itself and the previous row, so `urc.runtime.audit_check.check` detects
 a changed, removed or inserted row. The hashes do not protect against an attacker who rewrites the
-whole file. A copy exported to another place does protect against such an attacker.
+whole file. Only a copy exported to another place reveals such a change.
 """
 
 import logging
@@ -128,7 +128,7 @@ class AuditLog:
                 base.close()
 
     def _next_batch(self) -> list[AuditEntry]:
-        """Wait briefly for a batch and return the queued entries; return [] after `close`."""
+        """Wait for entries and return a batch; [] once the log is closed and the queue is empty."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()

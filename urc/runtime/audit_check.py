@@ -38,7 +38,7 @@ class ExportCheck(NamedTuple):
     entries: int
     """Number of checked entries."""
     fault: str
-    """Message about the first fault; "" if the export is intact."""
+    """Message about the first invalid entry; "" if the export is intact."""
     gap: str
     """Message about the first missing entry; exports for selected robots have such gaps."""
     last: int = 0
@@ -134,7 +134,7 @@ def check_export(lines: Iterable[str]) -> ExportCheck:
 
 
 def compare(file: Path, export: ExportCheck) -> str:
-    """Return a message if the audit log lacks an export's last entry, otherwise ""; see `check`.
+    """Return a message if an export's last entry is missing from the audit log or differs, else "".
 
     An export kept elsewhere therefore shows whether entries were removed from the end of the log.
 

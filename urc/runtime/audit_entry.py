@@ -22,7 +22,7 @@ class AuditEntry(NamedTuple):
     """One entry. The caller must remove secrets from all text."""
 
     at: float
-    """UTC time of this machine's clock, in seconds since 1970."""
+    """UTC time of the event by this machine's clock, in seconds since 1970."""
     robot: str
     """Name of the robot; "" for a server event."""
     what: str
@@ -60,7 +60,7 @@ COLUMNS: Final = AuditEntry._fields
 
 
 def link(before: str, entry: AuditEntry, version: int = VERSION) -> str:
-    """Return the link of an entry after the link `before`, which is "" for the first entry."""
+    """Return the link of an entry; `before` is the previous link, or "" for the first entry."""
     covered = entry if version > 1 else entry[:FIRST_COLUMNS]
     text = before + json.dumps(covered, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -177,7 +177,7 @@ class AuditRecorder:
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
-        """Record a change of the lease: a new holder, a latched STOP or a reset."""
+        """Record a change of the lease: its holder, a request for control, STOP or its reset."""
         before, self._lease = self._lease, state
         cause = self._cause or _NOBODY
         if state.latched_by and not before.latched_by:

@@ -1,8 +1,8 @@
 """A backup archive: one private ZIP file with the permanent content of a data folder.
 
-Layer 4. The archive begins with ``urc-backup.json``. `PARTS` lists all files in a backup. Links,
-oversized files and all other names are rejected, so a foreign archive cannot write outside the data
-folder. Copies of SQLite files are consistent, even while a server is writing.
+Layer 4. The archive begins with ``urc-backup.json``. All other files match `PARTS`. Links,
+oversized files and paths that do not match `PARTS` are rejected, so a foreign archive cannot write
+outside the data folder. Copies of SQLite files are consistent, even while a server is writing.
 """
 
 import os
@@ -204,7 +204,7 @@ class BackupReader:
     """An open archive with checked names and sizes."""
 
     def __init__(self, opened: IO[bytes], name: str) -> None:
-        """Check the entire directory of the archive.
+        """Read the archive's directory and check every entry.
 
         Args:
             opened: the archive.

@@ -1,6 +1,7 @@
 """The failure of a command.
 
-Layer 4. The error has a separate module, because clients of a server need it without the engine.
+Layer 4. The exception has a separate module, so that clients of a server can import it without the
+engine.
 """
 
 from urc.problems import UrcError
@@ -11,8 +12,8 @@ __all__ = ["CommandFailed"]
 class CommandFailed(UrcError):
     """The failure of a command.
 
-    `code` is ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full`` or
-    ``unknown-command``; a server adds ``busy`` and ``not-confirmed``. `message` is for display.
+    `code` is a failure code of `urc.protocol.events.Failed`, such as ``timed-out`` or ``refused``,
+    or an additional code of a client, such as ``busy``. `message` is text for display.
     """
 
     def __init__(self, code: str, message: str) -> None:

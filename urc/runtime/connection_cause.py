@@ -1,7 +1,8 @@
-"""The causes of failed connections, each with advice for the operator, in one table for all pages.
+"""The causes of failed connections, each with advice for the operator.
 
 Layer 4. Pure. Transports report errors in the words of the operating system or a library. The table
-recognises the usual errors. Pages translate a cause by its name (`core/connection_causes.js`).
+recognises the usual errors for all pages. Pages translate a cause by its name
+(`core/connection_causes.js`).
 """
 
 import re

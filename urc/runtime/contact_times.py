@@ -1,4 +1,4 @@
-"""The times of each robot's last use and last data, stored across restarts.
+"""The times at which each robot was last used and last sent data, stored across restarts.
 
 Layer 4. The store keeps the times in memory. The method `save` writes a small file and may block,
 so the server calls `save` in a thread. If the file is lost, only the order of the robots in the
@@ -79,7 +79,7 @@ class ContactStore:
         return self._times.get(key, NO_CONTACT)
 
     def note(self, key: str, now: float, *, is_used: bool, is_seen: bool) -> None:
-        """Set the times of a robot that is now in use or sending data.
+        """Record that a robot is in use or sending data at the time `now`.
 
         Args:
             key: the result of `key`.

@@ -14,7 +14,7 @@ __all__ = ["Coverage", "Exercised", "measure", "summary"]
 
 _KINDS: Final[tuple[Kind, ...]] = ("command", "poll", "message")
 _NAMED_MOST: Final = 3
-"""Maximum number of names in the summary; other names are only counted."""
+"""Maximum number of names in the summary; a longer list is replaced by counts."""
 
 
 class Coverage(NamedTuple):

@@ -4,8 +4,9 @@ Layer 4. The files are extracted and checked in a separate folder, ``restoring-â
 files move to ``replaced-â€¦``, and the new files replace them. After an error, the old files are
 moved back.
 
-A latched STOP stays latched. A newer block list stays in force. A replaced audit log stays in the
-data folder under another name.
+A STOP that is latched in the data folder or in the backup is latched afterwards. Block lists that
+are newer than the backup's stay in force. A replaced audit log stays in the data folder under
+another name.
 """
 
 import json
@@ -34,11 +35,11 @@ _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
 """Suffixes of the files that SQLite stores next to a database."""
 _LATCH_BYTES: Final = 4096
 _OLD: Final = "replaced-????????"
-"""Pattern for the names of folders with replaced files."""
+"""Pattern for the names of the folders that contain replaced files."""
 
 
 def check_target(data: Path, *, replaces: bool) -> None:
-    """Check that a backup can be restored into a data folder.
+    """Raise an error if a backup cannot be restored into a data folder.
 
     Args:
         data: the data folder.
@@ -61,7 +62,7 @@ def check_target(data: Path, *, replaces: bool) -> None:
 
 
 def is_interrupted(data: Path) -> bool:
-    """Return whether a power failure interrupted a restore."""
+    """Return whether an earlier restore was interrupted, such as by a power failure."""
     return any(data.glob(_OLD))
 
 
@@ -124,7 +125,7 @@ def _check_base(file: Path) -> None:
 
 
 def _merge_latches(new: Path, old: Path) -> None:
-    """Keep stopped robots stopped, and keep lease numbers from decreasing."""
+    """Keep stopped robots stopped, and never decrease the epoch of a lease."""
     for kept in old.rglob("*.latch.json"):
         restored = new / kept.relative_to(old)
         now, then = _latch(kept), _latch(restored)
@@ -192,7 +193,7 @@ def _swap(new: Path, old: Path, data: Path) -> None:
 
 
 def _keep_audit(old: Path, data: Path) -> None:
-    """Keep a replaced audit log, because no person may delete entries."""
+    """Keep a replaced audit log under a new name, because a restore must not delete entries."""
     if (old / AUDIT_FILE).exists():
         name = f"audit-before-{time.strftime('%Y%m%dT%H%M%S')}_{secrets.token_hex(2)}.sqlite"
         for end in ("", *_SIDE_FILES):

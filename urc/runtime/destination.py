@@ -32,9 +32,9 @@ third-party transports, counts as part of the destination."""
 
 
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-    """Return a digest of all destinations that a robot's settings can reach.
+    """Return a digest of a robot's destinations with the given settings.
 
-    Packages with the same transports and destinations have the same digest.
+    Versions of a package with the same transports and destinations have the same digest.
 
     Args:
         profile: profile with the transports.

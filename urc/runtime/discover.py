@@ -1,4 +1,4 @@
-"""The topics of a rosbridge robot, and the YAML that declares them in a document."""
+"""List the topics of a robot behind rosbridge, and write the YAML that declares them."""
 
 import asyncio
 import re
@@ -43,7 +43,7 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
     """Query rosapi for all topics; this function opens and closes the rosbridge transport.
 
     Raises:
-        TransportError: the bridge or rosapi does not respond.
+        TransportError: the bridge or rosapi does not respond, or the reply contains no topics.
     """
     try:
         await transport.open(timeout_s)

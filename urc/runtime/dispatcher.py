@@ -1,7 +1,7 @@
 """The dispatcher: the only caller of a driver's engine.
 
 All calls to the engine run on the event loop, one after another, and are never nested. Executing an
-event only changes the state of a `Link`, the hub or a future. The links' tasks react later. A
+event changes only the state of a `Link`, the hub or a future. The links' tasks react later. A
 driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
@@ -206,8 +206,8 @@ class Dispatcher:
             hub: destination of readings and log entries.
             clock: source of time.
             commands: the driver's commands, keyed by name.
-            limit_s: function that returns the maximum wait for a command in seconds, even if the
-                engine is still busy.
+            limit_s: function that returns the time limit of a command, in seconds; the command then
+                fails even if the engine is still working on it.
             sequence_control: state and controls of each sequence, by sequence name.
             motion: handler of held-command events; None ignores the events.
         """
@@ -278,7 +278,7 @@ class Dispatcher:
         return answer
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Pause, continue or end a sequence; do nothing if the sequence is not running."""
+        """Pass an operator's control request to a sequence; ignore an unknown sequence."""
         sequence_control = self._sequence_control.get(sequence)
         if sequence_control is not None:
             sequence_control.pull(what)
@@ -380,7 +380,7 @@ class Dispatcher:
                 self._ports[transport].want_close(reason)
 
     def _arm_after(self, now: float) -> None:
-        """Call `_arm` unless the timer will fire early enough."""
+        """Call `_arm` unless the current timer fires early enough."""
         # Without this check, a text poll costs 1.32 times as much as a hand-written driver, instead
         # of 1.2 times (decision 30).
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:

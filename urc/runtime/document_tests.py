@@ -57,7 +57,7 @@ def exercise(profile: Profile) -> TestReport:
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
     """Return a value for every setting: the default, or an example of the setting's type.
 
-    Optional settings stay empty.
+    Optional settings without a default stay empty.
     """
     values: dict[str, Value] = {}
     for name, setting in settings.items():
@@ -255,7 +255,7 @@ def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
         if step.closed in trial.closed:
             trial.closed.discard(step.closed)
         else:
-            complaints.append(f"{step.closed} should have been closed by URC, but is open")
+            complaints.append(f"URC should have closed {step.closed}, but it is open")
     return complaints
 
 

@@ -56,7 +56,9 @@ def start_guard_client(
     if is_guarded and CAN_GUARD:
         return GuardClient(lines, held, PipeChannel)
     if is_guarded:
-        log.warning("this system has no guard: if the server hangs, robots are not stopped")
+        log.warning(
+            "this system cannot run a guard process: if the server hangs, robots are not stopped"
+        )
     return GuardClient(lines, held, partial(LocalChannel, lines=lines, clock=clock))
 
 

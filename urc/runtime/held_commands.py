@@ -61,10 +61,10 @@ class MotionBackend(Protocol):
         """Return whether ticks of `command` are accepted; a lost connection disarms the command."""
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may still be moving, or its stop may still be repeated."""
+        """Return whether `command` may still move the robot, or its stop may still be repeated."""
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may be moving, because no stop is known to have been sent."""
+        """Return whether `command` may still move the robot, as no stop is known to be sent."""
 
     def is_open(self, command: str) -> bool:
         """Return whether the transport of `command` is connected, as last reported."""
@@ -76,7 +76,7 @@ class MotionBackend(Protocol):
         """Stop all motion immediately; `stops` maps each held command to its stop frame."""
 
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
-        """Wait for written or lost stop frames; return the command and the report for each frame.
+        """Wait until stop frames are written or lost; return a command and a report for each frame.
 
         The returned list is in order and never empty. If the wait is cancelled, no stop is lost.
         After the transport has accepted the stop frame, a control that was stopped by `stop` is
@@ -129,7 +129,7 @@ class HeldControl:
     """Epoch of the lease in which the command was stopped; motion requires a later epoch."""
 
     def rest(self) -> None:
-        """Reset the slew rate limit, because the control is at rest."""
+        """Reset the slew rate limiter, because the control is at rest."""
         if self.slew is not None:
             self.slew.reset()
 

@@ -81,7 +81,7 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the sequence number of each signal's oldest reading, keyed by signal.
+        """Return the number of each signal's first new reading, keyed by signal.
 
         `names` contains one signal name for each new reading.
         """
@@ -139,7 +139,7 @@ class LogEntry:
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Traffic of a connection, recorded only while a reader watches."""
+    """Traffic of a connection, recorded only while the hub has traffic readers."""
 
     time_s: float
     transport: str
@@ -150,7 +150,7 @@ class Traffic:
 
 
 class HubSubscription:
-    """A reader's position: the last revision seen, and an event for newer revisions."""
+    """A reader's position: the last revision that it has seen, and an event for newer revisions."""
 
     def __init__(self, hub: "Hub") -> None:
         self._hub = hub
@@ -279,7 +279,7 @@ class Hub:
         self.traffic_watchers = 0
         """Number of traffic readers; traffic is recorded only if this number is above 0."""
         self.streams = SampleHistory()
-        """Signals whose readings are all kept; empty by default."""
+        """Recent readings of the signals that keep every reading; empty by default."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()

@@ -40,8 +40,8 @@ def look_apart(
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: the document refers to a file outside the folder, or exceeds the memory or time
-            limit.
+        UrcError: the document refers to a file outside the folder, has this machine as a fixed
+            host, or exceeds the memory or time limit.
     """
     asked = json.dumps([str(document), str(folder), list(widgets)])
     command = [sys.executable, *COMMAND]

@@ -39,7 +39,7 @@ _UNKNOWN = Latch(LeaseState(latched_by=_UNREADABLE), is_owed=True)
 class LatchStore:
     """The stored latch of one robot.
 
-    Call `load` before the first `keep`; call `keep` on the event loop.
+    Call `load` before the first `save`; call `save` on the event loop.
     """
 
     def __init__(self, folder: Path, robot: str) -> None:
@@ -72,7 +72,7 @@ class LatchStore:
         except (OSError, ValueError, KeyError, TypeError) as error:
             log.warning("%s cannot be read (%s): the robot stays stopped", self._file, error)
             return _UNKNOWN
-        log.warning("%s is not a record of a stop: the robot stays stopped", self._file)
+        log.warning("%s is not a valid stop record: the robot stays stopped", self._file)
         return _UNKNOWN
 
     def save(self, kept: Latch) -> None:

@@ -6,11 +6,12 @@ the loop waits for the backoff delay, and finally for the end of the connection.
 writer run while the connection is open. The robot, the engine or a rule of the link can end a
 connection. Every connection ends through `_end`, and only `_serve` stops the reader and the writer.
 
-A connection counts as good after its first valid frame, and only a good connection resets the
-backoff. URC therefore does not flood a robot that accepts every connection and then closes it. If
-there are ``on_connect`` steps, frames do not count until the steps are done, because a robot may
-refuse the login after a greeting. Pages show the `LinkStatus`. While attempts fail, only the number
-of attempts in the status changes.
+Only a good connection resets the backoff. A connection is good after its first valid frame. If the
+robot sends nothing without a request, the connection is good after `SETTLE_S`. URC therefore does
+not flood a robot that accepts every connection and then closes it. If there are ``on_connect``
+steps, frames do not count until the steps are done, because a robot may refuse the login after a
+greeting. Pages show the `LinkStatus`. While attempts fail, only the number of attempts in the
+status changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` avoids task switches. Bytes that arrive while the reader waits
@@ -55,7 +56,7 @@ HURRY_S = 1.0
 """Minimum interval between two attempts that operators request, in seconds. Repeated requests,
 even from many pages, therefore do not flood a robot that refuses connections."""
 SETTLE_S = 1.0
-"""Age after which a connection counts as accepted by the robot, in seconds."""
+"""Age at which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
 """Extra time for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
@@ -117,10 +118,10 @@ class Link:
         """Future for the reason why the connection ended; None if there is no connection."""
         self._forget_connection()
         self._is_overdue = False
-        """Whether the robot has been silent since the last request."""
+        """Whether a reply or other data from the robot is overdue."""
         self.tried = asyncio.Event()
-        """Event that is set after the first attempt, or immediately if the engine decides when to
-        connect."""
+        """Event that is set after the first attempt; set from the start if the engine decides when
+        to connect."""
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
@@ -140,7 +141,7 @@ class Link:
         self._has_heard = False
         """Whether a valid frame arrived before the steps were done."""
         self._has_stood = False
-        """Whether the connection is older than `SETTLE_S`."""
+        """Whether the connection has been open for `SETTLE_S`."""
 
     @property
     def is_full(self) -> bool:
@@ -417,7 +418,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes now, unless there are too many or earlier bytes are waiting."""
+        """Handle received bytes at once, unless there are too many or earlier bytes are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended

@@ -75,7 +75,7 @@ class LinkReport:
 
     @property
     def is_well(self) -> bool:
-        """Whether the state would stay the same after another valid frame."""
+        """Whether another valid frame would leave the state unchanged."""
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "", *, is_ready: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Detect host names of this machine or of a device attached to it.
+"""Detect hosts that are this machine or have a link-local address.
 
 A package with a fixed local host would connect to programs on the computer of the person who
 installs it. A package may therefore address this machine only through a setting.

@@ -16,9 +16,10 @@ EVERY_S: Final = 0.1
 LATE_S: Final = 0.1
 """Minimum delay that is counted and reported, in seconds."""
 TOO_LATE_S: Final = 0.5
-"""Delay that stops motion regardless of the lease, in seconds."""
+"""Delay after which motion is stopped even if the lease is still valid, in seconds."""
 QUIET_S: Final = 10.0
-"""Length of the interval within which several delays are reported as one, in seconds."""
+"""Maximum interval between two delays of one series, in seconds. Only the first delay of a series
+is logged."""
 
 log = logging.getLogger(__name__)
 

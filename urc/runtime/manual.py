@@ -253,7 +253,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Describe what the server sends after a release or a loss of contact with the operator."""
+    """List what the server sends after a release or a loss of contact with the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -270,7 +270,7 @@ def _releases(driver: Driver) -> Iterator[str]:
 
 
 def _by_itself(watchdog_s: float | None) -> str:
-    """Describe what the robot does if no more frames arrive, not even for a release."""
+    """Describe the robot's reaction if no more frames arrive, not even for a release."""
     if watchdog_s is None:
         return "The document does not state whether the robot stops by itself."
     if math.isinf(watchdog_s):

@@ -110,7 +110,7 @@ class MotionController:
         return [name for name in self._stops if name in self._unconfirmed]
 
     def given(self, command: str) -> None:
-        """Record that a stop command has reached the robot."""
+        """Record that a stop command, or the stop of a held command, has reached the robot."""
         if command in self._unconfirmed:
             self._unconfirmed.discard(command)
             if self.is_confirmed:
@@ -126,7 +126,7 @@ class MotionController:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether all frames of the last stop were written."""
+        """Whether the last stop is confirmed: all its frames written and its commands delivered."""
         return not self._unconfirmed
 
     @property

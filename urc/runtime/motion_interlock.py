@@ -84,7 +84,7 @@ class MotionInterlock:
             self._latched = f"STOP was latched by {by}: reset it first" if by else ""
 
     def _asked(self) -> str:
-        """Return a server's first reason for refusing motion, or ""."""
+        """Ask the servers; return the first reason for refusing motion, or ""."""
         for file, server in servers(self._data).items():
             why = self._answer(file, server)
             if why:

@@ -1,9 +1,9 @@
 """Commands without a held control: their permission checks, and how STOP affects them.
 
-Layer 4. Only held commands require the lease. All other commands require the role of an operator: a
-watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
-STOP is latched or another operator is driving. The engine checks the latch again, because a command
-may have waited in a queue or for a confirmation.
+Layer 4. Only held commands require the lease. All other commands require the role ``drive`` or a
+higher role, so a watcher cannot send commands. A command that starts autonomous motion (``moves``)
+also fails while STOP is latched or another operator is driving. The engine checks the latch again,
+because a command may have waited in a queue or for a confirmation.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ HELD = "this command moves the robot only while a control is held; it cannot be 
 
 
 class Drivable(MotionSession, Protocol):
-    """The part of a robot's session that the controls use."""
+    """The part of a robot's session that held and one-shot commands use."""
 
     @property
     def hub(self) -> Hub:
@@ -96,7 +96,7 @@ def role_refusal(client: Operator, needed: Role) -> str:
 
 
 class OneShotCommands:
-    """One robot's commands that need no held control."""
+    """The commands of one robot that do not need a held control."""
 
     def __init__(
         self,
@@ -180,7 +180,7 @@ class OneShotCommands:
             self._pressed.set()
 
     def reset(self) -> None:
-        """Stop sending the stop commands after a reset."""
+        """Permit autonomous motion again after a reset."""
         if self._session is not None:
             self._session.latch("")
 

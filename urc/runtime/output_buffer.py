@@ -56,7 +56,10 @@ class _Shared(Protocol):
 
 
 class OutputBuffer:
-    """The output buffer of one transport. Any failure ends the connection by calling `give_up`."""
+    """The output buffer of one transport.
+
+    An overflow or a stall ends the connection by calling `give_up`.
+    """
 
     def __init__(
         self,
@@ -192,7 +195,7 @@ class OutputBuffer:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Wait up to `STUCK_S` for the robot to accept the bytes."""
+        """Call `give_up` if the robot does not accept the bytes within `STUCK_S`."""
         reason = f"the robot has accepted no bytes for {STUCK_S:g} s"
         alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._give_up(reason))
         try:

@@ -53,7 +53,7 @@ def examine(document: Path) -> list[str]:
 
 
 def problems(document: Path) -> list[Problem]:
-    """Return the output of `urc validate`, including warnings and failed tests, worst first.
+    """Return the problems that `urc validate` reports, including failed tests, errors first.
 
     Args:
         document: path of the document, such as ``TOP/drivers/puppet/driver.yaml``.

@@ -137,7 +137,7 @@ _URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#
 
 
 def risks_of(profile: Profile) -> list[str]:
-    """Return the fixed names of local resources in a package, one per line; usually empty."""
+    """Return the files, keys, programs and hosts that a package fixes, one per line."""
     found = [
         line
         for spec in profile.driver.transports.values()
@@ -173,7 +173,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
 
 
 def _own(value: Any, profile: Profile) -> str:
-    """Return the fixed text of an option, or "" if the text depends on settings."""
+    """Return the text of an option with its defaults; "" if it depends only on settings."""
     if value is None or value is False:
         return ""
     if not isinstance(value, Template):
@@ -217,7 +217,7 @@ class PackagePreview(NamedTuple):
     """Values of all keys that affect sent bytes, the decoding of replies, or rights. The values are
     stored by key path, such as ``commands.beep.send``."""
     risks: list[str]
-    """Local resources that the package uses without a setting; see `risks_of`."""
+    """Files, keys, programs and hosts that the package fixes; see `risks_of`."""
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview:

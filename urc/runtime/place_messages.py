@@ -1,6 +1,6 @@
 """Poses, positions on the Earth and laser scans as Foxglove's standard messages.
 
-Layer 4. Pure. To other programs, a signal is a number or a list without a meaning. The widgets of a
+Layer 4. Pure. A signal alone is a number or a list without a meaning. The widgets of a
 profile supply the meaning: a map shows the robot's position, and a scan shows distances around the
 robot.
 

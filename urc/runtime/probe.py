@@ -33,7 +33,7 @@ Verdict = Literal["answers", "opens", "fails"]
 
 
 class ProbeResult(NamedTuple):
-    """Test result of one transport."""
+    """The test result of one transport."""
 
     transport: str
     type: str
@@ -41,8 +41,8 @@ class ProbeResult(NamedTuple):
     """Address for display."""
     verdict: Verdict
     """The result ``answers`` means that the transport is live. The result ``opens`` means that the
-    transport is connected but the robot sends no data. The result ``fails`` means that there is no
-    connection."""
+    connection opens, but no valid data arrived. On-demand connections through a tunnel get this
+    result without a test. The result ``fails`` means that there is no connection."""
     text: str
     """Description of the result, in one line."""
     advice: str

@@ -1,12 +1,12 @@
 """One robot's alarms, which are detected from its hub's samples, stored and announced.
 
-Layer 4. Each sample includes its alarm, so each sample takes one comparison, and only changes are
-processed. The object belongs to a robot, not to a session. If there is no session, all values are
-unknown, and the alarms persist.
+Layer 4. Each sample includes its alarm, so one comparison shows whether the alarm has changed. Only
+changes are processed. The object belongs to a robot, not to a session. If there is no session, all
+values are unknown, and the alarms persist.
 
 While an alarm's expression `suppressed_when` is true, the alarm is suppressed by design. An
-expression with an unknown or stale value is false, except in the first seconds of a session, when
-the first values arrive.
+expression with an unknown or stale value counts as false. In the first seconds of a session, it
+counts as true while its first values are awaited.
 """
 
 import logging
@@ -280,7 +280,7 @@ class RobotAlarms:
         return bool(states) and not any(state in _CONNECTED for state in states)
 
     def _check(self) -> float:
-        """Handle stale values and all due changes."""
+        """Process stale values and make all due changes."""
         if self._hub is not None:
             old = [
                 name

@@ -27,7 +27,7 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A dashboard that is running or was running when the power failed."""
+    """A running dashboard, or one that ended without removing its file."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""

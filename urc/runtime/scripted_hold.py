@@ -48,7 +48,8 @@ async def hold(
         why_not: function that returns the reason to end early, or "" to continue.
 
     Raises:
-        CommandFailed: the command was refused or ended early with a stop.
+        CommandFailed: the command is not held, was refused or ended early, or the connection
+            failed.
     """
     backend = session.backend
     if backend is None:
@@ -78,7 +79,7 @@ def _now() -> float:
 
 
 async def until_ready(session: Session, backend: MotionBackend, name: str) -> None:
-    """Wait until the transport is connected and its connection steps have succeeded or failed."""
+    """Wait until the transport is ready; raise `CommandFailed` if it does not become ready."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
     while not (backend.is_open(name) and session.frames.is_ready(name)):

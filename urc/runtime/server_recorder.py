@@ -30,11 +30,11 @@ CLOCK_JUMP_S: Final = 5.0
 _BURST: Final = 60
 """Maximum number of entries about unknown visitors in one burst."""
 _PER_S: Final = 0.1
-"""Rate of entries about unknown visitors during a long attack: these entries use 3 MB of the log's
-100 MB in a day."""
+"""Maximum mean rate of entries about unknown visitors, in entries per second; an attack of one day
+fills 3 MB of the log's 100 MB."""
 _MOST_SECRETS: Final = 256
 _USERINFO: Final = re.compile(r"//[^/@\s\"]*@")
-"""User name and passphrase in a URL."""
+"""Pattern for the user name and passphrase in a URL."""
 
 log = logging.getLogger(__name__)
 
@@ -107,7 +107,7 @@ class ServerRecorder:
     # Sign-ins
 
     def signed_in(self, actor: Actor, agent: str = "") -> None:
-        """Record a sign-in; `agent` is text that names the browser and the system."""
+        """Record a sign-in; `agent` is text with the names of the browser and the system."""
         self._record("signed in", actor, outcome=agent)
 
     def sign_in_failed(
@@ -127,7 +127,7 @@ class ServerRecorder:
         self._repeat(_Repeated("sign-in failed", actor, "", "", reason))
 
     def signed_out(self, actor: Actor) -> None:
-        """Record that the owner has ended a sign-in."""
+        """Record that a person has ended their own sign-in."""
         self._record("signed out", actor)
 
     def revoked(self, actor: Actor, what: str, **about: object) -> None:
@@ -195,7 +195,7 @@ class ServerRecorder:
         file: str,
         outcome: str = "",
     ) -> None:
-        """Record a recording's event; `file` is the recording's file name without a folder."""
+        """Record the start, end, download or deletion of a recording; `file` has no folder."""
         self._record("recording", actor, step, robot, {"file": file}, outcome)
 
     def alarm(

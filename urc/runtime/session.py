@@ -104,7 +104,7 @@ class Session:
             profile: the loaded profile.
             settings: a value for every setting of the profile, as returned by `resolve_settings`.
             transports: table of the available transport types.
-            clock: source of time; None for the running event loop.
+            clock: source of time; None for the clock of the running event loop.
             random: function that returns a number in [0, 1) for the jitter of the backoff.
             motion: writer of held-command frames; see `Motion`.
 
@@ -303,8 +303,8 @@ class Session:
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, continue or end a sequence.
 
-        ``step`` starts an inactive sequence and pauses it at its first step. All verbs except
-        ``step`` have no effect if the sequence is not running.
+        If the sequence is not running, ``step`` makes its next run pause before the first step. All
+        other verbs then only cancel an earlier ``step``.
         """
         self._dispatcher.pull(sequence, what)
 

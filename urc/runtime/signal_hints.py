@@ -23,11 +23,11 @@ _WAITED_FOR: Final = {
     "slip": "for the end byte of the frame",
     "cobs": "for the end byte of the frame",
     "brackets": "for the closing bracket",
-    "json": "for the end of the JSON",
+    "json": "for the end of the JSON value",
     "xml": "for the end of the XML element",
     "regex": "for bytes that match the pattern",
 }
-"""The part that an incomplete frame lacks, by framing type."""
+"""Text after "waits" that names the missing part of a frame, by framing type."""
 
 
 class _Asked(NamedTuple):

@@ -1,7 +1,7 @@
 """Compare expected and actual results in a document's tests.
 
-Layer 4, pure. Each mismatch message contains the expected and the actual value. Callers insert the
-message into a line of text.
+Layer 4, pure. Each mismatch message contains the expected and the actual value. Callers put the
+message into a longer text.
 """
 
 import math

@@ -89,7 +89,7 @@ class TestEngine:
         Args:
             driver: driver with only the polls that the test names.
             settings: a value for every setting.
-            polls: all polls of the document, by name.
+            polls: all polls of the document.
         """
         self.driver = driver
         self.settings = settings
@@ -103,7 +103,7 @@ class TestEngine:
         self.fresh: set[str] = set()
         """Names of the signals set since the last call to `forget`."""
         self.fed: dict[str, bytes] = {}
-        """All bytes received from the robot since the connection was opened, by transport."""
+        """All bytes that the test has fed since the connection was opened, by transport."""
         self.sent: dict[str, list[Payload]] = {}
         """Sent payloads that no check has read yet, by transport."""
         self.failures: list[str] = []

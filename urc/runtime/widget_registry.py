@@ -30,7 +30,7 @@ def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
 
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
-    """Return the document's widget folders that are never used."""
+    """Return the document's widget folders that are unused, because built-in widgets hide them."""
     registry = widget_folder_of(document)
     return registry.hidden() if isinstance(registry, WidgetRegistry) else []
 

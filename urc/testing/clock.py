@@ -70,7 +70,7 @@ class FakeClock:
         await self.advance(0)
 
     async def advance(self, seconds: float) -> None:
-        """Advance the time, and run each due call and its effects in order."""
+        """Advance the time; run each due call, and the tasks that it makes ready, in order."""
         end_s = self._now + seconds
         await settle()
         while self._due and self._due[0][0] <= end_s:

@@ -21,7 +21,7 @@ def feed_three_ways(
     """Decode `data` in one piece, byte by byte, and with `trailing`; return the frames.
 
     Args:
-        decoder: function that returns a new decoder for each of the three ways.
+        decoder: function that returns a new decoder; called once for each of the three ways.
         data: complete frames.
         trailing: bytes that begin an incomplete frame.
 

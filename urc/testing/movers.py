@@ -36,7 +36,7 @@ class FakeFrames:
         return not self.number
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the command needs no further stop frame."""
+        """Return False, because rendered stop frames are never reused."""
         return False
 
     def is_ready(self, command: str) -> bool:
@@ -63,7 +63,7 @@ class FakeFrames:
         return f"{self.number + 1} " if self.number else ""
 
     def stop_frame(self, command: str) -> Payload:
-        """Return the stop frame of a command, without using a counter."""
+        """Return the stop frame of a command, without advancing the counter."""
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:

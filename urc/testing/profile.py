@@ -45,7 +45,7 @@ def line_profile(
     transport: str = "tcp",
     max_bytes: int = 65536,
 ) -> Profile:
-    """Return a profile like the puppet's: line feeds, one number signal, one poll and two commands.
+    """Return a profile like the puppet's: lines of text, two signals, one poll and two commands.
 
     Args:
         is_per_request: whether each request opens a separate connection.

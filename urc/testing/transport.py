@@ -11,7 +11,7 @@ __all__ = ["MemoryTransport", "table_of"]
 
 
 class MemoryTransport:
-    """A replacement for any transport, held in the test's memory.
+    """An in-memory replacement for any transport.
 
     The transport receives bytes from `feed` and `answer`. The callback `answer` gets all sent data
     and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.

@@ -279,7 +279,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps("wait: 1s, closed: wire"),
-            "3:9 1: wire should have been closed by URC, but is open",
+            "3:9 1: URC should have closed wire, but it is open",
         ),
     ],
 )  # fmt: skip

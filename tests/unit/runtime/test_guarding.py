@@ -122,7 +122,7 @@ def test_guard_is_a_process_where_the_system_can(
     assert not caplog.records
     monkeypatch.setattr(guarding, "CAN_GUARD", False)
     assert isinstance(scheduler(driver, is_guarded=True).channel, LocalChannel)
-    assert "this system has no guard" in caplog.text
+    assert "this system cannot run a guard process" in caplog.text
 
 
 @pytest.mark.parametrize("kind", KINDS)

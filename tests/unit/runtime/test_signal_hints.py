@@ -9,7 +9,7 @@ from urc.testing.profile import line_profile
 
 WAITING = {
     "xml": (FramingSpec("xml", {}), "<a>4", "for the end of the XML element"),
-    "json": (FramingSpec("json", {}), "[4", "for the end of the JSON"),
+    "json": (FramingSpec("json", {}), "[4", "for the end of the JSON value"),
     "regex": (
         FramingSpec("regex", {"pattern": "[0-9]+;"}),
         "4",

@@ -1,1 +1,1 @@
-"""Generates Python source from a driver and compiles the source."""
+"""Generates and compiles Python source code for a driver."""

@@ -23,7 +23,7 @@ FEEDBACK = "/feedback"
 
 
 class TopicReader:
-    """A reader for the messages on one topic; it uses the reader of another form.
+    """A reader for the messages on one topic; another form's reader decodes each message.
 
     For a topic with wildcards, the field ``_topic`` contains the actual topic.
     """

@@ -157,4 +157,6 @@ class _JsonDecoder(StreamDecoder):
         if is_long:
             text = f"a JSON value has more than {self._max_bytes} bytes; dropped"
             return self._lost("frame-too-long", text)
-        return self._lost("bad-json", "invalid JSON brackets or quotes; dropped up to the error")
+        return self._lost(
+            "bad-json", "invalid JSON brackets or quotes; the data up to the error was dropped"
+        )

@@ -24,7 +24,7 @@ __all__ = ["SwitchFraming"]
 
 
 class SwitchFraming(NamedTuple):
-    """Cases in the order of selection; each case is a pair of first bytes and framing."""
+    """A framing that selects one of several cases, in order, by the first bytes of a frame."""
 
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int

@@ -17,7 +17,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class AsymmetricFraming(NamedTuple):
-    """A framing with separate framings for sent and received data."""
+    """A framing that uses one framing for sent data and another for received data."""
 
     sent: Framing
     received: Framing

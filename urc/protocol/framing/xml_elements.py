@@ -209,4 +209,4 @@ class _XmlDecoder(StreamDecoder):
         if is_long:
             text = f"an element has more than {self._max_bytes} bytes; dropped"
             return self._lost("frame-too-long", text)
-        return self._lost("bad-xml", "invalid XML tags; dropped up to the error")
+        return self._lost("bad-xml", "invalid XML tags; the data up to the error was dropped")

@@ -39,7 +39,7 @@ class Value(NamedTuple):
 
     signal: Signal
     convert: str
-    """Expression using the raw text; "" means no conversion."""
+    """Expression that converts the raw text; "" means no conversion."""
     checks: tuple[str, ...]
     """Conditions for a valid value; ``{v}`` stands for the value."""
     raw_checks: tuple[str, ...] = ()

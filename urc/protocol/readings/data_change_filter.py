@@ -1,6 +1,6 @@
 """Dead band and debounce filters for samples.
 
-Callers pass the time, because the module reads no clock. A signal's keys ``deadband`` and
+Callers pass the time, because the module does not read a clock. A signal's keys ``deadband`` and
 ``debounce`` declare the filters.
 """
 

@@ -164,14 +164,18 @@ class _Parser:
         name = self._take()
         fields: dict[str, MessageField] = {}
         if self._peek() == ":":
-            raise BadDefinition(f"{self._owner}: {name} inherits from a structure: not supported")
+            raise BadDefinition(
+                f"{self._owner}: {name} inherits from a structure, which is not supported"
+            )
         self._take("{")
         while self._peek() != "}":
             default = self._annotations()
             kind = self._type()
             for field, length in self._names():
                 if length is not None and kind.length is not None:
-                    raise BadDefinition(f"{self._owner}: {field} is an array of arrays")
+                    raise BadDefinition(
+                        f"{self._owner}: {field} is an array of arrays, which is not supported"
+                    )
                 size = kind.length if length is None else length
                 fields[field] = MessageField(field, kind.name, size, default, kind.bound)
         self._take("}")
@@ -189,7 +193,9 @@ class _Parser:
                 length = self._size()
                 self._take("]")
             if self._peek() == "[":
-                raise BadDefinition(f"{self._owner}: {name} is an array of arrays: not supported")
+                raise BadDefinition(
+                    f"{self._owner}: {name} is an array of arrays, which is not supported"
+                )
             found.append((name, length))
             if self._take() == ";":
                 return found
@@ -210,7 +216,7 @@ class _Parser:
                 bound = self._size()
                 self._take(">")
             if inner.length is not None:
-                raise BadDefinition(f"{self._owner}: a sequence of arrays: not supported")
+                raise BadDefinition(f"{self._owner}: a sequence of arrays is not supported")
             return _Type(inner.name, 0, bound)
         if word in ("string", "wstring"):
             if self._peek() == "<":

@@ -30,7 +30,7 @@ from urc.protocol.ros.definition import (
 __all__ = ["NOW", "Unwritable", "Writer", "Written"]
 
 NOW: Final = "now"
-"""Text that stands for a point in time; the sender replaces it with the time of sending."""
+"""Placeholder for a point in time; the sender replaces it with the time of sending."""
 _HEADER: Final = b"\0\1\0\0"
 """Encapsulation identifier of CDR with little-endian numbers."""
 _SHOWN: Final = 40

@@ -78,7 +78,7 @@ class Player:
         self._wants_to_run = True
         self._is_open = False
         self._number = 0
-        """Number of changes to position or state so far."""
+        """Number of jumps to another position so far."""
         self._changed = asyncio.Event()
 
     @property
@@ -235,7 +235,7 @@ class Player:
             await self._changed.wait()
 
     def _forget(self, hub: Hub, known: Set[str]) -> None:
-        """Clear all values that first appear in the recording after the current position."""
+        """Clear all values that the recording does not contain before the current position."""
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:

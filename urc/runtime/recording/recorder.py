@@ -3,9 +3,9 @@
 Layer 4. Theory of operation. `Recorder.record` queues events and returns immediately. `record`
 never waits for a disk, because motion uses the same event loop. A separate thread does all slow
 work: reading the document, creating the file, and writing. The thread flushes the file once a
-second, so a killed process loses at most one second of events and the end of the file. If the queue
-is full, new events are lost, and the file contains a count of the lost events. If the disk is full,
-the recording ends, and `fault` contains the reason.
+second. A killed process therefore loses at most the last second of events and the end records of
+the file. If the queue is full, new events are lost, and the file contains a count of the lost
+events. If the disk is full, the recording ends, and `fault` contains the reason.
 """
 
 import asyncio
@@ -272,7 +272,7 @@ def _size(event: Tapped) -> int:
 def named(folder: Path, robot: str, number: int = 1, utc_s: float | None = None) -> Path:
     """Return the path for a recording, such as ``puppet-20261123T141502Z.mcap``.
 
-    If a name is already in use, the suffix ``-2`` or a higher number is added.
+    A `number` above 1 is added as a suffix, such as ``-2``, for a name that is already in use.
     """
     at = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(utc_s))
     more = "" if number == 1 else f"-{number}"
