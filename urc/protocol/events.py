@@ -59,7 +59,7 @@ class Close(NamedTuple):
 
     transport: str
     reason: str = ""
-    """Reason for a failure; "" means an orderly close, also of a per-request connection."""
+    """Reason for a failure; "" for an orderly close or the end of a per-request connection."""
 
 
 class Ready(NamedTuple):

@@ -26,7 +26,7 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Number of counter numbers that other frames can use before the stops must be rendered again."""
+"""Number of counter values that other frames can use before the stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
@@ -139,8 +139,8 @@ class MotionEncoder:
 
         A stop can be rendered without a connection. A stop with a counter is a series with one
         frame for each possible next number. The series is long enough for the stops of all held
-        commands on the connection. The stop is empty if each motion step ends automatically in the
-        robot.
+        commands on the connection. The stop is empty if the robot ends each motion step
+        automatically.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.

@@ -147,7 +147,7 @@ def append_events(base: sqlite3.Connection, events: Iterable[tuple[str, AlarmEve
 
 
 def prune_events(base: sqlite3.Connection, most: int = MOST_EVENTS) -> None:
-    """Delete the oldest events beyond `most` once `_SPARE` have accumulated, in a transaction."""
+    """Inside a transaction, delete the events beyond `most` if there are at least `_SPARE`."""
     first, last = base.execute("SELECT min(id), max(id) FROM events").fetchone()
     if first is not None and last - first >= most + _SPARE:
         base.execute("DELETE FROM events WHERE id <= ?", (last - most,))

@@ -13,7 +13,7 @@ class CommandFailed(UrcError):
     """The failure of a command.
 
     `code` is a failure code of `urc.protocol.events.Failed`, such as ``timed-out`` or ``refused``,
-    or an additional code of a client, such as ``busy``. `message` is text for display.
+    or a code that a client adds, such as ``busy``. `message` is text for display.
     """
 
     def __init__(self, code: str, message: str) -> None:

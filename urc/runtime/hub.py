@@ -156,7 +156,7 @@ class HubSubscription:
         self._hub = hub
         self._event = asyncio.Event()
         self.seen = 0
-        """Revision of the last change that this reader has taken."""
+        """Revision of the last change that this reader has received."""
 
     async def changed(self) -> None:
         """Wait until the hub has a revision newer than `seen`."""
@@ -433,10 +433,10 @@ class Hub:
 
     @contextmanager
     def tap(self, *, with_traffic: bool = False) -> Iterator[EventTap]:
-        """Open a tap on all samples and log entries for the duration of the context.
+        """Open a tap on all events of the hub for the duration of the context.
 
         Args:
-            with_traffic: whether to include the connections' traffic from now on.
+            with_traffic: whether to record and include the traffic of all connections.
         """
         tap = EventTap()
         self._taps.add(tap)

@@ -7,8 +7,8 @@ writer run while the connection is open. The robot, the engine or a rule of the 
 connection. Every connection ends through `_end`, and only `_serve` stops the reader and the writer.
 
 Only a good connection resets the backoff. A connection is good after its first valid frame. If the
-robot sends nothing without a request, the connection is good after `SETTLE_S`. URC therefore does
-not flood a robot that accepts every connection and then closes it. If there are ``on_connect``
+robot sends frames only on request, the connection is good after `SETTLE_S` seconds. URC therefore
+does not flood a robot that accepts every connection and then closes it. If there are ``on_connect``
 steps, frames do not count until the steps are done, because a robot may refuse the login after a
 greeting. Pages show the `LinkStatus`. While attempts fail, only the number of attempts in the
 status changes.
@@ -115,7 +115,7 @@ class Link:
         self._hurried_s = float("-inf")
         """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """Future for the reason why the connection ended; None if there is no connection."""
+        """Future that receives the reason for the connection's end; None without a connection."""
         self._forget_connection()
         self._is_overdue = False
         """Whether a reply or other data from the robot is overdue."""
@@ -141,7 +141,7 @@ class Link:
         self._has_heard = False
         """Whether a valid frame arrived before the steps were done."""
         self._has_stood = False
-        """Whether the connection has been open for `SETTLE_S`."""
+        """Whether the connection has been open for at least `SETTLE_S` seconds."""
 
     @property
     def is_full(self) -> bool:

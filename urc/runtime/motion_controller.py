@@ -161,7 +161,7 @@ class MotionController:
     def attach(self, session: MotionSession) -> None:
         """Attach a session: its engine, backend and events.
 
-        Attaching a session sends an outstanding stop.
+        If a stop is outstanding, it is sent immediately.
         """
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle

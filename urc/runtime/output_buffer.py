@@ -195,7 +195,7 @@ class OutputBuffer:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Call `give_up` if the robot does not accept the bytes within `STUCK_S`."""
+        """Call `give_up` if the robot does not accept the bytes within `STUCK_S` seconds."""
         reason = f"the robot has accepted no bytes for {STUCK_S:g} s"
         alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._give_up(reason))
         try:

@@ -36,7 +36,8 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: the document refers to a file outside the folder.
+        UrcError: the document refers to a file outside the folder, or has this machine as a fixed
+            host.
     """
     checked = check(document, built_in_catalog(), widget_folder_of(document))
     _check_inside(checked, folder)  # first, because a problem would show a line in an outside file
@@ -137,7 +138,7 @@ _URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#
 
 
 def risks_of(profile: Profile) -> list[str]:
-    """Return the files, keys, programs and hosts that a package fixes, one per line."""
+    """Return the hard-coded files, keys, programs and hosts in a package, one per line."""
     found = [
         line
         for spec in profile.driver.transports.values()
@@ -217,7 +218,7 @@ class PackagePreview(NamedTuple):
     """Values of all keys that affect sent bytes, the decoding of replies, or rights. The values are
     stored by key path, such as ``commands.beep.send``."""
     risks: list[str]
-    """Files, keys, programs and hosts that the package fixes; see `risks_of`."""
+    """Hard-coded files, keys, programs and hosts; see `risks_of`."""
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview:
@@ -230,7 +231,8 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: the document refers to a file outside the folder.
+        UrcError: the document refers to a file outside the folder, or has this machine as a fixed
+            host.
     """
     allowed = permissions(document, folder, widgets)
     registry = widget_folder_of(document)

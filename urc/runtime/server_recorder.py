@@ -135,7 +135,7 @@ class ServerRecorder:
 
         Args:
             actor: the administrator.
-            what: the kind of the ended right, such as ``sign-in`` or ``device``.
+            what: kind of right that was ended, such as ``sign-in`` or ``device``.
             about: the right's name and other facts, without secrets.
         """
         self._record("revoked", actor, what, arguments=about)
@@ -195,7 +195,7 @@ class ServerRecorder:
         file: str,
         outcome: str = "",
     ) -> None:
-        """Record the start, end, download or deletion of a recording; `file` has no folder."""
+        """Record the start, end, download or deletion of the recording with the name `file`."""
         self._record("recording", actor, step, robot, {"file": file}, outcome)
 
     def alarm(
@@ -310,7 +310,7 @@ def terminal_actor() -> Actor:
 
 
 def _user() -> str:
-    """Return the name of the process's user as known to the system, not from the environment."""
+    """Return the user name of this process, from the system and not from the environment."""
     try:
         if sys.platform == "win32":
             return getuser()

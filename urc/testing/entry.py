@@ -22,7 +22,7 @@ CONTROL = AccessControl(STORE, key=KEY)
 ACCESS = Access(CONTROL, instance="test")
 """Access to a dashboard that requires a sign-in."""
 OPEN = Access(CONTROL, instance="test", anonymous="drive")
-"""Access to a dashboard that visitors may use without a sign-in, with the cookies of `ACCESS`."""
+"""Access to a dashboard that needs no sign-in; it also accepts the cookies of `ACCESS`."""
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
 """Cookies of a browser that has sent the start key."""

@@ -42,7 +42,7 @@ class IdleFraming(NamedTuple):
 
 
 class DatagramFraming(NamedTuple):
-    """Frames that arrive whole: each received block of bytes is one frame."""
+    """Frames that arrive complete: each received block of bytes is one frame."""
 
     codec: FrameCodec | None
     max_bytes: int

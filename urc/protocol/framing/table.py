@@ -17,7 +17,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class AsymmetricFraming(NamedTuple):
-    """A framing that uses one framing for sent data and another for received data."""
+    """A pair of framings: one for sent data and one for received data."""
 
     sent: Framing
     received: Framing

@@ -31,7 +31,7 @@ __all__ = ["Connection"]
 
 
 class Connection:
-    """Base class of conversations, which opens and closes transports."""
+    """Base class of `Conversation`, which opens and closes the connection."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         self.spec = spec

@@ -90,8 +90,8 @@ class CompiledRequest(NamedTuple):
     queue_s: float = 0.0
     """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader for the reply if the only reply is one frame that contains only samples; otherwise
-    None."""
+    """Reader for the reply if the request expects a single frame that contains only samples;
+    otherwise None."""
     is_miss_harmless: bool = False
     """Whether missing replies are counted only for the poll and never indicate a lost
     connection."""

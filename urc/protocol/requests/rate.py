@@ -20,8 +20,9 @@ REALTIME: Final = 0
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
-    between calls would instead delay every slightly early call and so reduce the average rate.
+    After a pause, two calls may pass immediately; the average rate stays within the limit. A
+    minimum gap between calls would instead delay every slightly early call and so reduce the
+    average rate.
     """
 
     __slots__ = ("_next_s", "_period_s")

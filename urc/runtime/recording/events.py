@@ -33,7 +33,7 @@ def topic_of(signal: str) -> str:
 def event_of(
     topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
 ) -> Sample | LinkStatus | LogEntry | Traffic | None:
-    """Return the event described by a message, with the time `time_s`, or None if unknown.
+    """Return the event that a message describes; None if the message is not recognised.
 
     Args:
         topic: topic of the message in the recording.

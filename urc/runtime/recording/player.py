@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 
 class Player:
-    """The position and state of a playback. All methods must be called on one event loop."""
+    """The position and state of a playback. Call all methods on the same event loop."""
 
     def __init__(
         self,

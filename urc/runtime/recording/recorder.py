@@ -225,7 +225,7 @@ class Recorder:
             self._waiting_bytes = 0
             lost, self._lost = self._lost, 0
             if lost:
-                text = f"events missing here, because they arrived too fast to be written: {lost}"
+                text = f"events are missing here: they arrived too fast to be written: {lost}"
                 batch.append(LogEntry(time.monotonic(), "warning", "recording", text))
             if not batch and self._is_closing:
                 return None

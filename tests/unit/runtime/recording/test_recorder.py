@@ -89,7 +89,7 @@ def test_what_is_more_than_it_can_keep_is_counted(
     kept.close()
     texts = [message.data for message in open_recording(file).messages(0)]
     assert len(texts) == 3
-    assert b"events missing here, because they arrived too fast to be written: 7" in texts[-1]
+    assert b"events are missing here: they arrived too fast to be written: 7" in texts[-1]
 
 
 def test_what_is_too_much_in_bytes_is_counted_too(
