@@ -1,1 +1,1 @@
-"""The operation of robots: links, newest values and sessions."""
+"""Runtime for robots: links, newest values and sessions."""

@@ -78,7 +78,10 @@ class AuditLog:
         self._thread.start()
 
     def add(self, entry: AuditEntry) -> None:
-        """Queue an entry and return immediately. This method is thread-safe and never raises."""
+        """Queue an entry and return immediately.
+
+        This method is thread-safe and never raises an exception.
+        """
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:
                 self._lost += 1

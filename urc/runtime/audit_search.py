@@ -79,7 +79,7 @@ def search(file: Path, query: AuditQuery, longest_s: float = _LONGEST_S) -> list
 
 
 def condition(query: AuditQuery) -> tuple[str, list[object]]:
-    """Return the condition of a query, and its values."""
+    """Return the SQL condition of a query, and the values of its parameters."""
     parts, values = ["at >= ? AND at < ?"], list[object]((query.since, query.until))
     if query.robots is not None:
         parts.append(f"robot IN ({_marks(query.robots)})")

@@ -105,7 +105,7 @@ def select(base: sqlite3.Connection) -> str:
 
 
 def row_of(values: tuple[object, ...]) -> AuditRow:
-    """Return one row of a query with `select`."""
+    """Return one result row of a query from `select` as an `AuditRow`."""
     number, version, chain, *entry = values
     return AuditRow(number, version, chain, AuditEntry._make(entry))  # type: ignore[arg-type]
 

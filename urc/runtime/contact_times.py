@@ -55,7 +55,7 @@ class _Stored(msgspec.Struct, frozen=True):
 class ContactStore:
     """The contact times of all robots of a server.
 
-    Emulated robots have their own times: `key` distinguishes them from real robots with the same
+    Emulated robots have separate times: `key` distinguishes them from real robots with the same
     name.
     """
 

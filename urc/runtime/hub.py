@@ -181,7 +181,7 @@ class SequenceProgress:
 
     command: str
     place: int
-    """Number of started top-level steps."""
+    """Number of outermost steps that have started."""
     of: int
     state: Literal["idle", "running", "paused"]
     reason: str = ""
@@ -336,7 +336,7 @@ class Hub:
         return bool(self._taps)
 
     def publish_record(self, done: MotionRecord | AuditRecord) -> None:
-        """Report an operator's action to the open taps."""
+        """Report an accepted tick or an audit log entry to the open taps."""
         if self._redactor is not None and isinstance(done, MotionRecord):
             done = replace(done, arguments=self._redactor.value(done.arguments))
         for tap in self._taps:

@@ -351,7 +351,7 @@ class RobotAlarms:
             if events:
                 self.on_events(events)
         except Exception:  # supervisor: a bug in a listener must not end the session
-            log.exception("a change of alarms was not announced")
+            log.exception("an alarm change was not announced")
 
 
 def _limits(signals: Mapping[str, Signal]) -> dict[str, AlarmLimits]:

@@ -89,7 +89,9 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
             raise BadValue(f"expected at most {most} bytes, found {len(data)}")
         if signal.type == "image" and pixels(data) > MAX_PIXELS:
             width, height = picture_size(data) or (0, 0)
-            raise BadValue(f"an image of {width} by {height} pixels; the limit is {MAX_PIXELS}")
+            raise BadValue(
+                f"an image of {width} by {height} pixels; the limit is {MAX_PIXELS} in total"
+            )
         return data
 
     return convert
