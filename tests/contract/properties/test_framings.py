@@ -201,12 +201,12 @@ REFUSED = [
     ("{ type: xml }", b"go", "b'go' is not a single XML element"),
     ("{ type: regex, pattern: '[a-z]+;' }", b"ab;c;",
      "b'ab;c;' does not match the pattern of the framing"),
-    ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n': this"
-     " would make two frames"),
+    ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n', so it"
+     " would be sent as two frames"),
     ("{ type: switch, cases: [{ first: 1, framing: { type: fixed, size: 2 } }] }", b"\x02\x03",
      "no case of the framing matches b'\\x02\\x03'"),
-    (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n': this would make"
-     " two frames"),
+    (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n', so it would"
+     " be sent as two frames"),
     ("{ type: datagram, checksum: { algorithm: sum8, from_hex: true } }", b"xy",
      "the checksum covers hex digits, found other bytes"),
 ]  # fmt: skip

@@ -61,7 +61,7 @@ def test_a_frame_that_is_too_long_is_dropped_once_and_the_stream_goes_on(
 
 def test_a_payload_with_the_delimiter_in_it_is_refused() -> None:
     """It would reach the robot as two frames, the second one of somebody's choosing."""
-    with pytest.raises(FramingError, match="would make two frames"):
+    with pytest.raises(FramingError, match="would be sent as two frames"):
         framing().encode(b"go\nDISARM")
 
 
