@@ -28,7 +28,7 @@ class ChannelListener(Protocol):
 
     @property
     def may_move(self) -> bool:
-        """Whether a control may be moving."""
+        """Whether the robot may be moving because of a control."""
 
     def briefing(self) -> Iterable[messages.ToGuard]:
         """Return the messages that initialise a new guard, in sending order.

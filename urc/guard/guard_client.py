@@ -2,15 +2,15 @@
 
 Theory of operation. The guard's state is lost when the guard process dies. The client therefore
 keeps a table of all held commands that were armed or stopped. Each entry stores the command's terms
-and whether the command may be moving. A new guard is initialised from this table. The new guard
-receives the list of transports, a pending stop for each command that may be moving, and the terms
-of other armed commands. For each pending stop, the guard opens the connection and writes the stop
-first. Motion never resumes automatically.
+and whether the robot may still be moving because of the command. A new guard is initialised from
+this table. The new guard receives the list of transports, and a pending stop for each command that
+may be moving the robot. It also receives the terms of other armed commands. For each pending stop,
+the guard opens the connection and writes the stop first. Motion never resumes automatically.
 
-A control's state *may be moving* begins with its first tick or stop request. The state ends when
-the guard reports that it has written the stop after the newest tick. The state begins again if the
-guard reports that this stop may be lost with the connection. A pending stop is therefore not lost
-when the guard process dies.
+A command *may be moving* the robot from its first tick or stop request. This state ends when the
+guard reports that it has written the stop after the newest tick. The state begins again if the
+guard reports that this stop may have been lost with the connection. A pending stop is therefore not
+lost when the guard process dies.
 """
 
 import asyncio
@@ -101,7 +101,7 @@ class GuardClient:
         """
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
-        """Table of all commands that are armed or may be moving."""
+        """Table of all commands that are armed or may be moving the robot."""
         self._stops: deque[tuple[str, StopReport]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -110,7 +110,7 @@ class GuardClient:
         self.channel.start()
 
     async def finish(self) -> None:
-        """Stop all commands that may be moving, close every connection, and end the guard."""
+        """Stop commands that may be moving the robot, close all connections, and end the guard."""
         await self.channel.finish()
 
     # -- held commands: `urc.runtime.motion_controller.MotionBackend`
@@ -131,7 +131,7 @@ class GuardClient:
         self.channel.post(messages.ArmControl(control.line, command, terms))
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease of `command`, with `data` as its newest frame. Never waits."""
+        """Renew the lease of `command`, with `data` as the command's newest frame. Never waits."""
         control = self._controls.get(command)
         if control is None or not control.is_armed:
             return  # the guard has stopped it, and would drop the tick
@@ -166,7 +166,7 @@ class GuardClient:
         self.channel.post(messages.ReleaseControl(command))
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
-        """Stop commands immediately, even idle ones; `stops` maps each command to its frame."""
+        """Stop commands immediately, even if idle; `stops` maps each command to its stop frame."""
         told: list[tuple[str, str, HoldTerms]] = []
         for command, frame in stops.items():
             control = self._control(command)
@@ -179,7 +179,7 @@ class GuardClient:
             self.channel.post(messages.StopMotion(told), is_urgent=True)
 
     def stop_all(self, stop_frame: Callable[[str], Payload | FrameVariants]) -> None:
-        """Stop all commands that may be moving.
+        """Stop all commands that may be moving the robot.
 
         Args:
             stop_frame: function that returns the current stop frame of a command. If `stop_frame`
@@ -196,7 +196,7 @@ class GuardClient:
         self.stop(stops)
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may be moving or its stop may still be repeated."""
+        """Return whether `command` may be moving the robot, or its stop may still be repeated."""
         control = self._controls.get(command)
         if control is None:
             return False
@@ -204,7 +204,7 @@ class GuardClient:
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may be moving, because no stop has been reported as written."""
+        """Return whether `command` may be moving the robot: no stop was reported as written."""
         control = self._controls.get(command)
         return control is not None and control.may_move
 
@@ -215,7 +215,7 @@ class GuardClient:
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait for reports of written or lost stops; return each command with its report.
 
-        If the wait is cancelled, no stop is lost.
+        Cancelling the wait loses no report.
         """
         while not self._stops:
             self._stopped.clear()
@@ -241,7 +241,7 @@ class GuardClient:
 
     @property
     def may_move(self) -> bool:
-        """Whether a control may be moving."""
+        """Whether the robot may be moving because of a control."""
         return any(control.may_move for control in self._controls.values())
 
     def briefing(self) -> Iterator[messages.ToGuard]:
@@ -304,7 +304,7 @@ class GuardClient:
         self._report(stopped.control, stopped.reason)
 
     def _record_due(self, command: str) -> None:
-        """Record that the stop of `command` may be lost, although it was reported as written."""
+        """Record that the stop of `command`, reported as written, may have been lost."""
         control = self._controls.get(command)
         if control is not None and not control.may_move:
             control.may_move = True

@@ -1,7 +1,7 @@
 """The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
-closes it. The engine requests that the connection be opened or closed. The guard sends received
+closes it. The engine requests the opening and closing of the connection. The guard sends received
 data to the engine within the engine's flow-control credit. If the connection is lost while the
 robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead. The
 guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection is
@@ -133,7 +133,8 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """Number of refusals of engine frames because their counter values were used up."""
+        """Number of times that engine frames were refused because their counter values were already
+        used."""
 
     # -- requests from the engine
 
@@ -149,7 +150,7 @@ class GuardedConnection:
             self._waiting = self._clock.call_at(self._clock.now() + timeout_s, self._in_vain)
 
     def close(self, turn: int) -> None:
-        """Stop all moving controls, close the connection, and report `LineClosed`."""
+        """Stop all controls that move the robot, close the connection, and report `LineClosed`."""
         if turn != self._turn or self._is_rescuing:
             self._forget_waiting()
             self._emit(messages.LineClosed(self.name, turn))
@@ -194,7 +195,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard this round's remaining frames, because their counter values are used up."""
+        """Discard frame `number` and all later frames, whose counter values are already used."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 

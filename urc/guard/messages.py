@@ -60,8 +60,8 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     """Age of unsent motion data at which a connection counts as stalled and is reset, in seconds.
     """
     is_strict: bool
-    """Whether the transport is slow to open; if so, a frame is written only when no bytes are
-    unsent.
+    """Whether the transport is slow to open; if so, a motion frame is written only when no bytes
+    are unsent.
     """
     silent_s: float | None = None
     """Maximum silence of a moving robot before the connection is reset, in seconds; None means
@@ -89,11 +89,11 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     the last sent value."""
     round: int = 0
     """Number of `SendStale` messages that the engine has received on this connection. The guard
-    drops the frame if it has sent a different number."""
+    drops the frame if the guard has sent a different number of these messages."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
-    """Stop all moving controls and close the connection; the answer is `LineClosed`."""
+    """Stop all controls that move the robot and close the connection; reply with `LineClosed`."""
 
     line: str
     turn: int
@@ -123,8 +123,8 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
     """Number of this control's tick."""
     data: Payload
     at_s: float
-    """Time of the sample on this machine's monotonic clock, in seconds. The time of a delayed tick
-    stays unchanged."""
+    """Time of the sample on this machine's monotonic clock, in seconds. A delayed tick keeps its
+    original time."""
     count: Count | None = None
     """Counter values of the frame, as in `SendBytes`."""
 
@@ -142,7 +142,7 @@ class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
 
 
 class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
-    """Reopen a connection to stop a control that was moving when the previous guard died."""
+    """Reopen a connection to stop a control that was moving the robot when the last guard died."""
 
     line: str
     control: str
@@ -150,7 +150,7 @@ class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
 
 
 class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
-    """Replace a control's stop frame, because the old frame's counter value is used up."""
+    """Replace a control's stop frame, because the old frame's counter value is already used."""
 
     control: str
     stop: Payload
@@ -228,7 +228,7 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
 
 
 class StopDue(msgspec.Struct, array_like=True, frozen=True, tag=32):
-    """A control's stop may be lost with the connection; the guard writes the stop again first."""
+    """A control's stop may have been lost with the connection; the guard first writes it again."""
 
     control: str
 

@@ -89,7 +89,8 @@ class MotionScheduler:
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._stopped_at: dict[str, int] = {}
-        """Number of the newest tick when each control was stopped; a stop may wait in the queue."""
+        """Number of the newest tick at each control's stop, keyed by control; the stop may still
+        be in the queue."""
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
         """Whether a written stop may not have arrived at the robot."""
@@ -105,12 +106,12 @@ class MotionScheduler:
 
     @property
     def is_moving(self) -> bool:
-        """Whether any control is moving."""
+        """Whether any control is moving the robot."""
         return any(hold_to_run.state == "moving" for hold_to_run in self._holds.values())
 
     @property
     def is_settled(self) -> bool:
-        """Whether no control moves and all stops, with repeats, were handed to the transport."""
+        """Whether all controls are idle, and the transport has all stops, including repeats."""
         return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property
@@ -153,18 +154,18 @@ class MotionScheduler:
             hold_to_run.stop("released", self._clock.now())
 
     def stop(self, control: str, terms: HoldTerms) -> None:
-        """Stop `control`, whether it moves or not."""
+        """Stop `control`, even if idle."""
         hold_to_run = self._hold_to_run(control, terms)
         hold_to_run.stop("stopped", self._clock.now())
         if not self._is_open:
             hold_to_run.cut()
 
     def owe(self, control: str, terms: HoldTerms) -> None:
-        """Record that `control` may be moving, and stop it as soon as the connection opens."""
+        """Record that `control` may be moving the robot; stop it when the connection opens."""
         self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
-        """Stop all moving controls before the connection is closed."""
+        """Stop all controls that are moving the robot, and disarm all controls, before closing."""
         now = self._clock.now()
         for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
@@ -205,7 +206,8 @@ class MotionScheduler:
         """Record that the connection is closed, and drop all unsent frames.
 
         Returns:
-            Controls whose stops were reported as written but may be lost with the connection.
+            Controls whose stops were reported as written but may have been lost with the
+            connection.
         """
         self._is_open = False
         for control, is_stop in self.queue.end():

@@ -1,9 +1,9 @@
 """One end of the pipe between the engine's process and the guard process.
 
 Each message on the wire is a four-byte length followed by the body. Writing never waits: unsent
-messages are queued. Urgent messages go first, and a newer message replaces an older one in the same
-slot. The senders limit the length of the queue: flow-control credit limits replies, and the maximum
-number of pending requests limits requests.
+messages are queued. Urgent messages are sent first, and a newer message replaces an older message
+in the same slot. The senders limit the length of the queue: flow-control credit limits replies, and
+the maximum number of pending requests limits requests.
 """
 
 import asyncio

@@ -20,8 +20,8 @@ __all__ = ["GuardedTransport"]
 
 _CLOSED: Final = "the connection is closed"
 START_S: Final = 60.0
-"""Maximum time that a connection waits for the guard to start, in seconds. With many robots, guards
-start in turns."""
+"""Maximum time that a connection waits for the guard to start, in seconds. With many robots, the
+guards start one after another."""
 _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4

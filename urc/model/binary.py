@@ -65,7 +65,7 @@ class Item(NamedTuple):
     number: Number = Number("integer", 8)
     """Number type of a ``number``, or of the number that contains the ``bits``."""
     size: Extent | None = None
-    """Size of bytes, text, padding or a struct's window; None means unlimited."""
+    """Size of bytes, text, padding or the section that a struct occupies; None means unlimited."""
     times: Extent | None = None
     """Number of elements of an array. The attribute cannot be named ``count``, because tuples have
     a ``count`` method."""
@@ -155,7 +155,7 @@ def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
 
     Args:
         items: items at one nesting level.
-        sent: whether to omit values that URC computes when sending.
+        sent: whether to omit fields whose values URC computes for a sent frame.
     """
     for item in scope_of(items):
         if not item.id or item.const is not None or (sent and item.value is not None):
@@ -212,7 +212,7 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the formulas for sizes and counts, keyed by the name of the size or count item.
+    """Map each item that contains a size or count to the formula that uses the item.
 
     URC computes sizes and counts from the data to send.
     """

@@ -13,9 +13,9 @@ __all__ = ["targets"]
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
     """Map the name of each command argument to the name of an output value.
 
-    An explicit binding takes precedence. Without a binding, a value goes to the argument of the
-    same name. A single output value goes to the command's only free argument, even under a
-    different name. Values of hold-to-run controls go only to arguments of the same name.
+    An explicit binding takes precedence. Without a binding, a value is passed to the argument of
+    the same name. A single output value is passed to the command's only free argument, even if the
+    names differ. Values of hold-to-run controls are passed only to arguments of the same name.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

@@ -39,7 +39,7 @@ class WidgetUse(NamedTuple):
     given: Mapping[str, OutputBinding] = NOTHING
     """Declared argument mappings, keyed by widget output."""
     lists: Mapping[str, tuple[str, ...]] = NOTHING
-    """Lists of driver signals, keyed by multiple input of the widget."""
+    """Lists of driver signals, keyed by the widget's multiple inputs."""
     files: Mapping[str, str] = NOTHING
     """Paths of the files named in options, keyed by the file name in the option."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING

@@ -74,7 +74,8 @@ class AlarmLimits(NamedTuple):
     for_s: float = 0.0
     """On-delay: minimum time beyond a limit before the alarm begins, in seconds."""
     off_delay_s: float = 0.0
-    """Minimum time that the value must be normal before the alarm ends, in seconds."""
+    """Off-delay: minimum time for which the value must be normal before the alarm ends, in
+    seconds."""
     states: tuple[str, ...] = ()
     """Values that cause an alarm, as text; a boolean is ``true`` or ``false``."""
     attributes: tuple[tuple[str, AlarmAttributes], ...] = ()

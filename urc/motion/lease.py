@@ -1,10 +1,10 @@
 """The lease of one robot: the exclusive right of one operator to drive the robot.
 
-Theory of operation. At most one operator holds the lease. Every change of holder and every stop
-begins by sending a stop to the robot and incrementing the lease's epoch. Inputs with an older epoch
-are refused, so motion cannot continue by mistake. A holder who sends no input for `SILENT_S`
-seconds loses the lease. STOP does not require a lease, and it latches: the robot does not move
-until an operator resets the latch. A reset never starts motion.
+Theory of operation. At most one operator holds the lease. Every change of holder and every STOP
+sends a stop to the robot and increments the lease's epoch. Inputs with an older epoch are refused,
+so motion cannot continue by mistake. A holder who sends no input for `SILENT_S` seconds loses the
+lease. STOP does not require a lease, and it latches: the robot does not move until an operator
+resets the latch. A reset never starts motion.
 """
 
 from typing import Final, NamedTuple

@@ -1,9 +1,9 @@
 """Automatic replies of an emulated robot to every request that the driver declares.
 
-The module does not use sockets or clocks. Each received frame is matched against all requests that
-the driver can send on its transport. Each reply is encoded from plausible values, with the
-declaration that the driver uses to decode it. A command argument with the name of a signal sets
-that signal.
+The module does not use sockets or clocks. Each received frame is compared with all requests that
+the driver can send on the same transport. Each reply contains plausible values, and is encoded with
+the declaration that the driver uses to decode replies. A command argument with the name of a signal
+sets that signal.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -69,7 +69,7 @@ class SimulatedReply(NamedTuple):
     prompt: Pattern | None = None
     match: Template | None = None
     needed: frozenset[str] = frozenset()
-    """Names of the internal fields that the acknowledgement uses."""
+    """Names of the message's internal fields that the driver's acknowledgement uses."""
 
     def fits(self, fields: Mapping[str, object]) -> bool:
         """Return whether a frame can be encoded from these fields."""
@@ -372,7 +372,7 @@ class DefaultConnection:
     def _script(
         self, label: str, steps: Iterable[Step]
     ) -> tuple[list[SimulatedReply], list[_Request]]:
-        """Return the frames expected before the first request, and all requests with replies."""
+        """Return the frames that the robot sends before the first request, and all requests."""
         opening: list[SimulatedReply] = []
         requests: list[tuple[WriteSpec, list[SimulatedReply]]] = []
         for step in _main_way(steps):

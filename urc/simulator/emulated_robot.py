@@ -2,9 +2,9 @@
 
 If no rule matches a frame, the driver's declarations define the reply (`urc.simulator.auto`).
 
-The module uses no sockets and no clock. Like the real robot, the emulated robot uses the driver's
-framing in reverse. Each client has a separate connection, but all connections share the robot's
-state.
+The module uses no sockets and no clock. Like the real robot, the emulated robot decodes with the
+driver's framing of sent data and encodes with the framing of received data. Each client has a
+separate connection, but all connections share the robot's state.
 """
 
 import logging
@@ -146,7 +146,7 @@ class EmulatedRobot:
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return the robot's camera image as JPEG; None if no camera works.
+        """Return the robot's camera image as JPEG; None if the robot has no working camera.
 
         `now_s` is the current time, in seconds since the epoch.
         """
@@ -247,7 +247,7 @@ class EmulatedConnection:
 
     @property
     def due_in_s(self) -> float | None:
-        """Time until `advance` has data to send, in seconds; None if no data is pending."""
+        """Time until `advance` must be called, in seconds; None while nothing is scheduled."""
         if not self._is_greeted:
             return 0.0
         left = [one.left_s for one in self._periodic]

@@ -22,7 +22,7 @@ _MOST_BYTES: Final = 4096
 
 
 def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, object]:
-    """Return the fields for signals that are computed from a single field.
+    """Return the values of all fields from which a signal is computed without other fields.
 
     Args:
         spec: the frame.
@@ -48,7 +48,7 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
 
 
 def _takes_apart(template: Template) -> bool:
-    """Return whether the expression splits its field, which then cannot be a plain value."""
+    """Return whether the expression uses parts of its field, which then differs from the signal."""
     return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
 
 
@@ -92,7 +92,7 @@ def _chain(python: str) -> list[Step]:
 
 
 def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
-    """Return the field's value, or some of its bytes and their offset."""
+    """Return the field's value and 0, or some of the field's bytes and their offset."""
     at = 0
     for name, arguments in chain:
         if name in _TEXTS:

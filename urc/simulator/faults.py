@@ -158,7 +158,7 @@ class DelayLine:
 
     @property
     def due_s(self) -> float:
-        """Due time of the first frame, on the clock of `push`; ``inf`` if the queue is empty."""
+        """Due time of the first frame, as passed to `push`; ``inf`` if the queue is empty."""
         return self._waiting[0][0] if self._waiting else math.inf
 
     def push(self, frames: Sequence[Payload], due_s: float) -> None:

@@ -1,6 +1,7 @@
 """Reply fields that repeat values from the request, and fields that identify a frame.
 
-Pure. The module inverts only equalities and lists of constants in ``when`` and ``match``.
+Pure. The module inverts only equalities, lists of constants and pattern tests in ``when`` and
+``match``.
 """
 
 import re
@@ -78,7 +79,7 @@ class _Name(str):
 
 
 def _equalities(template: Template) -> Iterator[tuple[str, object]]:
-    """Yield (name, constant or name) for each ``name == …`` and ``name in […]``."""
+    """Yield each name with a constant or name that satisfies its equality, list or pattern test."""
     for found in _EQUALS.finditer(template.source):
         left, right = found[1], found[2]
         if right[0].isalpha() or right[0] == "_":

@@ -165,7 +165,7 @@ class RuleSet:
         frame: Frame,
         now_s: float,
     ) -> RunningRule | None:
-        """Return the reactions to a frame with `names`; None if the rule's condition is false."""
+        """Return the reactions to a frame with values `names`; None if the rule does not apply."""
         for name, value in (names or NOTHING).items():
             if isinstance(value, Unusable):
                 raise Unanswered(f"{name}: {value.why}")
@@ -251,7 +251,7 @@ class RuleSet:
 
 
 def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
-    """Return the values that the rule reads from a frame, by name; None if nothing matches."""
+    """Return the values that the rule reads from the frame, by name; None without a match."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:
         if rule.reader is not None:

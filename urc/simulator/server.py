@@ -118,7 +118,7 @@ def _put_inside(
     """Make a transport reachable through its tunnel; return the endpoint for clients."""
     host, port, url = _known_as(context)
     if not isinstance(host, str) or not isinstance(port, int):
-        message = f"{context.spec.type} cannot be emulated behind another transport"
+        message = f"{context.spec.type} cannot be emulated through a tunnel"
         raise UrcError(f"transports.{context.name}: {message}")
     inside[host.strip(), port] = found
     text = f"{context.spec.type} {host_and_port(host, port)} through {context.spec.tunnel}"

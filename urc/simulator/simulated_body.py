@@ -1,7 +1,7 @@
 """The body of an emulated robot. The robot's state drives the body, and the body provides signals.
 
-The module uses no sockets and no clock. The fail-safe works with and without a connection. It is
-declared in the document (`failsafe`) or derived from held commands (`watchdog`).
+The module uses no sockets and no clock. The fail-safe works with and without a connection. The
+fail-safe is declared in the document (`failsafe`) or derived from held commands (`watchdog`).
 """
 
 import logging
@@ -65,10 +65,10 @@ class SimulatedBody:
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Restart the fail-safe timer if a received frame may be a command that restarts it.
+        """Restart the fail-safe timer if a received frame may be a command that restarts the timer.
 
         Args:
-            labels: commands that the frame may mean.
+            labels: names of the commands that may have produced the frame.
             now_s: time of the frame.
         """
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
@@ -143,7 +143,7 @@ def has_rendering() -> bool:
 
 
 def rendered_signals(spec: WorldSpec, without: frozenset[str] = frozenset()) -> frozenset[str]:
-    """Return the signals of cameras and laser scanners, except the readings in `without`."""
+    """Return the signals that need numpy or Pillow, except for the readings in `without`."""
     found = {name: set(_LOOKS.findall(one.python)) for name, one in spec.senses.items()}
     return frozenset(name for name, readings in found.items() if readings - without)
 

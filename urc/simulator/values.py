@@ -110,7 +110,7 @@ class Values:
         *,
         is_plain: bool = False,
     ) -> None:
-        """Create the robot with `initial` signals and state variables, and optionally a world."""
+        """Create the values from `initial` signals and state variables, and optionally a world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}

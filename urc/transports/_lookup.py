@@ -17,11 +17,11 @@ _Connected = TypeVar("_Connected")
 
 
 class AddressLookup:
-    """A repeatable address lookup for one host and port.
+    """An address lookup for one host and port, which can be repeated.
 
     A lookup in the event loop's thread pool could delay the program's exit by half a minute if the
     network is down. Each lookup therefore runs in a separate thread. Only one lookup runs at a
-    time; a retry waits for the running lookup.
+    time; further calls wait for its result.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:

@@ -25,7 +25,7 @@ FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, Loo
 """Exceptions that the library raises; a `LookupError` means that a server sent invalid RFC 2217
 data."""
 UNTAKEN_BYTES = 1_048_576
-"""Maximum number of unsent bytes in option replies to a server."""
+"""Maximum number of unsent bytes to an RFC 2217 server; beyond this limit, the connection ends."""
 if sys.platform != "win32":
     import termios
 
@@ -70,9 +70,10 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """An RFC 2217 connection that does not wait for the server to confirm unused notifications.
+    """An RFC 2217 connection that does not wait for the server to confirm notification masks.
 
-    The common server ser2net never confirms them, so the library would wait until its timeout.
+    The common server ser2net never confirms these masks, so the library would wait until its
+    timeout.
     """
 
     def _data_received(self, data: bytes) -> None:

@@ -47,7 +47,7 @@ log and do not prove that the robot is alive.
 
 
 class TransportError(UrcError):
-    """A transport error: the connection cannot be opened or can no longer be used.
+    """A transport error: an invalid option, unsuitable data, or a failed or lost connection.
 
     - `ConnectFailed`: the attempt was refused or timed out, or the host is unknown.
     - `PeerClosed`: the robot closed the connection, or the connection broke.
@@ -97,7 +97,7 @@ def bytes_of(data: Payload) -> bytes:
 
 
 class ByteStream(Protocol):
-    """One open connection inside a tunnel."""
+    """One open connection that carries bytes, direct or through a tunnel."""
 
     async def read(self) -> bytes:
         """Return at least one received byte; raise `PeerClosed` when the stream has ended."""
@@ -113,7 +113,7 @@ class Tunnel(Protocol):
     """A transport that carries other connections, such as SSH port forwarding."""
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
-        """Connect to `host` and `port` from the far end; raise `ConnectFailed` on failure."""
+        """Connect to `host` and `port` through the tunnel; raise `ConnectFailed` on failure."""
 
 
 class TopicSubscription(NamedTuple):
@@ -218,17 +218,17 @@ class Prompt(SupportsOffer, Protocol):
     """A byte transport that avoids one task switch per message in both directions.
 
     The order of all bytes is preserved. `offer` refuses data while earlier data is waiting, and the
-    sink receives nothing while `receive` has buffered data.
+    sink receives nothing while data is buffered for `receive`.
     """
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data is still unwritten; ``send(b"")`` waits until none is."""
+        """Whether accepted data is unwritten; ``send(b"")`` waits until all data is written."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink` until the connection is closed.
 
-        The sink returns whether it accepted the data; `receive` returns refused data.
+        The sink returns whether it accepted the data; `receive` returns data that the sink refused.
         """
 
 
@@ -256,5 +256,5 @@ def unsent_of(stream: ByteStream | None) -> int:
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream and discard unsent data if the stream supports this."""
+    """Close a stream, and discard its unsent data if the stream implements `SupportsReset`."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

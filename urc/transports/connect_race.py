@@ -24,7 +24,7 @@ class ConnectRace:
     def __init__(self, every_s: float) -> None:
         self.every_s = every_s
         self.is_used = False
-        """Whether overlapping attempts were used; some transports ignore the setting."""
+        """Whether overlapping attempts were used; some transports ignore `HURRY`."""
 
 
 HURRY: ContextVar[ConnectRace | None] = ContextVar("HURRY", default=None)
@@ -36,7 +36,7 @@ async def connected(family: int, address: object) -> socket.socket:
     """Return a connected non-blocking socket; the caller must set a timeout.
 
     Raises:
-        OSError: the robot or this machine refuses the connection.
+        OSError: the connection failed.
     """
     connect_race = HURRY.get()
     if connect_race is None:

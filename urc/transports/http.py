@@ -293,7 +293,7 @@ def _request_of(client: HttpClient, data: Envelope) -> httpx2.Request:
         path += f"{'&' if '?' in path else '?'}{query}"
     headers = attributes.get("headers") or {}
     if not isinstance(headers, Mapping):
-        raise HttpFault(f"headers must be names and values, not {headers!r}")
+        raise HttpFault(f"headers must map names to values, not {headers!r}")
     named = {str(name): _plain(value) for name, value in headers.items()}
     for name in named:
         if is_reserved(name):

@@ -33,7 +33,7 @@ class LineSplitter:
     """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Create a splitter that skips lines over `max_bytes` or yields `instead` for them."""
+        """Create a splitter that replaces lines over `max_bytes` by `instead`; None skips them."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
@@ -66,7 +66,7 @@ class LineSplitter:
         return lines
 
     def end(self) -> bytes:
-        """Return the incomplete last line when the body has ended."""
+        """Return the body's last line if it has no line end; otherwise, return b""."""
         rest = b"" if self._is_skipping else bytes(self._buffer)
         self._buffer.clear()
         return rest
@@ -93,7 +93,7 @@ class EventStreamParser:
     """An incremental parser of an event stream."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Skip events over `max_bytes` long; `last_id` is the previous connection's last id."""
+        """Create a parser that skips events over `max_bytes`; `last_id` is the last received id."""
         self._most = max_bytes
         self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
@@ -107,7 +107,7 @@ class EventStreamParser:
         self.left_out = 0
         """Number of events skipped so far."""
         self.retry_s: float | None = None
-        """Retry delay requested by the robot, in seconds; None if it has not requested one."""
+        """Retry delay requested by the robot, in seconds; None if no delay was requested."""
 
     def feed(self, data: bytes) -> list[Event]:
         """Process the next part of the stream and return the completed events."""

@@ -2,8 +2,8 @@
 
 The parser does no I/O: the input is bytes, and the output is parts.
 
-Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted
-and unquoted boundaries, with or without the two leading dashes of the body. Parts without
+Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted and
+unquoted boundaries in the header, and ignores leading dashes there and in the body. Parts without
 Content-Length and lines that end in LF alone are also accepted. Every part and header has a maximum
 size; larger parts or headers make the stream invalid.
 """

@@ -80,7 +80,7 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
             raise TransportError(f"http cannot open {path!r} as two different streams")
         found[path] = known._replace(topics=known.topics | {topic})
     if len(found) > MAX_STREAMS:
-        raise TransportError(f"http supports at most {MAX_STREAMS} paths")
+        raise TransportError(f"http supports at most {MAX_STREAMS} streams")
     return list(found.values())
 
 
@@ -102,7 +102,7 @@ class LastActivity:
 
 
 class HttpStream:
-    """One stream of an open transport; `run` continues until cancelled."""
+    """One stream of an open transport; `run` requests the stream again after each failure."""
 
     def __init__(
         self,
@@ -204,7 +204,7 @@ class HttpStream:
             await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Pass an event to the topic with the event's name, or otherwise to the path's topic."""
+        """Pass an event to the topic named after the event, or else to the path's topic."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:

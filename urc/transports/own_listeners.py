@@ -1,6 +1,6 @@
 """The listening addresses of URC's own dashboard, to which no transport may connect.
 
-A document that connects to the dashboard would have the rights of a local program. The address of
+A document that connected to the dashboard would have the rights of a local program. The address of
 each open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
 dashboard. Connections forwarded by a router, a proxy or another machine are not detected.
 """

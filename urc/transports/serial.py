@@ -1,7 +1,7 @@
 """The serial transport, for a port on this machine or on a server (``socket://``, ``rfc2217://``).
 
-The transport uses the library serialx from the extra ``serial``. A ``socket://`` address is a plain
-TCP connection to a server that has already configured the port.
+The transport uses the library serialx from the extra ``serial``. For a ``socket://`` address, the
+transport opens a plain TCP connection to a server that has already configured the port.
 """
 
 import asyncio

@@ -23,7 +23,7 @@ WINDOW = 262_144
 """SSH window size of the channel, excluding the receive buffer, in bytes."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
-"""Maximum wait for the exit of a program that has closed its output, in seconds."""
+"""Maximum wait for a program to exit after closing its output, in seconds."""
 _LAST_WORDS = 200
 """Maximum number of standard error bytes to quote in the message about a program's end."""
 
@@ -35,7 +35,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         """Initialise a channel.
 
         Args:
-            wire: the SSH connection's socket; it is full while the kernel accepts no more data.
+            wire: the SSH connection's socket; `write` waits while the socket is full.
             program: the program's name in messages, such as ``the shell``; "" for a forwarded
                 connection.
         """

@@ -1,4 +1,4 @@
-"""One SSH connection, which several users can share."""
+"""One SSH connection, which several transports can share."""
 
 import asyncio
 import ipaddress
@@ -21,7 +21,7 @@ from urc.transports.topic_socket import Address
 __all__ = ["SshConnection", "SharedConnection"]
 
 _GONE_WITHIN_S = 0.5
-"""Maximum wait for a closed connection to end, in seconds."""
+"""Maximum time to wait for a connection to close, in seconds."""
 _LOOK_UP_S = 2.0
 
 
@@ -162,7 +162,7 @@ class SshConnection:
 
 
 class SharedConnection:
-    """A shared SSH connection, opened by the first user and closed by the last user."""
+    """An SSH connection for several transports; the first opens it, and the last closes it."""
 
     def __init__(self, dial: Callable[[float], Awaitable[SshConnection]]) -> None:
         """Initialise without connecting.
@@ -194,7 +194,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the shared connection; close it if no user remains."""
+        """Release the shared connection; close the connection if no other caller uses it."""
         self._users -= 1
         if self._users:
             return

@@ -181,7 +181,10 @@ def _explain(target: SshTarget, client: _SshClient, fault: Exception) -> str:
         case asyncssh.DisconnectError():
             return f"{place} refused the connection ({_first(fault.reason).lower()})"
         case asyncssh.ChannelOpenError():
-            return f"nothing listens on {place} at the far end ({_first(fault.reason).lower()})"
+            return (
+                f"nothing listens on {place} at the far end of the tunnel"
+                f" ({_first(fault.reason).lower()})"
+            )
         case _:
             return f"cannot connect to {place} ({_first(str(fault)).lower()})"
 

@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the accepted host key types, with the types of known keys first."""
+    """Return the accepted host key types: certificates, types of known keys, then all others."""
     familiar = [
         name.decode("ascii")
         for key in known
@@ -148,5 +148,5 @@ async def _agent_keys() -> tuple[asyncssh.SSHAgentClient, list[Any]]:
         raise
     if not keys:
         agent.close()
-        raise ConnectFailed("the SSH agent holds no keys; 'ssh-add' adds one")
+        raise ConnectFailed("the SSH agent holds no keys; 'ssh-add' adds a key")
     return agent, keys

@@ -21,12 +21,12 @@ UNTAKEN_BYTES = 8_388_608
 """Maximum number of unsent bytes in replies to a server; larger than a channel's window."""
 _LAST_TURNS = 10
 """Number of event loop turns between the last bytes and the end of the stream. The delay is needed
-because asyncssh reads some packets in tasks. Servers often close directly after a refusal; the
-delay lets asyncssh read the reason."""
+because asyncssh reads some packets in tasks. Servers often close the connection directly after a
+refusal; the delay lets asyncssh read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return the one-line reason for a lost connection, in the words of other transports."""
+    """Return the one-line reason for a lost connection, worded as in other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
             return "the connection broke (the robot no longer answers)"

@@ -77,7 +77,7 @@ class TcpListener(StreamTransport):
 
     @property
     def port(self) -> int:
-        """Local port number; available only while the transport is listening."""
+        """Local port number; while not listening, the configured port, which may be 0."""
         return self._port if self._listener is None else int(self._listener.getsockname()[1])
 
     @property
@@ -292,7 +292,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data is still unwritten; `send` waits until none is."""
+        """Whether accepted data is still unwritten; `send` waits until all data is written."""
         stream = self._stream
         return type(stream) is TcpStream and not stream.is_writable
 

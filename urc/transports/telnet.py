@@ -33,7 +33,7 @@ _COLUMNS: Final = 240
 """Reported terminal width, in characters; wide enough to keep shells from wrapping long lines."""
 _LONGEST_NAME: Final = 40
 _SMALL_BYTES: Final = 1024
-"""Maximum size of a received segment that URC acknowledges immediately, in bytes."""
+"""Size in bytes below which URC acknowledges a received segment immediately."""
 
 
 class TelnetOptions(NamedTuple):
@@ -161,7 +161,8 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
     terminal = _options.text("telnet", options, "terminal", "VT100")
     if len(terminal) > _LONGEST_NAME or not (terminal.isascii() and terminal.isprintable()):
         raise TransportError(
-            f"telnet: terminal must be a name of up to {_LONGEST_NAME} letters, not {terminal!r}"
+            f"telnet: terminal must be a name of up to {_LONGEST_NAME} ASCII characters,"
+            f" not {terminal!r}"
         )
     negotiate = _options.choice("telnet", options, "negotiate", ("full", "passive"), "passive")
     wishes = TelnetOptions(

@@ -2,8 +2,8 @@
 
 Pure. Options are negotiated with the Q method (RFC 1143), which prevents loops: replies are sent
 only for changes. URC never withdraws an agreed option, so the six states of the Q method reduce to
-the three of `_Side`. URC refuses every request for an unknown option, because servers negotiate in
-several rounds and wait for the last reply.
+the three of `_Side`. URC replies with a refusal to every request for an unknown option, because
+servers negotiate in several rounds and wait for the last reply.
 """
 
 import re

@@ -1,8 +1,8 @@
 """A bounded queue for received topic messages.
 
-A fast publisher must not fill URC's memory. It must not be blocked either, because one stalled
-reader would freeze a topic for all clients of the bridge. Each topic therefore keeps only its
-newest messages. Responses are queued separately, because they are never repeated.
+A fast publisher must not fill URC's memory. The publisher must not be blocked either, because one
+stalled reader would freeze a topic for all clients of the bridge. Each topic therefore keeps only
+its newest messages. Responses are queued separately, because they are never repeated.
 """
 
 import asyncio

@@ -68,7 +68,7 @@ class Dialer:
         return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:
-        """Close `line` and its stream immediately; discard unsent data."""
+        """Reset the stream behind `line`, and make `line` discard unsent data when closed."""
         forget_unsent(line)
         carried = self._carried if self._bridges else None
         if carried is not None and isinstance(carried, SupportsReset):

@@ -45,7 +45,7 @@ class OptionReader:
         self._options = options
 
     def part(self, name: str) -> "OptionReader":
-        """Return a reader of the mapping option `name`, or an empty reader if it is missing."""
+        """Return a reader of the mapping option `name`, or an empty reader for a missing option."""
         found = self._options.get(name)
         if found is None:
             return OptionReader(self.kind, {})

@@ -47,7 +47,7 @@ _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as sent by the client."""
 Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-"""A request about the lease or a reset of STOP."""
+"""A request about the lease; ``reset`` resets a latched STOP."""
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
@@ -112,7 +112,7 @@ class SequenceAction(
 class ScreenName(
     msgspec.Struct, tag_field="t", tag="name", forbid_unknown_fields=True, frozen=True
 ):
-    """The name of a screen that has no sign-in of its own, such as “Tablet in the lab”."""
+    """The name of a screen that does not have its own sign-in, such as “Tablet in the lab”."""
 
     name: Annotated[str, msgspec.Meta(max_length=SCREEN_NAME_LENGTH)] = ""
     """"" resets the name to the screen's number."""
@@ -138,8 +138,8 @@ class Drive(
     for_s: float = REQUEST_S
     """Time for the holder's answer, in seconds."""
     stops: int | None = None
-    """Number of STOPs that the operator saw in the lease. A reset is refused if STOP has been
-    pressed again since then; null means the current number."""
+    """Number of STOPs known to the page. A reset is refused if STOP has been pressed again since
+    then; null means the current number."""
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
@@ -157,8 +157,8 @@ class Release(
 ):
     """The release of a held control.
 
-    Releases and ticks share one count: after a release, ticks with lower numbers have no effect. A
-    program that sends ticks and releases in order may send 0 as the number.
+    Releases and ticks share one sequence of numbers: after a release, ticks with lower numbers have
+    no effect. A program that sends ticks and releases in order may send 0 as the number.
     """
 
     command: str

@@ -15,7 +15,7 @@ Messages from the server::
     3 (binary)          the response to a call
 
 Messages from the client are ``subscribe``, ``unsubscribe`` and the binary message 2, a call.
-Clients can't publish, because the protocol cannot tell the robot that a client has released a
+Clients cannot publish, because the protocol cannot tell the robot that a client has released a
 control.
 """
 
@@ -75,7 +75,7 @@ _NOT_OFFERED: Final = frozenset(
         *("subscribeConnectionGraph", "unsubscribeConnectionGraph", "playbackControlRequest"),
     }
 )
-"""Operations of capabilities that the server does not have."""
+"""Operations that require capabilities that the server does not have."""
 Level = Literal["info", "warning", "error"]
 """Level of a status."""
 _Id = Annotated[int, msgspec.Meta(ge=0, lt=2**32)]
@@ -113,7 +113,7 @@ class Subscription(msgspec.Struct, frozen=True):
 
 
 class Subscribe(msgspec.Struct, tag_field="op", tag="subscribe", frozen=True):
-    """A request for the messages of channels."""
+    """A request to subscribe to channels."""
 
     subscriptions: tuple[Subscription, ...]
 
@@ -254,7 +254,7 @@ def encode_unadvertise_services(services: Iterable[int]) -> bytes:
 
 
 def encode_status(level: Level, message: str, status: str = "") -> bytes:
-    """Return a status message, which replaces an earlier one with the same id `status`."""
+    """Return a status message, which replaces any earlier status with the same id `status`."""
     more = {"id": status} if status else {}
     return _told("status", level=_LEVELS[level], message=message[:_LONGEST], **more)
 

@@ -80,7 +80,7 @@ class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     axes: str = ""
     """The signal's axis convention; "" if unknown."""
     has_alarms: bool = False
-    """Whether one of the signal's limits or states causes an alarm."""
+    """Whether a limit or state of the signal can cause an alarm."""
 
 
 class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
@@ -293,7 +293,7 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     group: int
     """Number of the alarm burst."""
     raised: int
-    """Number to repeat in an acknowledgement."""
+    """Number that the page repeats when it acknowledges the alarm."""
     began: int
     value: str = ""
     active: bool = False

@@ -222,7 +222,7 @@ async def test_topics_that_nobody_publishes_are_told_once() -> None:
             await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
             told += await notices(transport)
             await transport.close()
-    assert told == ["nobody publishes /lidar"]
+    assert told == ["nothing publishes /lidar"]
 
 
 async def notices(transport: Transport) -> list[str]:
@@ -321,7 +321,9 @@ async def test_a_fault_of_a_topic_is_in_the_robots_log(rover: Profile) -> None:
             await robot.answer(asked, {"topics": [], "types": []})
             with session.hub.subscribe() as news:
                 async with asyncio.timeout(WAIT_S):
-                    while "nobody publishes /odom" not in [note.text for note in session.hub.notes]:
+                    while "nothing publishes /odom" not in [
+                        note.text for note in session.hub.notes
+                    ]:
                         await news.changed()
                         news.changes()
             assert session.hub.links["ros"].state != "live", "it is no sign of life"

@@ -107,7 +107,7 @@ async def test_agent_logs_in(sshd: Sshd, tmp_path: Path, monkeypatch: pytest.Mon
     assert await refusal(line) == "there is no SSH agent: SSH_AUTH_SOCK is not set"
     monkeypatch.setenv("SSH_AUTH_SOCK", str(tmp_path / "agent"))
     with agent(tmp_path) as add:
-        assert await refusal(line) == "the SSH agent holds no keys; 'ssh-add' adds one"
+        assert await refusal(line) == "the SSH agent holds no keys; 'ssh-add' adds a key"
         add(key)
         key.unlink()
         async with nothing_left():

@@ -18,7 +18,7 @@ def test_a_topic_without_a_publisher_is_told_once() -> None:
     for _ in range(2):
         known.learn(TYPES)
         known.subscribed({"/odom": "nav_msgs/Odometry", "/lidar": "", "/dock/feedback": ""})
-    assert told == ["nobody publishes /lidar"]
+    assert told == ["nothing publishes /lidar"]
 
 
 def test_a_topic_of_another_type_is_told() -> None:

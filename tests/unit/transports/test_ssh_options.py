@@ -83,7 +83,7 @@ def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -
         ({"echo": 1}, "telnet: echo must be true or false, not 1"),
         (
             {"terminal": "VT\x1b"},
-            "telnet: terminal must be a name of up to 40 letters, not 'VT\\x1b'",
+            "telnet: terminal must be a name of up to 40 ASCII characters, not 'VT\\x1b'",
         ),
     ],
 )

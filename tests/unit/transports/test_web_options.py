@@ -125,7 +125,7 @@ STREAMS: list[tuple[list[TopicSubscription], str]] = [
     ),
     (
         [TopicSubscription(f"/{n}", {"stream": "lines"}) for n in range(17)],
-        "http supports at most 16 paths",
+        "http supports at most 16 streams",
     ),
 ]
 

@@ -47,7 +47,7 @@ class LastPeer:
 
     def __init__(self) -> None:
         self.host = ""
-        """Address of the client; "" before the first data."""
+        """Address of the host; "" before any data has arrived."""
 
 
 class ServerContext(NamedTuple):
@@ -81,7 +81,7 @@ class ServerContext(NamedTuple):
 
 
 class SimulatedServer(Protocol):
-    """One transport of the emulated robot."""
+    """A server for one transport of the emulated robot."""
 
     async def open(self) -> Endpoint:
         """Start accepting clients.

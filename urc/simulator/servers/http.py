@@ -26,7 +26,7 @@ __all__ = ["HttpServer"]
 
 
 _BLOCKS: Final = (20, 15)
-"""Size of the image in blocks of 8 by 8 pixels: 160 by 120 pixels."""
+"""Size of a 160 by 120 pixel image in blocks of 8 by 8 pixels."""
 _PERIOD_S: Final = 12.0
 """Period of the colour cycle, in seconds."""
 

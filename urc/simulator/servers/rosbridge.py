@@ -372,7 +372,7 @@ def _fields(body: object) -> object:
 
 
 def _png(data: bytes) -> str:
-    """Return `data`, padded with newlines, as the base64 pixels of a square 8-bit RGB image."""
+    """Return `data`, padded with newlines, as the pixels of a nearly square base64 PNG image."""
     side = max(1, round((len(data) / 3) ** 0.5))
     height = -(-len(data) // (side * 3))
     padded = data.ljust(side * height * 3, b"\n")
@@ -393,8 +393,8 @@ def _png(data: bytes) -> str:
 MAX_BYTES = 10_000_000
 """Maximum frame size in bytes, equal to the default of the real server."""
 MAX_UNSENT_BYTES = 4_194_304
-"""Maximum number of unsent bytes per client. While a client is above the limit, messages to it are
-dropped."""
+"""Maximum number of unsent bytes per client. While a client is above the limit, messages to the
+client are dropped."""
 
 
 class RosbridgeServer(MessageServer):

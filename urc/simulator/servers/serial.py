@@ -22,8 +22,8 @@ from urc.simulator.servers.tcp import TcpServer
 __all__ = ["SerialServer"]
 
 _LOOK_S = 0.02
-"""Polling interval for a closed pseudo-terminal, in seconds. The system does not report when a
-program opens the pseudo-terminal."""
+"""Interval at which the server checks whether a program has opened the pseudo-terminal, in seconds.
+The system does not report when a program opens the pseudo-terminal."""
 
 
 class SerialServer:

@@ -245,7 +245,7 @@ def _write(file: Path, content: bytes) -> None:
 def _private_key(
     context: ServerContext, key: str, passphrase: str | None
 ) -> asyncssh.SSHKey | None:
-    """Return the key in the options; None if the key file is missing."""
+    """Return the key in the options; raise `UrcError` if the key cannot be used."""
     try:
         if "-----BEGIN" in key:
             return asyncssh.import_private_key(key.strip() + "\n", passphrase)

@@ -16,7 +16,7 @@ class TerminalInput:
     """The input of one client, converted to the driver's line endings."""
 
     def __init__(self, spec: TransportSpec) -> None:
-        """Use the line endings of `spec`'s framing; without line endings, bytes stay unchanged."""
+        """Use the line ending of `spec`'s framing; without a line ending, keep all bytes."""
         framing = spec.framing.sent or spec.framing
         end = framing.options.get("tx") if framing.type == "delimiter" else None
         self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""

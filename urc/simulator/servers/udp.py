@@ -1,8 +1,8 @@
 """An emulated robot behind a UDP port.
 
 Clients are identified by the source address of their datagrams. If the driver listens on a port
-(``listen``), the robot sends to that port from the start. Unsolicited datagrams go to the local
-machine at first, then to the host that last sent data to the robot.
+(``listen``), the robot sends to that port from the start. Unsolicited datagrams are sent to the
+local machine at first, then to the host that last sent data to the robot.
 """
 
 import asyncio
@@ -111,7 +111,7 @@ class UdpServer(asyncio.DatagramProtocol):
         await converse(self._context, client, receiver.get, put)
 
     def _now_at(self, address: _Address) -> _Address:
-        """Return the address for unsolicited datagrams: the host of the last peer."""
+        """Return a client's address; for the driver's port, use the host of the last peer."""
         last_peer = self._context.last_peer
         if address != self._told or last_peer is None or not last_peer.host:
             return address
@@ -119,7 +119,7 @@ class UdpServer(asyncio.DatagramProtocol):
 
 
 def _reachable(host: str) -> str:
-    """Return the loopback address for a server that listens on all addresses."""
+    """Return `host`, or the loopback address if `host` means all addresses."""
     if host in ("0.0.0.0", ""):  # noqa: S104 - compared, not bound
         return "127.0.0.1"
     return "::1" if host == "::" else host

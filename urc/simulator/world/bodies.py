@@ -17,7 +17,7 @@ GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
 """Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""Lean angle of a sprung body for an acceleration, in radians per m/s²."""
+"""Lean angle of a sprung body per unit of acceleration, in radians per m/s²."""
 
 Inputs = Mapping[str, float]
 

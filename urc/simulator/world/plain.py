@@ -80,7 +80,7 @@ class _Column(NamedTuple):
     turn: float
     """Direction of the column, in radians left of the forward direction."""
     scale: float
-    """Slope of the ray per pixel from the horizon."""
+    """Change of the ray's slope from one pixel row to the next."""
     even: Channels
     """Colours of the sky and of the ground's even tiles."""
     odd: Channels
@@ -184,7 +184,7 @@ def _focus(width: int, view: float) -> float:
 
 
 def _moved_up(channel: bytearray, rows: int) -> bytearray:
-    """Return a column moved up by a number of rows; its last pixel fills the gap."""
+    """Return a column moved up by a number of rows; the pixel next to the gap fills the gap."""
     rows = max(-len(channel), min(len(channel), rows))
     if rows < 0:
         return channel[:1] * -rows + channel[: len(channel) + rows]
@@ -233,7 +233,7 @@ def _columns(ground: str, width: int, height: int, view: float, z: float) -> lis
 
 
 def _shades(ground: tuple[int, int, int], z: float, steepest: float) -> Channels:
-    """Return the colours for the slopes from `steepest` down to its negative."""
+    """Return the colours for the slopes from `steepest` down to ``-steepest``."""
     above, horizon = _SKY
     planes = [bytearray(_SHADES + 1) for _ in range(3)]
     for place in range(_SHADES + 1):

@@ -32,8 +32,8 @@ __all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 STEP_S: Final = 0.02
 """Length of a simulation step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Maximum simulated time between two observations, in seconds. The rest of a longer gap is not
-simulated."""
+"""Maximum simulated time between two observations, in seconds. The earlier part of a longer gap is
+skipped."""
 _ASKED_EVERY_S: Final = 0.1
 """Interval at which time-dependent inputs are evaluated during a long gap, in seconds."""
 _TRAIL_EVERY_M: Final = 0.05
@@ -117,7 +117,7 @@ class World:
             self._is_busy = False
 
     def low_battery(self) -> None:
-        """Set the battery level to nearly empty."""
+        """Reduce the battery level to at most `_LOW` per cent."""
         self.battery.drain(_LOW)
 
     def view(self, now_s: float) -> "SensorView":

@@ -27,7 +27,7 @@ __all__ = ["DEFAULT_PORT", "FoxgloveTransport"]
 
 DEFAULT_PORT: Final = 8765
 _GREETS_S: Final = 3.0
-"""Maximum wait for the server's description, in seconds."""
+"""Maximum wait for the server information (``serverInfo``), in seconds."""
 _SETTLE_S: Final = 0.1
 _CHECK_S: Final = 2.0
 """Delay before missing topics are reported, in seconds."""

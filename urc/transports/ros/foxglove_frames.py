@@ -60,7 +60,7 @@ class ServiceReply(NamedTuple):
 
 
 class AdvertisedChannel(NamedTuple):
-    """One of the robot's topics, with its type's definition."""
+    """One of the robot's topics, with the definition of the topic's type."""
 
     id: int
     topic: str

@@ -46,8 +46,8 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
 
 MAX_CHANNELS: Final = 4096
-"""Maximum number of known services and of known channels; further ones are ignored.
-Channels for the driver's topics are accepted up to twice this number."""
+"""Maximum number of known services, and of known channels; further services and channels are
+ignored. Channels for the driver's topics are accepted up to twice this number."""
 MAX_PENDING: Final = 256
 """Maximum number of pending calls; above the limit, the oldest call is dropped."""
 KNOWN_TOPICS: Final = 256
@@ -66,7 +66,7 @@ log = logging.getLogger(__name__)
 
 
 class TopicWish(NamedTuple):
-    """A topic that the driver uses."""
+    """A topic that the driver subscribes to."""
 
     topic: str
     type: str = ""
@@ -74,7 +74,7 @@ class TopicWish(NamedTuple):
 
 
 class _Subscription:
-    """A subscribed topic, with the time of its next message."""
+    """A subscribed topic, with the earliest time of its next message."""
 
     __slots__ = ("channel", "due_s", "is_heard", "late", "number", "wish")
 
@@ -103,7 +103,7 @@ class FoxgloveSession:
 
         Args:
             queue: queue for messages and replies.
-            wishes: the driver's topics, without duplicates.
+            wishes: topics to subscribe to, without duplicates.
             graph: object that checks topics.
             call_at: function that schedules a call for a given time on `clock`.
             clock: monotonic clock, in seconds.
@@ -136,7 +136,7 @@ class FoxgloveSession:
         self.capabilities: frozenset[str] = frozenset()
         self.encodings: tuple[str, ...] = ()
         self.is_greeted = False
-        """Whether the server's description has arrived."""
+        """Whether the server information has arrived."""
         self.has_graph = False
 
     def written(self) -> list[tuple[bytes, bool]]:
@@ -402,7 +402,9 @@ class FoxgloveSession:
         said = envelope.attributes
         topic, kind = str(said.get("topic") or ""), str(said.get("type") or "")
         if self.is_greeted and "clientPublish" not in self.capabilities:
-            raise TransportError("the bridge accepts no messages (capability clientPublish)")
+            raise TransportError(
+                "the bridge accepts no messages: it lacks the capability clientPublish"
+            )
         encoding, data = str(said.get("encoding") or ""), said.get("data")
         if not isinstance(data, bytes) or (self.encodings and encoding not in self.encodings):
             if self.encodings and "json" not in self.encodings:
@@ -513,7 +515,7 @@ def _named(one: Mapping[str, Any]) -> bool:
 
 
 def _of_text(value: object) -> object:
-    """Return a parameter's value, which rosapi passes as JSON text."""
+    """Decode a parameter's value, which rosapi passes as JSON text."""
     if not isinstance(value, str):
         return value
     try:

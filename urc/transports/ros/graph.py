@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Maximum number of remembered reports; beyond this number, mistakes are not reported."""
+"""Maximum number of remembered reports; further mistakes are not reported."""
 
 
 class TopicGraph:
@@ -43,7 +43,7 @@ class TopicGraph:
         for topic, kind in sorted(wanted.items()):
             # In ROS 2, the feedback of an action is not an ordinary topic.
             if topic not in self._types and not topic.endswith("/feedback"):
-                self._log(f"nobody publishes {topic}")
+                self._log(f"nothing publishes {topic}")
             else:
                 self._compare(topic, kind, "carries")
 
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version that uses type names of this form; None if unknown."""
+    """Return the ROS version (1 or 2) that uses this form of type name; None without names."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None

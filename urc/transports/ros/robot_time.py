@@ -1,8 +1,8 @@
 """An estimate of a robot's clock, from the times in its messages. No I/O.
 
 A robot's clock may differ from this machine's clock, and a simulation's clock may be paused.
-Delays make the difference between the clocks appear smaller, so the largest difference in the last
-two seconds is the best estimate.
+Transmission delays reduce the measured difference (robot time minus this machine's time). The
+largest difference in the last two seconds is therefore the best estimate.
 """
 
 import struct

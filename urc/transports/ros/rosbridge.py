@@ -203,7 +203,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
 
 def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic; a second would cancel the throttle of the first."""
+    """Merge subscriptions to the same topic; a second would cancel the throttle of the first."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -278,7 +278,7 @@ class _Session:
         return self._client.call_service("/rosapi/subscribers", told, {"topic": topic})
 
     async def settle(self) -> str:
-        """Wait until published messages have arrived; return a line about undelivered topics."""
+        """Wait for delivery; return a line about topics without subscribers, or ""."""
         topics = list(self._fresh)
         self._fresh.clear()
         heard = await asyncio.gather(*map(self._is_heard, topics))

@@ -2,11 +2,11 @@
 
 roslibpy implements the rosbridge operations, their ids, and the handling of pending requests.
 roslibpy's network connections are not used. After a reconnection, roslibpy would send old messages
-again. It also fails on binary frames and never probes the other side. Measurements of roslibpy's
-network connections are recorded in docs/decisions. In this module, roslibpy's protocol writes
-frames to a list, and the transport sends these frames over URC's socket. The transport passes
-received data to the protocol. Each object serves only one connection, so no state is carried over
-to the next connection.
+again. roslibpy also fails on binary frames, and never checks whether the bridge still responds.
+Measurements of roslibpy's network connections are recorded in docs/decisions. In this module,
+roslibpy's protocol writes frames to a list, and the transport sends these frames over URC's socket.
+The transport passes received data to the protocol. Each object serves only one connection, so no
+state is carried over to the next connection.
 
 The client does no I/O and uses no tasks or threads.
 """
@@ -170,7 +170,7 @@ class RosClient:
         self._goals[goal] = name, number
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with the given id, or for an unknown id, the action's newest goal."""
+        """Cancel the goal with the given id or, if the id is unknown, the action's newest goal."""
         name, number = _text(attributes, "action"), attributes.get("id")
         running = [goal for goal, (action, _) in self._goals.items() if action == name]
         named = [goal for goal in running if self._goals[goal][1] == number]

@@ -30,8 +30,8 @@ MAX_VALUES = 2_000_000
 """Maximum number of commas and brackets; limited because an empty list takes three bytes as text
 but fifty in memory."""
 _MANY_VALUES = 100_000
-"""Maximum number of values in CBOR data with shared references; processing this many values takes a
-tenth of a second."""
+"""Maximum number of values in a small CBOR frame, which may repeat values by reference. A larger
+frame may contain as many values as bytes. Processing this many values takes a tenth of a second."""
 _CBOR_MAP = b"\xa0"
 """First byte of a CBOR map; JSON text never begins with this byte or a higher byte."""
 _LONGEST_ID = 256
