@@ -1,11 +1,11 @@
 """The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
-closes it. The engine requests the opening and closing of the connection. The guard sends received
-data to the engine within the engine's flow-control credit. If the connection is lost while the
-robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead. The
-guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection is
-then kept for the engine's next attempt.
+closes the transport. The engine requests the opening and closing of the connection. The guard sends
+received data to the engine within the engine's flow-control credit. If the connection is lost while
+the robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead.
+The guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection
+is then kept for the engine's next attempt.
 """
 
 import asyncio

@@ -136,7 +136,7 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop the listed controls, even if idle; each entry is a line, a control and its terms."""
+    """Stop the listed controls, even if idle; each entry contains line, control and terms."""
 
     controls: list[tuple[str, str, HoldTerms]]
 
@@ -228,7 +228,7 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
 
 
 class StopDue(msgspec.Struct, array_like=True, frozen=True, tag=32):
-    """A control's stop may have been lost with the connection; the guard first writes it again."""
+    """A control's stop may have been lost with the connection; the guard first repeats the stop."""
 
     control: str
 

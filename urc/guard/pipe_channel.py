@@ -118,7 +118,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start and initialise the guard when its turn comes; requires a running event loop."""
+        """Start and initialise the guard in its turn; requires a running event loop."""
         self._turns = start_turns()
         self._turns.take(self, self._launch)
 

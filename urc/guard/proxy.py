@@ -220,7 +220,7 @@ class GuardedTransport:
         self._closed()
 
     def handle(self, said: messages.FromGuard, size: int) -> None:
-        """Handle a message about this transport; both sides count its size as `size` bytes."""
+        """Handle a message about this transport; `size` is its size in bytes for flow control."""
         match said:
             case messages.BytesReceived(turn=turn, data=data) if (
                 turn == self._turn and self._is_open

@@ -5,7 +5,7 @@ bounded work in each turn. The guard uses the lowest real-time priority (``SCHED
 precedence over ordinary programs but not over other real-time programs. Two limits prevent a faulty
 guard from blocking the machine. After `LONGEST_S` seconds of uninterrupted work, the guard runs at
 ordinary priority for `PAUSE_S` seconds. After `FATAL_S` seconds, the kernel kills the guard, and
-the server starts a new one. Child threads and child processes run at ordinary priority.
+the server starts a new guard. Child threads and child processes run at ordinary priority.
 """
 
 import os

@@ -24,7 +24,7 @@ class GuardServer:
     """
 
     def __init__(self, emit: Emit, clock: LaneClock) -> None:
-        """Create a server without transports; it sends messages to the engine with `emit`."""
+        """Create a server without transports; `emit` sends messages to the engine."""
         self._emit = emit
         self._clock = clock
         self._lines: dict[str, GuardedConnection] = {}

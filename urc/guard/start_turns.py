@@ -16,8 +16,8 @@ __all__ = ["START_TIMEOUT_S", "StartTurns", "start_turns"]
 START_TIMEOUT_S: Final = 2.0
 """Maximum time for which a guard without a heartbeat keeps its turn, in seconds."""
 _MOST: Final = 4
-"""Maximum number of guards that start at the same time. A container may have fewer processors than
-it sees, so the number of processors alone is not a reliable limit."""
+"""Maximum number of guards that start at the same time. A program in a container may see more
+processors than it can use, so the number of processors alone is not a reliable limit."""
 
 
 class StartTurns:

@@ -82,7 +82,7 @@ class Item(NamedTuple):
     valid: tuple[float, float] | None = None
     """Valid range of the scaled value; a value outside the range is a violation."""
     value: Template | None = None
-    """Default value to send; None means that the caller must provide a value."""
+    """Formula for the value to send; None means that the caller provides the value."""
     encoding: str = ""
     """Text encoding; "" means the connection's encoding."""
     pad: int = 0

@@ -166,7 +166,7 @@ class Argument(NamedTuple):
     default: Reading = None
     is_required: bool = True
     allows_control: bool = False
-    """Whether a string may contain control characters, such as the end of a frame."""
+    """Whether a string may contain control characters, such as the delimiter of a frame."""
     description: str = ""
     items: ElementType = "number"
     """Type of an array's elements; range and choices apply to each element."""

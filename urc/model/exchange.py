@@ -1,7 +1,7 @@
 """Request handling: queues, reply stages and conditions.
 
-This module contains only data classes. `urc.config` creates their instances, and `urc.protocol`
-applies them.
+This module contains only data classes. `urc.config` creates instances of these classes, and
+`urc.protocol` uses the instances.
 """
 
 from collections.abc import Mapping

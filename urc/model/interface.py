@@ -75,7 +75,7 @@ class Tab(NamedTuple):
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
     left_handed: Mapping[str, Layout] = NOTHING
-    """Declared left-handed layouts, by screen."""
+    """Declared left-handed layouts, keyed by screen."""
     is_mirrored: bool = True
     """Whether layouts without a left-handed version are mirrored for left-handed operators."""
 
@@ -86,7 +86,7 @@ class Interface(NamedTuple):
     name: str
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
-    """Layouts by screen; empty for an interface with tabs."""
+    """Layouts, keyed by screen; empty for an interface with tabs."""
     background: str = ""
     """Name of the background slot; "" means no background."""
     widgets: Mapping[str, WidgetUse] = NOTHING
@@ -96,7 +96,7 @@ class Interface(NamedTuple):
     """SPDX licence identifier from the document."""
     author: str = ""
     left_handed: Mapping[str, Layout] = NOTHING
-    """Declared left-handed layouts, by screen."""
+    """Declared left-handed layouts, keyed by screen."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING
 

@@ -33,7 +33,7 @@ class Setting(NamedTuple):
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
     title: str = ""
     default: Value = None
-    """Default value; None means that the operator must enter a value before connecting."""
+    """Default value; None means that the setting has no default."""
     choices: tuple[str, ...] = ()
     min: float | None = None
     max: float | None = None

@@ -66,7 +66,7 @@ class Widget(NamedTuple):
     """Minimum number of columns and rows in the slot."""
     footprint: Footprint = "instrument"
     is_dead_man: bool = False
-    """Whether the widget is a dead-man control; while it is released, no motion is sent."""
+    """Whether the widget is a dead-man control; while released, no motion commands are sent."""
     summary: str = ""
     licence: str = ""
     """SPDX licence identifier of the widget, from the manifest."""

@@ -152,7 +152,8 @@ class HoldToRun:
     def stop(self, reason: Reason, now: float) -> None:
         """Stop the motion.
 
-        A release has no effect unless the control is moving. Other stops always take effect.
+        A release has no effect unless the control is moving the robot. Other stops always take
+        effect.
         """
         if reason == "released" and self.state != "moving":
             return  # nothing moves, and an idle control is silent

@@ -100,7 +100,7 @@ def _server(context: ServerContext) -> SimulatedServer:
     row = SERVERS.get(context.spec.type)
     if row is None:
         known = ", ".join(sorted(SERVERS))
-        message = f"{context.spec.type} cannot be emulated; expected one of {known}"
+        message = f"{context.spec.type} cannot be emulated; supported types: {known}"
         raise UrcError(f"transports.{context.name}: {message}")
     server: SimulatedServer = row.load()(context)
     return server

@@ -20,7 +20,7 @@ def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
 
 
 def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
-    """Return the port in the option `key`; it must be from 1 to 65535.
+    """Return the port in the option `key`; the port must be from 1 to 65535.
 
     Raises:
         TransportError: the option is missing or invalid.
@@ -65,7 +65,7 @@ def choice(
     """Return an option that must be a word in `among`, or `default` for a missing option.
 
     Raises:
-        TransportError: the value is not one of the words.
+        TransportError: the value is not in `among`.
     """
     found = options.get(key)
     if found is None:

@@ -1,8 +1,8 @@
 """An HTTP/1.1 client for one server, based on the library `httpx2`: connections, logins, errors.
 
-The client replaces the library's connection handling. Every connection goes to the document's
-server, even if a request names another host. Redirects and proxy settings from the environment are
-ignored. Address lookups do not delay the program's exit.
+The client replaces the library's connection handling. Every connection is opened to the server in
+the document, even if a request names another host. Redirects and proxy settings from the
+environment are ignored. Address lookups do not delay the program's exit.
 """
 
 import asyncio

@@ -318,7 +318,7 @@ class _MqttSession:
             self._lose(self._client.fault or HUNG_UP)
 
     def _lose(self, reason: str) -> None:
-        """Wake all waiting tasks, and tell them why the connection ended."""
+        """Record why the connection ended, and wake all waiting tasks."""
         self.queue.end(reason)
         self._forget(self.line)
         if not self._answered.done():

@@ -1,8 +1,8 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-A shared SSH connection has several users: the transport's own channel and all transports that name
-this transport in ``tunnel``. The first user opens the connection, the last user closes it, and its
-loss disconnects all users.
+An SSH transport shares its connection with all transports that name this transport in ``tunnel``.
+The first of these transports opens the connection, and the last closes the connection. A lost
+connection disconnects all of these transports.
 """
 
 import asyncio

@@ -27,7 +27,7 @@ ALL_BYTES = 33_554_432
 A_TURN = 32
 """Maximum number of envelopes handled in one turn of the event loop."""
 ANSWERS = 1024
-"""Maximum number of queued responses and feedback messages; `ALL_BYTES` limits their size."""
+"""Maximum number of queued responses and feedback messages; `ALL_BYTES` limits their total size."""
 
 
 class TopicReceiveQueue:

@@ -141,7 +141,7 @@ class OptionReader:
             if not _TOKEN.fullmatch(name) or not text.isprintable() or not text.isascii():
                 raise TransportError(f"{self.kind} cannot send the header {name[:40]!r}")
             if is_reserved(name) or name.lower() in _OURS:
-                raise TransportError(f"{self.kind} sets the header {name} itself")
+                raise TransportError(f"{self.kind}: a document may not set the header {name}")
             found[name] = text
         if len(found) > MAX_HEADERS:
             raise TransportError(f"{self.kind} accepts at most {MAX_HEADERS} headers")

@@ -153,7 +153,7 @@ def decode(message: str | bytes) -> ClientFrame:
     """Return a message from the client: text, or bytes for a binary message.
 
     Raises:
-        BadClientMessage: the message is invalid, or belongs to a capability that the server lacks.
+        BadClientMessage: the message is invalid, or requires a capability that the server lacks.
     """
     return _operation(message) if isinstance(message, str) else _binary(message)
 

@@ -103,8 +103,8 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
 class ValuesMessage(Outbound, tag="v", frozen=True):
     """Changed signals: `i` holds name indexes, `v` values and `s` alarms (None if all are normal).
 
-    A signal with a history may have several values, oldest first; `e` maps its index to the number
-    of its first value. `n` is the server's time in milliseconds.
+    A signal with a history may have several values, oldest first; `e` maps the signal's index to
+    the number of the first value. `n` is the server's time in milliseconds.
     """
 
     n: int

@@ -45,9 +45,9 @@ BESIDE: list[tuple[dict[str, object], str]] = [
     ({"auth": {"type": "basic"}}, "http needs a user for auth of type basic"),
     ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y'"),
     ({"headers": {"X": "a\nHost: b"}}, "http cannot send the header 'X'"),
-    ({"headers": {"Host": "b"}}, "http sets the header Host itself"),
+    ({"headers": {"Host": "b"}}, "http: a document may not set the header Host"),
     *(
-        ({"headers": {name: "x"}}, f"http sets the header {name} itself")
+        ({"headers": {name: "x"}}, f"http: a document may not set the header {name}")
         for name in (
             "Origin",
             "cookie",

@@ -84,7 +84,7 @@ class Clients:
         try:
             await talk(client)
         except (OSError, TimeoutError) as fault:
-            log.info("%s: lost a client: %s", name, str(fault) or "it does not read its data")
+            log.info("%s: lost a client: %s", name, str(fault) or "it did not read its data")
         finally:
             client.abort()
             self._talks.pop(client, None)

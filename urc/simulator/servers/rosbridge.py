@@ -238,7 +238,7 @@ class BridgeClient:
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Send a message to all subscribers and to the robot; drop it if its type is unknown."""
+        """Send a message to all subscribers and to the robot; ignore unannounced topics."""
         topic, message = _text(operation, "topic"), operation.get("msg")
         if topic not in self._bridge.types or not isinstance(message, dict):
             return None

@@ -1,10 +1,10 @@
 """The kinds of ROS bridges and the automatic choice between them.
 
-A WebSocket client offers subprotocols, and the server selects one. A Foxglove protocol server
-requires one of its own subprotocols. A rosbridge server selects no subprotocol. With ``via: auto``,
-the transport therefore offers Foxglove's subprotocols and follows the server's selection. With
-``via: auto`` and no port, the transport tries the usual ports of both kinds, beginning with the
-port that worked last.
+A WebSocket client offers subprotocols, and the server selects at most one. A Foxglove protocol
+server requires one of its own subprotocols. A rosbridge server selects no subprotocol. With ``via:
+auto``, the transport therefore offers Foxglove's subprotocols and follows the server's selection.
+With ``via: auto`` and no port, the transport tries the usual ports of both kinds, beginning with
+the port that worked last.
 """
 
 from collections.abc import Mapping

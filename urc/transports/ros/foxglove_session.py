@@ -1,7 +1,7 @@
 """The state of one open Foxglove protocol connection: channels, subscriptions, calls.
 
-The session does no I/O. It writes frames to a list, and the transport sends these frames. Each
-object serves a single connection, so no state is carried over to the next.
+The session does no I/O. The session writes frames to a list, and the transport sends these frames.
+Each object serves a single connection, so no state is carried over to the next.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
 only to the driver's topics. The bridge sends every message at the full rate, so the session drops
@@ -53,7 +53,7 @@ MAX_PENDING: Final = 256
 KNOWN_TOPICS: Final = 256
 """Maximum number of topics that the client publishes."""
 MAX_STATUS: Final = 64
-"""Maximum number of different status messages that are passed on."""
+"""Maximum number of different status messages that are reported."""
 MAX_RETRIES: Final = 5
 """Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
@@ -364,8 +364,9 @@ class FoxgloveSession:
     def _forget_refused(self, channels: set[int]) -> None:
         """Forget the subscriptions to refused channels, so that `reconcile` subscribes again.
 
-        The Foxglove SDK's server announces a channel before it accepts subscriptions, so it refuses
-        a client that subscribes immediately. The refusal is text that contains the channel number.
+        The Foxglove SDK's server announces a channel before accepting subscriptions, so the server
+        refuses a client that subscribes immediately. The refusal is text that contains the channel
+        number.
         """
         for one in list(self._topics.values()):
             topic, is_refused = one.wish.topic, one.channel.id in channels and not one.is_heard

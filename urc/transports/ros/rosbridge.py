@@ -9,13 +9,13 @@ stalled reader would freeze the topic for every client of the bridge.
 A bridge delivers the first message on a topic only after the bridge's publisher has connected to
 the subscribers. If the client disconnects before then, the message is dropped. Clients therefore
 call `settle` before disconnecting: the method queries rosapi and waits for the subscribers. The
-reply also shows that the bridge has processed all earlier data.
+reply from rosapi also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
-all result in missing messages. The transport therefore requests the list of topics from rosapi at
-the start. It requests a topic's subscribers when the topic's first message is published.
-`urc.transports.ros.graph` reports mistakes. With ``version: auto``, subscriptions wait for the list
-of topics, which determines the form of the type names.
+all result in missing messages. The transport therefore requests the list of topics from rosapi when
+the connection opens. The transport also requests a topic's subscribers when the topic's first
+message is published. `urc.transports.ros.graph` reports mistakes. With ``version: auto``,
+subscriptions wait for the list of topics, which determines the form of the type names.
 """
 
 import asyncio
@@ -73,7 +73,7 @@ class RosbridgeTransport:
         Args:
             wire: WebSocket transport to the bridge, owned by this transport.
             where: target as display text, such as ``192.168.1.5:9090``.
-            subscriptions: subscriptions made at each opening, one per topic.
+            subscriptions: subscriptions to make whenever the connection opens, one per topic.
             ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
                 bridge's version; None to keep names as written.
         """
