@@ -145,8 +145,8 @@ class SendQueue(Generic[_Tag]):
 
 def why_broken(bug: Exception) -> str:
     """Log an unexpected error from a transport; return an error message for people."""
-    log.error("a transport failed unexpectedly", exc_info=bug)
-    return f"the transport failed unexpectedly ({type(bug).__name__}: {bug})"
+    log.error("a transport failed in an unexpected way", exc_info=bug)
+    return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"
 
 
 def tolerant(

@@ -124,7 +124,7 @@ async def test_what_cannot_be_sent_is_told(benches: list[Bench]) -> None:
         robot.fault = fault
         bench.tell(send(number, b"a"))
         await settle()
-    strange = "the transport failed unexpectedly (KeyError: 'bug')"
+    strange = "the transport failed in an unexpected way (KeyError: 'bug')"
     assert bench.heard() == [
         messages.SendRefused("wire", 1, 1, "too long", is_closed=False),
         messages.SendRefused("wire", 1, 2, "gone", is_closed=True),
@@ -222,7 +222,7 @@ async def test_bug_of_a_transport_ends_its_line(
     monkeypatch.setattr(bench.robot, "receive", broken)
     bench.robot.arriving.put_nowait(b"last")
     await settle()
-    strange = "the transport failed unexpectedly (KeyError: 'bug')"
+    strange = "the transport failed in an unexpected way (KeyError: 'bug')"
     assert bench.heard() == [
         messages.BytesReceived("wire", 1, b"last"),
         messages.LineLost("wire", 1, strange),
@@ -253,7 +253,7 @@ async def test_body_that_no_message_carries_ends_the_line(
     ("fault", "words"),
     [
         (None, "nothing listens"),
-        (KeyError("bug"), "the transport failed unexpectedly (KeyError: 'bug')"),
+        (KeyError("bug"), "the transport failed in an unexpected way (KeyError: 'bug')"),
     ],
 )
 async def test_refusal_is_told(benches: list[Bench], fault: Exception | None, words: str) -> None:

@@ -21,4 +21,4 @@ def test_a_call_that_raises_has_a_result_and_a_reason() -> None:
         raise OSError("the port is gone")
 
     assert tolerant(unsent, 0, reasons.append)() == 0
-    assert reasons == ["the transport failed unexpectedly (OSError: the port is gone)"]
+    assert reasons == ["the transport failed in an unexpected way (OSError: the port is gone)"]

@@ -244,7 +244,7 @@ async def test_foreign_exception_of_a_transport_is_a_lost_line() -> None:
 
     async with opened(Buggy(), clock) as session:
         await clock.advance(1)
-        expected = "the transport failed unexpectedly (ZeroDivisionError: oops)"
+        expected = "the transport failed in an unexpected way (ZeroDivisionError: oops)"
         assert state_of(session) == ("lost", expected)
 
 
