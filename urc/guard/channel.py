@@ -33,8 +33,8 @@ class ChannelListener(Protocol):
     def briefing(self) -> Iterable[messages.ToGuard]:
         """Return the messages that initialise a new guard, in sending order.
 
-        The channel calls this method once for each new guard. The method marks pending stops as
-        sent.
+        The channel calls this method once for each new guard. The method resets the tick numbers,
+        and disarms controls with a pending stop.
         """
 
     def handle(self, message: messages.FromGuard, size: int) -> None:

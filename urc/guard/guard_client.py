@@ -4,8 +4,9 @@ Theory of operation. The guard's state is lost when the guard process dies. The 
 keeps a table of all held commands that were armed or stopped. Each entry stores the command's terms
 and whether the robot may still be moving because of the command. A new guard is initialised from
 this table. The new guard receives the list of transports, and a pending stop for each command that
-may be moving the robot. It also receives the terms of other armed commands. For each pending stop,
-the guard opens the connection and writes the stop first. Motion never resumes automatically.
+may be moving the robot. The new guard also receives the terms of other armed commands. For each
+pending stop, the guard opens the connection and writes the stop first. Motion never resumes
+automatically.
 
 A command *may be moving* the robot from its first tick or stop request. This state ends when the
 guard reports that it has written the stop after the newest tick. The state begins again if the

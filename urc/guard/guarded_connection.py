@@ -44,8 +44,8 @@ _RESCUE_S: Final = 90.0
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
-"""Minimum interval between connection attempts, in seconds; five times as long for slow
-transports."""
+"""Minimum interval between connection attempts, in seconds; five times as long for transports that
+are slow to open."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
 """Maximum timeout for one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout

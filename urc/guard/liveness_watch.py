@@ -31,7 +31,7 @@ class LivenessWatch:
             transport: the transport, which is probed if it implements `SupportsProbe`.
             clock: the time source.
             silent_s: maximum silence of an unprobed robot, in seconds; None for no limit.
-            is_moving: function that returns whether a control is moving.
+            is_moving: function that returns whether a control is moving the robot.
             failed: callback that receives the reason when the program is frozen.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
@@ -70,7 +70,7 @@ class LivenessWatch:
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
-        """Start the watch if a control is moving."""
+        """Start the watch if a control is moving the robot."""
         if self._alarm is None and self._is_open and self.is_able and self._is_moving():
             self._check()
 

@@ -134,7 +134,7 @@ class ProcessState(NamedTuple):
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
-    """Return a process's state from ``/proc`` on Linux; on other systems, return a default."""
+    """Return a process's state from ``/proc``; without ``/proc``, return a default state."""
     try:
         # The name before the state may contain any characters, including brackets and spaces.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]

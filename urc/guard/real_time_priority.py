@@ -62,7 +62,8 @@ class RealTimePriority:
     def __init__(self) -> None:
         """Create the object without requesting real-time priority."""
         self._again_s: float | None = None
-        """Time of the next request after an excessive run, in seconds; None if there is no pause.
+        """Time at which the pause ends and the priority is requested again, in seconds; None
+        without a pause.
         """
 
     def request(self) -> str:

@@ -41,15 +41,15 @@ WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
 class Extent(NamedTuple):
-    """The size of text in bytes, or the length of an array in items."""
+    """The size of bytes or text in bytes, or the number of elements of an array."""
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0
-    """Size in bytes or length in items, for the kind ``fixed``."""
+    """Size in bytes or number of elements, for the kind ``fixed``."""
     prefix: Number | None = None
     """Number type of the length field before the data, for the kind ``prefix``."""
     expression: Template | None = None
-    """Formula for the size or length from earlier items, for the kind ``expression``."""
+    """Formula for the size or number, using earlier items, for the kind ``expression``."""
 
 
 class Item(NamedTuple):
@@ -212,7 +212,7 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Map each item that contains a size or count to the formula that uses the item.
+    """Return the formula that uses each size or count item, keyed by the item's name.
 
     URC computes sizes and counts from the data to send.
     """

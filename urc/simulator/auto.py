@@ -289,7 +289,7 @@ class DefaultConnection:
         return exact or {one.request.label for one in found[:1]}
 
     def _readings(self, frame: Frame) -> Iterator[ReceivedRequest]:
-        """Yield all possible requests for a frame, constant requests first."""
+        """Yield all possible requests for a frame, requests without arguments first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
@@ -317,7 +317,7 @@ class DefaultConnection:
             return False
 
     def _declared(self) -> Iterator[_Request]:
-        """Yield every request that the driver can send on this transport, constants first."""
+        """Yield all requests of the driver on this transport, requests without arguments first."""
         driver, name = self._robot.driver, self._spec.name
         requests = []
         for command in driver.commands.values():

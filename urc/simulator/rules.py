@@ -77,7 +77,7 @@ class RunningRule:
         self.frame = frame
         """The received frame; None for a periodic rule."""
         self.sets = sets
-        """Whether this connection changes the robot's state."""
+        """Whether the reactions may change the robot's state."""
         self.left_s = 0.0
         """Time until the first reaction in `ready_reactions` is due, in seconds."""
         self.has_waited = False

@@ -279,7 +279,7 @@ def tune(line: socket.socket) -> None:
 
 
 def as_bytes(payload: Payload) -> bytes:
-    """Return `payload` as bytes, for a connection that carries bytes.
+    """Return `payload` unchanged if it is bytes.
 
     Raises:
         TransportError: the payload is an envelope.

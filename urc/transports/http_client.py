@@ -127,7 +127,7 @@ class HttpClient:
         ):
             where = f"{self._place.authority}"
             raise HttpFault(
-                f"{one_line(reference)!r} is not on {where}: requests go only to the robot"
+                f"{one_line(reference)!r} is not on {where}: requests are sent only to the robot"
             )
         return self._built(method, str(url.copy_with(fragment=None)), headers, body)
 

@@ -265,7 +265,7 @@ class _MqttSession:
             writable.set_result(None)
 
     def _readable(self) -> None:
-        """Make paho read all received packets; each paho call reads at most one packet."""
+        """Make paho read received packets; each call of `loop_read` reads at most one packet."""
         try:
             for _ in range(_PACKETS_A_TURN):
                 before = self._seen
@@ -396,7 +396,7 @@ class _PahoClient(Client):
             return super()._sock_recv(min(bufsize, _READ_BYTES))
 
     def _sock_send(self, buf: bytes | bytearray) -> int:
-        """Send some of the packets; if sending fails, record the reason."""
+        """Send part of `buf`; if sending fails, record the reason."""
         with self._explained():
             return super()._sock_send(buf)
 

@@ -41,11 +41,11 @@ class OwnListeners:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return the addresses as text, to be passed to `learn` in a related process."""
+        """Return the addresses as text, for `learn` in the guard process."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add a related process's listening addresses; they apply until this process ends."""
+        """Add addresses returned by `words` in another process; they apply until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))

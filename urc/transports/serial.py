@@ -123,7 +123,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
 
 
 def _remedy(port: str) -> str:
-    """Return a hint about the user group that may open the port; "" on systems without groups."""
+    """Return a hint about the user group that may open the port; "" if the group is unknown."""
     if sys.platform == "win32":
         return ""
     import grp

@@ -207,7 +207,7 @@ class SharedConnection:
             await attempt.result().close()
 
     def break_off(self) -> None:
-        """Reset the connection for all users and discard unsent data."""
+        """Reset the connection for all transports and discard unsent data."""
         if self._attempt is not None and self._attempt.done() and self._is_good(self._attempt):
             self._attempt.result().reset()
 

@@ -151,7 +151,7 @@ class LogMessage(Outbound, tag="log", omit_defaults=False, frozen=True):
     """New lines of the log, oldest first; a gap in the numbers means that lines were dropped."""
 
     first: int
-    """Number of the first log line, counted from 0 in each session."""
+    """Number of this message's first log line, counted from 0 in each session."""
     lines: list[LogRow]
 
 

@@ -173,7 +173,7 @@ async def test_a_url_that_leads_elsewhere_is_not_asked_for(web: Server, url: str
         assert answer.attributes["ok"] is False
         assert "status" not in answer.attributes
         reason = str(answer.attributes["reason"])
-        assert "requests go only to the robot" in reason or "is not a URL" in reason
+        assert "requests are sent only to the robot" in reason or "is not a URL" in reason
 
 
 @WEB

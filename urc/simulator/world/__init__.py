@@ -1,1 +1,1 @@
-"""The simulated world of an emulated robot. It is pure, with fixed time steps and seeded noise."""
+"""The simulated world of an emulated robot: pure, with fixed time steps and seeded noise."""

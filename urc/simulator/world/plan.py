@@ -14,7 +14,7 @@ __all__ = ["ROOM", "Edge", "WorldMap", "Contact"]
 
 
 class Edge(NamedTuple):
-    """A vertical face of an obstacle, which begins at the ground."""
+    """A vertical face of an obstacle, starting at the ground."""
 
     x1: float
     y1: float
@@ -30,7 +30,7 @@ class Contact(NamedTuple):
     x: float
     y: float
     depth: float
-    """Depth of the overlap, at least 0."""
+    """Depth of the overlap in metres, greater than 0."""
 
 
 ROOM: Final = PlanSpec(

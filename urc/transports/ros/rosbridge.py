@@ -173,7 +173,7 @@ class RosbridgeTransport:
 
 
 def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
-    """Return a subscription with a document's options.
+    """Return the subscription to a topic, with options from the document.
 
     Raises:
         TransportError: an option is invalid.

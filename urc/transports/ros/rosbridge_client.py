@@ -29,7 +29,7 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["RosSubscription", "RosClient"]
 
 MAX_PENDING = 256
-"""Maximum number of pending calls and goals; beyond this limit, the oldest is dropped."""
+"""Maximum number of pending calls and goals; further calls and goals replace the oldest."""
 _NAME_SHOWN = 80
 KNOWN_TOPICS = 256
 """Maximum number of remembered topics, services and actions."""

@@ -21,14 +21,14 @@ __all__ = ["BadOperation", "OperationReader", "encode_operation"]
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of an operation in any encoding, in bytes; the bridge's own limit is 10 MB."""
 MAX_FRAGMENTED = 8
-"""Maximum number of incomplete operations; beyond this limit, the oldest is dropped."""
+"""Maximum number of incomplete operations; beyond this limit, the oldest operation is dropped."""
 MAX_FRAGMENTS = 4096
 MAX_PNG_BYTES = 2 * 1024 * 1024
 """Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
 one second."""
 MAX_VALUES = 2_000_000
-"""Maximum number of commas and brackets; limited because an empty list takes three bytes as text
-but fifty in memory."""
+"""Maximum number of commas and brackets in a frame; limited because an empty list takes three bytes
+as text but fifty in memory."""
 _MANY_VALUES = 100_000
 """Maximum number of values in a small CBOR frame, which may repeat values by reference. A larger
 frame may contain as many values as bytes. Processing this many values takes a tenth of a second."""
