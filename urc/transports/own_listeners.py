@@ -45,7 +45,7 @@ class OwnListeners:
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add addresses returned by `words` in another process; they apply until this process ends."""
+        """Add addresses from another process's `words`; they apply until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))
