@@ -146,7 +146,7 @@ class EmulatedRobot:
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return the robot's camera image as JPEG; None if the robot has no working camera.
+        """Return the camera image (JPEG, or PNG if `is_plain`); None without a working camera.
 
         `now_s` is the current time, in seconds since the epoch.
         """

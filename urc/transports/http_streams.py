@@ -49,7 +49,7 @@ class StreamSpec(NamedTuple):
     path: str
     every_s: float
     topics: frozenset[str]
-    """All topics of the stream's path; a topic ``PATH#NAME`` receives only the events called
+    """All topics of the stream's path; a topic ``PATH#NAME`` receives only the events named
     ``NAME``."""
 
 

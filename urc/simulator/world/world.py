@@ -141,7 +141,7 @@ class World:
         return self._once(("top", size), 0.2, draw)
 
     def picture(self) -> bytes:
-        """Return the robot's camera image as JPEG; draw at most ten new images per second."""
+        """Return the camera image as JPEG, or as PNG if `is_plain`; draw at most ten per second."""
         flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
 
         def draw() -> bytes:
