@@ -84,7 +84,7 @@ def number_of(name: str) -> Number | None:
 
 
 def _odd_number(name: str) -> Number | None:
-    """Return the number type of a name such as ``f32cdab`` or ``u14by7le``."""
+    """Return the number type of a name such as ``f32cdab`` or ``u14by7le``; otherwise None."""
     found = _SWAPPED.fullmatch(name)
     if found is not None:
         letters: str = found[2] or found[3]

@@ -367,7 +367,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """Linear time could not be proven for the pattern, although it remains possible."""
+    """Raised if linear time cannot be proven; the pattern may nevertheless run in linear time."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:

@@ -151,7 +151,7 @@ def invite_person(
         if person is None and not grants:
             raise AccessError(f"no person has the name {name!r}; a new person needs a role")
         if person is not None and grants:
-            raise AccessError(f"{person.name!r} already exists; change the roles of this person")
+            raise AccessError(f"{person.name!r} already exists; change this person's roles instead")
         if person is None:
             person = store.add("person", name, grants, now=now)
         base.execute("DELETE FROM invitations WHERE kind = 'person' AND owner = ?", (person.id,))

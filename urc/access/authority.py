@@ -216,7 +216,7 @@ class CertificateAuthority:
         )
 
     def _is_usable(self) -> bool:
-        """Return whether the root will not expire soon and permits all of this machine's names."""
+        """Return whether the root is valid for long enough and permits all required names."""
         if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
         allowed = self._allowed()

@@ -44,7 +44,7 @@ class ClaimRule(NamedTuple):
     claim: str
     """Name of the claim; dots separate nested names, as in ``realm_access.roles``."""
     value: str
-    """The value, or `ANY`. A list in the claim matches if it contains the value."""
+    """The required value, or `ANY`. A claim that is a list matches if it contains the value."""
     grant: Grant
 
 

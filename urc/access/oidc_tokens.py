@@ -1,7 +1,8 @@
 """Validation of ID tokens (OpenID Connect Core 1.0, 3.1.3.7).
 
 Layer 4. Pure. Only asymmetric signatures are allowed. A provider can choose neither ``none`` nor a
-signature with a shared secret, which a page may know. The provider sends its keys over TLS.
+signature with a shared secret, because a page may know the secret. The provider sends its keys over
+TLS.
 """
 
 from collections.abc import Mapping, Sequence

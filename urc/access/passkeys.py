@@ -221,7 +221,8 @@ class Passkeys:
         )
         if passkey.counter and proof.new_sign_count <= passkey.counter:
             log.warning(
-                "the counter of the passkey %r did not increase: it may be a copy", passkey.name
+                "the counter of the passkey %r did not increase: the passkey may have been copied",
+                passkey.name,
             )
             raise AccessError(
                 "the passkey may have been copied: its counter did not increase. Use another way to"

@@ -95,7 +95,7 @@ class Invitation(NamedTuple):
 
 
 class AccessStore:
-    """The store; its methods block for a few milliseconds, so servers call them in a thread."""
+    """One SQLite file with identities. Methods block for milliseconds, so servers use a thread."""
 
     def __init__(self, folder: Path) -> None:
         """Open the file, and create it if it is missing.

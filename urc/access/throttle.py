@@ -2,8 +2,8 @@
 
 Layer 4. Pure. Each address and each attempted name has its own count of failures. After `FREE`
 failures, each further failure doubles the wait, up to `LONGEST_S`. A success clears only the name's
-count, so an attacker with one valid account cannot clear the address's count. STOP is never
-throttled here.
+count, so an attacker with one valid account cannot clear the address's count. This limit never
+applies to STOP.
 """
 
 from collections import OrderedDict

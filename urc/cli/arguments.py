@@ -158,10 +158,10 @@ def load(word: str) -> "Profile":
 
 
 def profile_path(word: str) -> str:
-    """Return a robot's file; `word` is a path, or the name of a shipped or installed robot.
+    """Return the path of a robot's file; `word` is a path, or a shipped or installed robot's name.
 
-    An existing path has priority over shipped robots, and shipped robots have priority over
-    installed packages.
+    An existing file has priority over a shipped robot with the same name, and a shipped robot has
+    priority over an installed package.
     """
     path = Path(word)
     if path.suffix in (".yaml", ".yml") or os.path.isfile(word):
@@ -194,7 +194,7 @@ def what_it_has(word: str, known: Iterable[str]) -> str:
 
 
 def duration(text: str) -> float:
-    """Return a duration in seconds, greater than 0.
+    """Return a duration in seconds, which must be greater than 0.
 
     `text` is a number of seconds, or a number with the unit ms, s, m or h.
     """
@@ -208,7 +208,7 @@ def duration(text: str) -> float:
 
 
 def port(text: str) -> int:
-    """Return a port to listen on, 0 to 65535."""
+    """Return the number of a port to listen on, from 0 to 65535."""
     if not re.fullmatch(r"[0-9]{1,5}", text) or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"expected a port from 0 to 65535, found {text!r}")
     return int(text)

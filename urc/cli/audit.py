@@ -26,9 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of newest entries to print (default: 200)",
     )
     parser.add_argument(
-        "--robot", default="", metavar="NAME", help="use only entries of this robot"
+        "--robot", default="", metavar="NAME", help="use only entries about this robot"
     )
-    parser.add_argument("--who", default="", metavar="NAME", help="print only entries of a person")
+    parser.add_argument(
+        "--who", default="", metavar="NAME", help="print only entries with this person's name"
+    )
     parser.add_argument("--text", default="", help="print only entries that contain this text")
     action = parser.add_mutually_exclusive_group()
     action.add_argument(
@@ -51,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print, export or check the entries; return 1 if they were tampered with."""
+    """Print, export or check the entries; return 1 if they cannot be trusted."""
     from urc.runtime.audit_check import check
 
     if arguments.check:

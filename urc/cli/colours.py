@@ -45,7 +45,7 @@ def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> 
 def painted(text: str, style: Style, stream: TextIO | None = None) -> str:
     """Return the text in a style; return it unchanged if the stream has no colours.
 
-    Without `stream`, the text is for standard output.
+    The default stream is standard output.
     """
     if not text or not has_colours(stream or sys.stdout):
         return text

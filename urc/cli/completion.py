@@ -78,4 +78,4 @@ def _documents(prefix: str, **_: object) -> list[str]:
 
 
 _COMPLETERS: dict[str, Callable[..., list[str]]] = {"PROFILE": _robots, "PATH": _robots}
-"""Completion function for each metavar; all other arguments complete to file names."""
+"""Completion function for each metavar; arguments with other metavars complete to file names."""

@@ -108,7 +108,7 @@ def run_dashboard(
         profiles: profiles of the initial robots.
         place: address, folders and options of the dashboard.
         is_simulated: whether emulated robots replace the real robots.
-        on_ready: callback that receives the start addresses once.
+        on_ready: callback, called once with the start addresses.
         given: function that returns a profile's command-line settings.
         is_dev: whether to serve developer pages and reload changed documents.
         faults: faults to inject into emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
@@ -191,7 +191,7 @@ async def _serve(
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:
-    """Open the audit log until `stack` closes; return the log, and options that record to it."""
+    """Open the audit log until `stack` closes; return the log, and a `place` that records to it."""
     audit = AuditLog(own_folder(place.data) / FILE)
     stack.callback(audit.close)
     return audit, replace(place, recorder=ServerRecorder(audit.add))
@@ -231,7 +231,7 @@ async def _robot_at_start(
     profile: Profile,
     faulty: FaultInjector | None,
 ) -> Robot:
-    """Return a profile's robot; with `faulty`, emulate it from the start, even without viewers."""
+    """Return a profile's robot; with `faulty`, emulate it from the start, even without a page."""
     robot = _first(factory, profile)
     if faulty is None:
         return robot
@@ -356,5 +356,5 @@ async def _kept(
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the settings, with sample values for the missing settings of a real robot."""
+    """Return the settings for an emulation, with sample values in place of missing values."""
     return sample_settings(profile.settings) | dict(values)

@@ -1,4 +1,4 @@
-"""`urc demo`: emulate the gallery's robots over real sockets, and open the browser."""
+"""`urc demo`: emulate all shipped robots over real sockets, and open the dashboard in a browser."""
 
 import argparse
 import os

@@ -41,7 +41,7 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""For each optional package, the extra that installs the package, and the package's purpose."""
+"""Maps each optional package to the extra that installs it, and to the package's purpose."""
 OPTIONAL = {
     "google-re2": "patterns without provably linear run time; without this package, URC refuses"
     " them",

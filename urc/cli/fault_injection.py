@@ -91,7 +91,7 @@ def _is_ours(handle: int) -> bool:
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
     """Declare the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
-    which = " of all emulated robots" if has_names else ""
+    which = " for all emulated robots" if has_names else ""
     single = " ROBOT:FAULT for a single robot;" if has_names else ""
     name = "tello:" if has_names else ""
     parser.add_argument(
@@ -101,8 +101,8 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
         default=[],
         metavar="FAULT",
         help=f"a fault{which}, such as delay=200ms, loss=5%%, silent, noise=2x,"
-        f" dropout=SIGNAL, stuck=SIGNAL, low-battery;{single} repeatable, and changed by"
-        f" lines on standard input: 'fault {name}loss=10%%', 'mend', 'faults'",
+        f" dropout=SIGNAL, stuck=SIGNAL, low-battery;{single} repeatable; to change faults"
+        f" while running, enter 'fault {name}loss=10%%', 'mend' or 'faults' on standard input",
     )
 
 
@@ -121,7 +121,7 @@ class FaultInjector:
         self._now = now
         self._emulated_robots: dict[str, list[EmulatedRobot]] = {}
         self._wrong: dict[str, dict[str, str]] = {}
-        """Each robot's faults for its next emulation, by robot name."""
+        """Faults to inject when a robot's emulation restarts, by robot name."""
 
     @contextmanager
     def watch(self, name: str, emulated_robot: "EmulatedRobot") -> Iterator[None]:

@@ -140,7 +140,7 @@ def roles_in(texts: Sequence[str] | None) -> tuple["Grant", ...]:
 def change_roles(
     store: "AccessStore", kind: "Kind", arguments: argparse.Namespace, verb: str
 ) -> int:
-    """Run ``grant`` or ``revoke``: give roles to a person or device, or take them away."""
+    """Run ``grant`` or ``revoke``: add roles to a person or device, or remove roles."""
     from urc.access.administration import change_grants
 
     (name,) = words_of(arguments, verb, "NAME")
@@ -150,7 +150,7 @@ def change_roles(
         raise Misuse(f"'urc {verb} grant' requires --role")
     found = named(store, kind, name)
     if found.owner:
-        raise UrcError(f"{found.name} has the roles of its owner; change the roles of the owner")
+        raise UrcError(f"{found.name} has the roles of its owner; change the owner's roles instead")
     missing = [str(role) for role in roles if role not in found.grants]
     if not is_grant and missing:
         raise UrcError(f"{found.name} has no role {', '.join(missing)}: {roles_text(found.grants)}")

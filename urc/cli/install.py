@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     audit_packages("install", plan.told)
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
-        print(f"{used} remains in use; the robot's settings select the version")
+        print(f"{used} remains in use, because the robot's settings select this version")
     return 0
 
 
@@ -129,7 +129,7 @@ def _compare(
     look: "PreviewWorker",
     risks: list[str],
 ) -> "UpdateDiff | None":
-    """Print and return the changes from the installed version; None for a new installation."""
+    """Print and return the changes from the version in use; None if no other version is in use."""
     from urc.packages.update import UpdateDiff, staged_difference
     from urc.problems import UrcError, printable
 

@@ -127,8 +127,8 @@ def _unknown(verb: str) -> int:
 def _mend_streams() -> None:
     """Open missing standard streams, and make all streams accept any text.
 
-    WARNING: missing streams must be opened first. If a standard stream is missing, the next file or
-        socket receives its number, and printed text could reach a robot.
+    WARNING: open missing streams before any other file or socket. Otherwise, the next file or
+    socket receives the number of the missing stream, and printed text could reach a robot.
     """
     for number in range(3):
         try:

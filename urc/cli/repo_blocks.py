@@ -82,7 +82,8 @@ def blocks(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
             known.forget(key.rstrip("="))
             audit_packages("blocks forget", [key])
             print(
-                f"deleted the block lists of {key}; a repository with this key sends its list again"
+                f"deleted the block lists of {key}; a repository with this key will send its list"
+                " again"
             )
         case _:
             raise Misuse(

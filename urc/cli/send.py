@@ -238,7 +238,7 @@ async def _given(
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
 ) -> AsyncIterator["MotionInterlock | None"]:
-    """Apply the interlocks while the context is active, unless an argument overrides them."""
+    """Apply the interlocks to motion while the context is active, except with `--despite-stop`."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
         yield None

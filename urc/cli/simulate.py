@@ -86,7 +86,9 @@ async def _simulate(
 
 
 class UnansweredLog(logging.Handler):
-    """A reporter of frames without a reply. Identical warnings share one line with a count.
+    """A logging handler that reports frames without a reply.
+
+    Identical warnings share one line with a count.
 
     Args:
         tell: function that prints one line.

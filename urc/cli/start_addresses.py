@@ -57,7 +57,7 @@ class ReadyDashboard(NamedTuple):
 
 
 def _viewer_address(url: str, port: int, key: str) -> str:
-    """Return the address for viewers on this machine; it grants all rights."""
+    """Return the address for viewers on this machine, which grants all rights."""
     place = urlsplit(url)
     host = f"[{place.hostname}]" if ":" in (place.hostname or "") else place.hostname
     scheme = "wss" if place.scheme == "https" else "ws"

@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
-    """Return the installed package with this name, and the requested version range."""
+    """Return the installed package that `word` names, and the version range in `word`."""
     from urc.packages.names import PackageError, parse_requirement
 
     required = parse_requirement(word)

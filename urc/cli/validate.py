@@ -151,7 +151,7 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
 def _examine_folder(
     path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
 ) -> None:
-    """Add the problems in a widget's files, if its manifest is valid."""
+    """Add the problems in a widget's files to the report, if the widget's manifest is valid."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
@@ -161,7 +161,7 @@ def _examine_folder(
 
 
 def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
-    """Add the problems in a document's widgets, except shipped widgets."""
+    """Add the problems in a document's widgets to the report; skip shipped widgets."""
     from urc.shipped import shipped
 
     home = shipped("widgets").resolve()
@@ -185,7 +185,7 @@ def _document_in(path: str) -> str:
 
 
 def _widgets_of_package(path: str) -> "WidgetFolder | None":
-    """Return the widgets in a document's folder or package, or None."""
+    """Return the widgets in a document's folder or package; None if it contains no widgets."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):

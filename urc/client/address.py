@@ -83,7 +83,7 @@ def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAdd
 
 
 def trust(authority: Path | None) -> ssl.SSLContext:
-    """Return the rules for certificates: the system's trust store, or only the authority in a file.
+    """Return a TLS context that trusts the system's trust store, or only the authority in a file.
 
     Raises:
         UrcError: the file cannot be read, or contains no certificate.

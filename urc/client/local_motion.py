@@ -92,10 +92,10 @@ class LocalMotion(ProgramControls):
             self.controller.detach()
 
     def admit(self, command: str, arguments: Mapping[str, Reading]) -> tuple[str, ...]:
-        """Return the names of the command's confirmers: only this program.
+        """Admit a command, and return the names of those who confirm it: only this program.
 
         Raises:
-            CommandFailed: the command is held, or STOP refuses its motion.
+            CommandFailed: the command is a held command, or STOP refuses its motion.
         """
         self.once.admit(_US, command, arguments, None)
         return (_US.name,)

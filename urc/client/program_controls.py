@@ -44,7 +44,7 @@ def only_control(controls: tuple[str, ...], command: str) -> str:
 
 
 class ProgramControls(ABC):
-    """The sticks of one robot in this process; a `urc.client.stick.MotionLine`."""
+    """The sticks of one robot in this process; implements `urc.client.stick.MotionLine`."""
 
     def __init__(self) -> None:
         self.sticks: dict[str, Stick] = {}

@@ -2,8 +2,8 @@
 
 Layer 5. `urc.connect` connects to a robot from this process, and `urc.client.open` uses a server's
 robot. Both return this interface, so a program switches between them by changing one line. The
-tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same
-dialogues against both.
+tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same test
+cases against both functions.
 """
 
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -114,8 +114,8 @@ class RobotInterface(Protocol):
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
         """Run a command and return the values in its reply.
 
-        The call itself confirms a command with ``confirm``. A two-person command waits until a
-        person at a dashboard approves it.
+        Calling a command that has ``confirm`` also confirms the command. A two-person command waits
+        until a person at a dashboard approves it.
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message.

@@ -153,7 +153,7 @@ class Stick:
         return f"this program was blocked for {(now_s - self._moved_s) * 1000:.0f} ms"
 
     def sampled(self, now_s: float, *, is_moving: bool) -> None:
-        """Record a sample's time only during motion; otherwise, a blocked program does no harm."""
+        """Record a sample's time during motion; without motion, a blocked program does no harm."""
         self._moved_s = now_s if is_moving else None
 
     def sample(self) -> tuple[Mapping[str, Reading], float] | None:

@@ -247,7 +247,7 @@ class SyncRobot:
         return SyncAlarms(found, self._thread)
 
     def _here(self, read: Callable[[], _Result]) -> _Result:
-        """Return the result of `read`, called on the event loop."""
+        """Call `read` on the event loop, and return its result."""
 
         async def call() -> _Result:
             return read()

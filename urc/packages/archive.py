@@ -1,9 +1,9 @@
 """The archive format: reproducible ZIP files without compression.
 
-Entries are stored without compression, sorted by path, with dates in 1980. The same files therefore
-produce the same bytes on every machine, regardless of zlib. No entry can be larger than its
-archive. Archives that differ from this form are rejected. URC uses the module `zipfile` only to
-parse archives, never to extract them.
+Entries are stored without compression, sorted by path, and with a fixed date in 1980. The same
+files therefore produce the same bytes on every machine, regardless of zlib. No entry can be larger
+than its archive. Archives that differ from this form are rejected. URC uses the module `zipfile`
+only to parse archives, never to extract them.
 """
 
 import re

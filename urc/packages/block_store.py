@@ -39,7 +39,7 @@ class KnownBlocks(msgspec.Struct, frozen=True):
     """A block list with its maintainer and its origin."""
 
     by: str
-    """The maintainer's name; only the key confirms the name."""
+    """The maintainer's name, which URC does not verify; only the key identifies the maintainer."""
     key: str
     """The maintainer's public key, 32 bytes in base64."""
     number: int

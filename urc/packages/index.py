@@ -89,7 +89,7 @@ class Index(msgspec.Struct, frozen=True):
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
     """Number that increases with every change to the repository; 0 in unnumbered indexes."""
     blocks: BlockList | msgspec.UnsetType = msgspec.UNSET
-    """Blocked packages. Clients trust only the list in a signed index."""
+    """Blocked packages. Clients ignore this list unless the index is signed."""
 
     @property
     def block_list(self) -> BlockList | None:

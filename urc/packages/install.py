@@ -175,7 +175,7 @@ def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
 
 
 def without_blocked(found: Found, store: Store) -> Found:
-    """Return the packages without blocked versions; raise `PackageError` for a damaged store."""
+    """Return the packages, omitting blocked versions; raise `PackageError` for a damaged store."""
     if not store.blocks.all():
         return found
     kept = {

@@ -30,7 +30,7 @@ class InstallPlan(NamedTuple):
 
     @property
     def told(self) -> list[str]:
-        """The package with its version, and each package without a signature, for the audit log."""
+        """Audit log lines: the requested package, and each package accepted without a signature."""
         return [
             str(self.lock),
             *(

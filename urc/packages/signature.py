@@ -46,7 +46,7 @@ class Signature(msgspec.Struct, frozen=True):
     """A signature in an index."""
 
     by: Annotated[str, msgspec.Meta(min_length=1, max_length=_LONGEST)]
-    """Name of the publisher. Only the key confirms the name."""
+    """Publisher's name, which URC does not verify; only the key identifies the publisher."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
     """Ed25519 public key, 32 bytes in base64."""
     value: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{86}==\Z")]

@@ -82,8 +82,8 @@ class PinnedKey:
             found = f"signed by another key, {signature}" if signature else "not signed"
             raise PackageError(
                 f"{self._url}: the index is {found}, but the key {fingerprint(pin.key)} is pinned;"
-                f" if the maintainer confirms this, run 'urc repo remove {self._url}' and add it"
-                " again"
+                f" if the maintainer confirms the change, run 'urc repo remove {self._url}' and add"
+                " the repository again"
             )
         if head is None or signature is None:
             return
@@ -91,7 +91,7 @@ class PinnedKey:
             raise PackageError(
                 f"{self._url}: the index number decreased from {pin.number} to {head.number}; if"
                 f" the maintainer confirms the change, run 'urc repo remove {self._url}' and add"
-                " it again"
+                " the repository again"
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(

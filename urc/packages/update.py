@@ -52,7 +52,7 @@ class PackageSummary(Protocol):
 
     @property
     def risks(self) -> Sequence[str]:
-        """Uses of local resources without a setting, one line each."""
+        """Local resources that the package itself specifies, one line each."""
 
     @property
     def wire(self) -> Mapping[str, str]:
@@ -72,7 +72,7 @@ class UpdateDiff(NamedTuple):
     """New permissions."""
     lost: list[str]
     risks: list[str]
-    """New uses of local resources without a setting."""
+    """Local resources that the new version itself specifies, but the old version does not."""
     wire: list[str]
     """Changed keys, such as ``- commands.beep.send: "beep"`` and ``+ commands.beep.send:
     "BEEP"``."""

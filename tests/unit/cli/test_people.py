@@ -257,7 +257,7 @@ def test_a_device_of_a_person_has_the_roles_of_the_owner(urc: Run, store: Access
     assert (row["owner"], row["roles"], row["is_paired"]) == ("Ann", None, True)
     said = urc("devices", "grant", "Phone", "--role", "watch")
     assert said.errors == (
-        "urc devices: Phone has the roles of its owner; change the roles of the owner\n"
+        "urc devices: Phone has the roles of its owner; change the owner's roles instead\n"
     )
     taken = urc("devices", "pair", "--name", "phone")
     assert taken.errors == "urc devices: a device already has the name 'phone'\n"
