@@ -253,7 +253,7 @@ _RULES: tuple[tuple[str, Rule], ...] = (
     (r"^remove the quotes: (\S+)", _put()),
     (r"^quote it: (\"[^\"]*\"):$", _put()),
     (r"^quote it: ('[^']*'|\"[^\"]*\")$", _quote),
-    (r"^if '#' belongs to it, quote it: ('[^']*')", _quote),
+    (r"^if '#' belongs to the value, quote it: ('[^']*')", _quote),
     (r"^write the number (?:alone|with a point): (\S+)$", _put()),
     (r"^put a colon after the key: '([^']+)'$", lambda t, p, f: _line_rest(t, p, f[1])),
     (r"^put a space after the dash: '([^']+)'$", lambda t, p, f: _line_rest(t, p, f[1])),

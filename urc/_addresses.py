@@ -35,7 +35,8 @@ class _Interface(ctypes.Structure):
 def local_addresses() -> tuple[Address, ...]:
     """Return the addresses at which other machines can reach this machine, IPv4 first.
 
-    Loopback and link-local IPv6 addresses are excluded, because browsers cannot open them.
+    Loopback and link-local IPv6 addresses are excluded, because browsers on other machines cannot
+    open them.
     """
     found = _all()
     usable = [each for each in found if not each.is_loopback and not each.is_unspecified]

@@ -69,7 +69,7 @@ def _documents_in(folder: str) -> str:
         names = sorted(name for name in os.listdir(folder) if name.endswith((".yaml", ".yml")))
     except OSError:
         return ""
-    return f"name one of its documents, such as {os.path.join(folder, names[0])}" if names else ""
+    return f"pass one of its documents, such as {os.path.join(folder, names[0])}" if names else ""
 
 
 def similar_file(path: str) -> str:

@@ -75,7 +75,9 @@ def translate(
     python = parser.expression()
     parser.expect_end()
     if not allows_bytes and _NONCE_ALONE.fullmatch(python.removeprefix(resolve(NONCE))):
-        text = "nonce() returns bytes: write nonce() | b64encode, or send it by 'hex:' or 'bytes:'"
+        text = (
+            "nonce() returns bytes: write nonce() | b64encode, or send it with 'hex:' or 'bytes:'"
+        )
         raise ExpressionSyntaxError(text, 0)
     return python
 
@@ -128,7 +130,7 @@ class _ExpressionParser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip the next token if it is the unquoted word `text`; return whether it was skipped."""
+        """Skip the next token if it is `text` outside quotes; return whether it was skipped."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True

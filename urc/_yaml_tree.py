@@ -82,7 +82,8 @@ class TreeReader:
                 rest,
                 "several-documents",
                 "a second document starts here",
-                hint="one file holds one document: move the second document to a separate file",
+                hint="a file contains only one document:"
+                " move the second document to a separate file",
             )
         return built.value, built.mark
 
@@ -317,7 +318,7 @@ class TreeReader:
             event,
             "cut-value",
             "the value ends before ' #', because a comment starts there",
-            hint=f"if '#' belongs to it, {whole}; else write '# ' with a space",
+            hint=f"if '#' belongs to the value, {whole}; otherwise, write '# ' with a space",
             severity="warning",
         )
 

@@ -70,7 +70,7 @@ class ExpressionError(UrcError):
 
 
 class Template:
-    """A compiled template. Templates are immutable, and templates with equal source are equal."""
+    """A compiled, immutable template. Templates with equal Python source are equal."""
 
     __slots__ = ("_function", "is_constant", "names", "python", "settings", "source")
 

@@ -109,7 +109,7 @@ class Document:
             path: path of the value; for a missing value, the problem points at the nearest parent.
             code: code of the problem, such as ``unknown-key``.
             message: one line that states the actual and the expected content.
-            hint: advice.
+            hint: suggested correction.
             key: whether the problem points at the key instead of the value.
             offset: 0-based character position in the value at `path`.
             length: number of characters to underline from `offset`.
@@ -181,7 +181,7 @@ def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
 
 
 def read_document(path: str, limits: DocumentLimits = _LIMITS) -> Document:
-    """Read a file.
+    """Return the document in a file.
 
     Raises:
         ProblemsError: the file cannot be read or is not a YAML document within `limits`.
@@ -253,7 +253,10 @@ def _parser(text: str) -> Any:
 def _decode(content: bytes, file: str) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise refused(
-            file, "not-utf-8", "this file is UTF-16, documents are UTF-8", "save it as UTF-8"
+            file,
+            "not-utf-8",
+            "this file is UTF-16; documents must be UTF-8",
+            "save the file as UTF-8",
         )
     try:
         text = content.decode("utf-8")

@@ -5,7 +5,7 @@ server's certificate. Users trust the root certificate once on each device. The 
 local network names (RFC 5280, 4.2.1.10), so a stolen key cannot impersonate public websites.
 
 Every certificate is valid from one day before the release day of this version. If the machine's
-clock shows a time before the release day, the release day is used instead.
+clock shows an earlier time than the release day, URC uses the release day as the current time.
 """
 
 import ipaddress
@@ -38,7 +38,7 @@ AUTHORITY_FOLDER: Final = "tls"
 """Subfolder in the data folder for certificates and keys."""
 AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
-"""Time from the issue of a server certificate to its expiry."""
+"""Longest time from the issue of a server certificate to its expiry."""
 RENEW_BEFORE: Final = timedelta(days=30)
 OLDEST: Final = RELEASED
 """Earliest plausible time of the machine's clock."""
@@ -216,7 +216,7 @@ class CertificateAuthority:
         )
 
     def _is_usable(self) -> bool:
-        """Return whether the root is valid for long enough and permits all required names."""
+        """Return whether the root is valid for at least 30 more days and permits the names."""
         if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
         allowed = self._allowed()

@@ -1,9 +1,9 @@
 """Access control for one server: identify requests, and check rights at each command.
 
 Layer 4. Each server has one local user in addition to the people, devices and programs in the
-store. The local user holds the start key and administers the server. The server prints the start
-key in its address. The start key and the local sign-ins exist only in memory and end with the
-server.
+store. The local user holds the start key and administers the server. The server prints an address
+that contains the start key. The start key and the local sign-ins exist only in memory and end with
+the server.
 
 Theory of operation. Every change, including a change by another process, replaces the whole
 `directory`. The callbacks in `on_change` then close the sockets that have lost their rights. Time

@@ -57,7 +57,7 @@ class SignIn(NamedTuple):
     idle_s: float | None
     """Maximum time without use, in seconds; None for no limit."""
     place: str = ""
-    """Network address from which the person signed in."""
+    """Network address from which the sign-in was opened."""
     agent: str = ""
     """Names of the browser and system, such as “Chromium on Android”."""
 

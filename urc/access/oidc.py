@@ -174,7 +174,7 @@ class OidcSignIn:
         return "?"
 
     def _ends_at(self, response: Mapping[str, Any], claims: Mapping[str, Any], now: float) -> float:
-        """Return the latest end of the sign-in, as limited by the provider's session.
+        """Return the UTC end of the sign-in, as limited by the options and the provider's session.
 
         The provider may report the end of its session in the claim ``session_expiry`` (OpenID
         Connect Enterprise Extensions) or in ``refresh_expires_in`` (Keycloak).

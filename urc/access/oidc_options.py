@@ -83,7 +83,7 @@ class OidcOptions:
 
 
 def claim_values(claims: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """Return a claim's values as text; a list has several values.
+    """Return a claim's values as text, one for each item of a list; () for a missing claim.
 
     Args:
         claims: a token's claims.

@@ -1,7 +1,7 @@
 """YAML files with sign-in options; every error message contains the line number.
 
-Layer 4. The file contains no secrets. It names the files that contain the secrets; only their owner
-may read those files.
+Layer 4. The file contains no secrets. It names the files that contain the secrets; those files must
+not be accessible to all users.
 """
 
 import os
@@ -97,7 +97,7 @@ class OptionsFile:
 
         Raises:
             ProblemsError: the file cannot be read, is too short or too long, or is accessible to
-                other users of this machine.
+                all users of this machine.
         """
         if self.data.get(key) is None:
             return ""

@@ -108,7 +108,7 @@ class PasskeyTable:
         """Record a sign-in with a passkey.
 
         Raises:
-            AccessError: the passkey was removed, or a later sign-in is already recorded.
+            AccessError: the passkey was removed, or `counter` is neither 0 nor higher than before.
         """
         self._changed(
             "UPDATE passkeys SET counter = ?, used_at = ? WHERE id = ? AND (counter < ? OR ? = 0)",

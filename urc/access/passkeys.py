@@ -198,7 +198,8 @@ class Passkeys:
             now: UTC time in seconds since 1970.
 
         Raises:
-            AccessError: the response is invalid or too late, or the passkey is unknown.
+            AccessError: the response is invalid or too late, the passkey is unknown, or its counter
+                did not increase.
         """
         from webauthn import verify_authentication_response
 
@@ -264,7 +265,7 @@ def _challenge_of(answer: Mapping[str, Any]) -> str:
 
 
 def _owner_of(answer: Mapping[str, Any]) -> str:
-    """Return the owner's id from the authenticator's response; "" if there is no id."""
+    """Return the owner's id from the response; "" if there is no id, "?" if it is invalid."""
     try:
         return _bytes(answer["response"].get("userHandle") or "").decode()
     except (ValueError, KeyError, TypeError, AttributeError):

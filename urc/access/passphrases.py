@@ -48,8 +48,8 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
     """Return a new passphrase's hash, with its salt and parameters.
 
     Raises:
-        AccessError: the passphrase is too short, too long, too uniform, identical to the name, or
-            easy to guess, such as a common password.
+        AccessError: the passphrase is too short, too long, unprintable, too uniform, identical to
+            the name, or easy to guess, such as a common password.
     """
     passphrase = _normal(passphrase)
     length = len(passphrase)

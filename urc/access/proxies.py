@@ -1,7 +1,7 @@
 """Trusted proxies: web servers in front of URC that sign people in and send their names.
 
 Layer 4. All functions except `read_proxy_options` are pure. URC accepts a name only together with
-the proxy's secret, regardless of the network address. Without the secret, both headers are removed,
+the proxy's secret, regardless of the network address. Both headers are removed from every request,
 so neither a client nor another proxy can set a name.
 """
 
@@ -54,7 +54,7 @@ class ProxiedRequest(NamedTuple):
     user: str = ""
     """The person's name according to the proxy; "" if the proxy sent no name."""
     fault: str = ""
-    """Reason why proxy headers were ignored; "" if they were not."""
+    """Reason why proxy headers were ignored; "" if none were ignored."""
 
 
 def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) -> ProxiedRequest:

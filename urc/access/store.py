@@ -179,7 +179,8 @@ class AccessStore:
             ends_at: UTC time at which all rights end; None if they never end.
 
         Raises:
-            AccessError: the name is empty, too long or in use, or there are too many principals.
+            AccessError: the name is invalid or in use, there are too many principals, or the owner
+                has too many devices.
         """
         principal = Principal(
             secrets.token_hex(8), kind, parse_name(name), tuple(grants), owner, tuple(commands),
@@ -205,7 +206,7 @@ class AccessStore:
         return principal
 
     def rename(self, principal: str, name: str) -> None:
-        """Rename a principal; raise `AccessError` if the name is in use or invalid."""
+        """Rename a principal; raise `AccessError` for an unknown principal or unusable name."""
         try:
             self._update("UPDATE principals SET name = ? WHERE id = ?", parse_name(name), principal)
         except sqlite3.IntegrityError:

@@ -18,7 +18,7 @@ _SLACK_S: Final = 120.0
 
 
 class KnownTime(NamedTuple):
-    """A time in the past."""
+    """The time of a past event."""
 
     at: float
     """UTC time in seconds since 1970."""

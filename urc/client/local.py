@@ -107,7 +107,7 @@ class ConnectedRobot(HubReadings):
 
     @property
     def latched_by(self) -> str:
-        """Name of the person or program that latched STOP in this process; "" if not latched."""
+        """Name of the person or program that latched STOP; "" while STOP is not latched."""
         return self.motion.controller.lease.state.latched_by
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:

@@ -90,7 +90,7 @@ async def open(
         server: address such as ``https://robots.lab:8080``.
         robot: the robot's name in its URL; "" for the server's only robot.
         token: this program's token; "" for none.
-        token_file: file that contains the token; replaces `token`.
+        token_file: file that contains the token; cannot be combined with `token`.
         authority: PEM file with the certificate of the server's local authority; None for the
             system's trust store. Certificates are always checked.
         allow_unencrypted: whether to send the token to another computer over plain HTTP, where
@@ -184,7 +184,7 @@ class RemoteRobot(HubReadings):
 
     @property
     def latched_by(self) -> str:
-        """Name of the operator who pressed STOP; "" while STOP is not latched."""
+        """Name of the person or program that latched STOP; "" while STOP is not latched."""
         return self.motion.lease.latched if self.motion.lease is not None else ""
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
@@ -194,7 +194,7 @@ class RemoteRobot(HubReadings):
 
         Raises:
             CommandFailed: the command failed; the exception has a `code` and a message. With the
-                code ``disconnected``, the outcome is unknown.
+                code ``disconnected``, the robot may have executed the command.
         """
         try:
             plain = plain_arguments(arguments)

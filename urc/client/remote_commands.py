@@ -39,7 +39,8 @@ class RemoteCommands:
             stops: number of STOPs that the program knows of; None to skip the check.
 
         Raises:
-            CommandFailed: the connection is down, or was lost before the reply.
+            CommandFailed: the connection is down, was lost before the reply, or has too many
+                pending commands.
         """
         reply = await self._run(name, arguments, stops, "")
         if reply.code == "not-confirmed" and reply.message.startswith(_MISSING):

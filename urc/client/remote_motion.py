@@ -241,7 +241,7 @@ def plain_arguments(arguments: Mapping[str, Reading]) -> Arguments:
     """Return arguments in a form that the server accepts.
 
     Raises:
-        UrcError: an argument is not a number, text or boolean, or a list of such values.
+        UrcError: an argument is not None, a number, text, a boolean, or a list of such values.
     """
     return {name: _plain(name, value) for name, value in arguments.items()}
 

@@ -54,7 +54,7 @@ class RobotInterface(Protocol):
 
     @property
     def latched_by(self) -> str:
-        """Name of the operator who pressed STOP; "" while STOP is not latched."""
+        """Name of the person or program that latched STOP; "" while STOP is not latched."""
 
     def latest(self, name: str, /) -> Sample | None:
         """Return a signal's newest reading; None if there has been no reading.

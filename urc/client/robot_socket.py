@@ -62,7 +62,7 @@ class RobotSocket:
             address: the server.
             robot: the robot's name; "" for the server's only robot.
             token: the program's token; "" for none.
-            context: rules for certificates; None for an unencrypted connection.
+            context: TLS context; None for an unencrypted connection.
             timeout_s: longest duration of one attempt to connect, in seconds.
         """
         self.address = address

@@ -1,9 +1,9 @@
 """A program's stick: sampled input for one held command, under the motion contract.
 
-Layer 5. Theory of operation. Calling the stick sets the input and its time. A sampler sends one
-tick every 50 ms, while the input is younger than `valid_s`. A program that hangs, sleeps too long,
-raises an exception or dies does not renew its input, so the robot stops. No timer sends ticks for a
-program that does not renew its input.
+Layer 5. Theory of operation. Calling the stick sets the input and its time. A sampler sends a tick
+for new input, and at least every 50 ms, while the input is younger than `valid_s`. A program that
+hangs, sleeps too long, raises an exception or dies does not renew its input, so the robot stops. No
+timer sends ticks for a program that does not renew its input.
 
 If motion ends for any reason except `release` or the end of the context, further calls to the stick
 fail. New motion then requires a new context, just as a person must release and press a control

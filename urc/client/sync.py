@@ -133,7 +133,7 @@ class SyncRobot:
 
     @property
     def latched_by(self) -> str:
-        """Name of the operator who pressed STOP; "" while STOP is not latched."""
+        """Name of the person or program that latched STOP; "" while STOP is not latched."""
         return self._robot.latched_by
 
     def latest(self, name: str, /) -> Sample | None:

@@ -162,7 +162,7 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
         raise PackageError(f"{name}: the archive is damaged or truncated: {error}") from None
     if _written(files) != data:
         raise PackageError(
-            f"{name}: this archive contains data outside its files;"
+            f"{name}: this archive differs from the form that URC writes;"
             " create the archive with 'urc bundle'"
         )
     return files

@@ -1,4 +1,4 @@
-"""Atomic file operations: after a crash, a file is either complete or absent."""
+"""Atomic file operations: a crash never leaves an incomplete file."""
 
 import os
 import shutil
@@ -100,7 +100,7 @@ def clear(work: Path) -> None:
 
 @contextmanager
 def exclusive(file: Path) -> Iterator[None]:
-    """Exclude other processes while the context is active.
+    """Hold the lock file `file`, which excludes other processes, while the context is active.
 
     A crash of this process releases the lock.
 

@@ -70,7 +70,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class BlockList(msgspec.Struct, frozen=True):
-    """One maintainer's entries."""
+    """The entries of one repository's block list."""
 
     id: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{32}\Z")]
     """Random identifier of the list, because one maintainer may sign several repositories."""

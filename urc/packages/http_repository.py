@@ -27,7 +27,7 @@ class HttpResponse(NamedTuple):
     """A web server's response."""
 
     status: int
-    """Status code: 200, 304 for an unchanged file, or 404 for a file that may be missing."""
+    """Status code; for downloads, 200, 304 for an unchanged file, or 404 for a missing file."""
     etag: str
     body: bytes
 
@@ -111,7 +111,7 @@ async def _within(
 
 @cache
 def _trust() -> ssl.SSLContext:
-    """Return the trusted certificate authorities. The result is cached for repeated requests."""
+    """Return a TLS context for all requests, which trusts the system's certificate authorities."""
     return httpx2.create_ssl_context()
 
 

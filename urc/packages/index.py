@@ -144,7 +144,7 @@ def in_order(entries: Iterable[IndexEntry]) -> tuple[IndexEntry, ...]:
 
 
 def check_entries(entries: Iterable[IndexEntry]) -> None:
-    """Raise `PackageError` for an invalid version or range."""
+    """Raise `PackageError` for an invalid version, package name or range."""
     versions: set[str] = set()
     needs: set[tuple[str, str]] = set()
     for entry in entries:  # thousands of entries share the same text, so each text is parsed once

@@ -66,7 +66,7 @@ class IndexListing(NamedTuple):
 
     listed: Index
     faults: tuple[str, ...]
-    """One error message for each rejected package."""
+    """Error messages about the rejected packages."""
 
 
 def make_index(
@@ -306,7 +306,7 @@ def _take(
     examine: Callable[[Path], list[str]],
     signer: Signer | None,
 ) -> list[str]:
-    """Write a new version's archive; return its errors."""
+    """Write the archive of a source package's new version; return the errors that prevent this."""
     try:
         package = pack_folder(home)
     except PackageError as error:

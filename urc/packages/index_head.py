@@ -53,7 +53,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
-        """Reject an invalid expiry time and an expiry time without a signature."""
+        """Reject an invalid expiry time, and a signature or an expiry time without the other."""
         if self.expires:
             datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (the format has a Z)
         if bool(self.expires) != isinstance(self.signature, Signature):
@@ -105,7 +105,7 @@ def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
 def next_head(
     old: IndexHead | None, number: int, digest: str, index_signer: IndexSigner | None
 ) -> IndexHead:
-    """Return a new head for an index, or the old head while it is still valid.
+    """Return a head for an index: the old head while more than half of its validity remains.
 
     Args:
         old: current head; None if there is no valid head.

@@ -91,9 +91,9 @@ class _Reader:
 
     def _text(self, path: Path, value: object) -> str:
         if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST:
-            raise self.fault(path, f"expected a text of 1 to {_LONGEST} characters")
+            raise self.fault(path, f"expected text of 1 to {_LONGEST} characters")
         if not value.isprintable():
-            raise self.fault(path, "expected a text on one line, without control characters")
+            raise self.fault(path, "expected text on one line, without control characters")
         return value
 
     def kind(self) -> str:

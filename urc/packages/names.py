@@ -56,7 +56,7 @@ def parse_key(text: str) -> PackageId:
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(
             f"{text!r} is not a package name: write drivers/NAME, interfaces/NAME, widgets/NAME"
-            " or robots/NAME, in small letters, digits and '-'"
+            " or robots/NAME, with lower-case letters, digits and '-'"
         )
     return PackageId(FOLDERS[folder], name)
 

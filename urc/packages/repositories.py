@@ -84,7 +84,7 @@ class Repository:
         return kept[0].packages if kept is not None else ()
 
     def entries(self) -> tuple[IndexEntry, ...]:
-        """Return the current entries, or the stored entries while the repository is unreachable.
+        """Return the current entries, or the stored entries if the request fails.
 
         Raises:
             PackageError: no index is stored, or the stored index has expired.
@@ -181,7 +181,7 @@ class Repository:
         return fetch_archive(self.name, entry)
 
     def forget(self) -> None:
-        """Delete the stored index."""
+        """Delete the stored index and the pinned key."""
         self._index.unlink(missing_ok=True)
         self._tags.unlink(missing_ok=True)
         self._trust.forget()

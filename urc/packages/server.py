@@ -43,7 +43,7 @@ _HEADERS: Final = {"cache-control": "no-store", "x-content-type-options": "nosni
 
 
 class UploadService:
-    """The service for uploads with `PUT`.
+    """Accepts package uploads with `PUT`.
 
     Clients send `PUT archives/drivers/puppet/1.0.0.zip` with the header `authorization: Bearer
     TOKEN`.
@@ -64,7 +64,7 @@ class UploadService:
         self._waiting = 0
 
     async def answer(self, request: Request) -> Response:
-        """Process one upload: reply 201 for a new version, or 200 for a listed version."""
+        """Process one upload: reply 201 for a new version, or 200 for an already listed version."""
         refusal: SubmissionRefused | None = None
         key = None
         try:
@@ -106,7 +106,7 @@ class UploadService:
             )
         found = _FILE.fullmatch(request.path_params["path"])
         if found is None or found[1] not in FOLDERS:
-            raise SubmissionRefused(404, "archives/drivers/NAME/VERSION.zip is expected")
+            raise SubmissionRefused(404, "expected the path archives/drivers/NAME/VERSION.zip")
         key = PackageId(FOLDERS[found[1]], found[2])
         if not token.allows(key):
             may = ", ".join(token.may)
@@ -231,7 +231,7 @@ class _Shop:
         except (PackageError, OSError):
             return _respond(request, b'{"error":"the repository cannot be read"}', "json", 503)
         if body is None:
-            return _respond(request, b'{"error":"there is no such thing here"}', "json", 404)
+            return _respond(request, b'{"error":"this repository has no such file"}', "json", 404)
         return _respond(request, body, kind, 200)
 
     def _content(self, path: str) -> tuple[bytes | None, str]:

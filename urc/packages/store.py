@@ -39,7 +39,7 @@ _LOCK_BYTES: Final = 1 << 20
 
 
 class Store:
-    """The store in one folder. The first installation creates the store's folder."""
+    """The installed packages in one folder. The first installation creates the folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -214,8 +214,8 @@ class StoreTransaction:
             ``drivers/puppet/driver.yaml``.
 
         Raises:
-            PackageError: an archive differs from the lock or from an installed version, or a
-                signature is not accepted.
+            PackageError: an archive differs from the lock or from an installed version, a signature
+                is not accepted, or a package is blocked.
         """
         store = self._store
         store.state().check(plan)
@@ -271,7 +271,7 @@ class StoreTransaction:
             1.0.0``.
 
         Raises:
-            PackageError: the package is not installed, or another package depends on it.
+            PackageError: the package is not installed, or was installed only as a dependency.
         """
         state = self._store.state()
         gone = _meant(required, state.installed)

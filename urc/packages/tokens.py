@@ -76,7 +76,8 @@ class UploadTokens:
         """Generate a token and return its text. Only the token's digest is stored.
 
         Raises:
-            PackageError: the name is in use or invalid, or `may` contains an invalid package.
+            PackageError: the name is in use or invalid, `may` contains an invalid pattern, or too
+                many tokens are stored.
         """
         if not _NAME.fullmatch(name):
             raise PackageError(f"{name!r}: expected a name of letters, digits, '-', '_' and '.'")

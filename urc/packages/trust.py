@@ -19,7 +19,7 @@ class PinnedSigner(NamedTuple):
     """The signer of a repository's index."""
 
     by: str
-    """Name of the signer. Only the key confirms the name."""
+    """Name of the signer, which URC does not verify; only the key identifies the signer."""
     key: str
     """Public key, 32 bytes in base64."""
 

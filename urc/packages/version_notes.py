@@ -44,7 +44,7 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
     def __str__(self) -> str:
         at = f" at {self.commit}" if self.commit else ""
         by = f" by {self.tool}" if self.tool else ""
-        return f"made from {self.source or 'somewhere'}{at}{by}"
+        return f"made from {self.source or 'an unknown source'}{at}{by}"
 
 
 class Notes(msgspec.Struct, frozen=True, omit_defaults=True):

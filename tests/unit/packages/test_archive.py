@@ -121,7 +121,10 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "empty": (lambda: b"", "this is not a package: expected a ZIP archive"),
     "end added": (lambda: GOOD + b"more", "truncated, or has extra data at its end"),
     "twice": (lambda: _twice(), "is present twice"),
-    "dated": (lambda: zipped(("a.txt", b"x")), "this archive contains data outside its files"),
+    "dated": (
+        lambda: zipped(("a.txt", b"x")),
+        "this archive differs from the form that URC writes",
+    ),
 }
 
 

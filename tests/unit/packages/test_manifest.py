@@ -41,10 +41,10 @@ def test_a_manifest_is_read() -> None:
         (
             "licence: MIT",
             "licence: 7",
-            "p.yaml:5:10: licence: expected a text of 1 to 500 characters",
+            "p.yaml:5:10: licence: expected text of 1 to 500 characters",
         ),
         ("[A. Author]", "[]", "p.yaml:6:10: authors: expected a list of 1 to 32 names"),
-        ("[A. Author]", '["a\\nb"]', "p.yaml:6:11: authors.0: expected a text on one line"),
+        ("[A. Author]", '["a\\nb"]', "p.yaml:6:11: authors.0: expected text on one line"),
         ("widgets/dial", "dial", "p.yaml:9:9: needs.dial: 'dial' is not a package name"),
         ("^1.0", "soon", "p.yaml:9:17: needs.widgets/dial: 'soon' is not a range of versions"),
         ("licence:", "license:", "unknown key 'license'; expected one of: urc, package, name"),
