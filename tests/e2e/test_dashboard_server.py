@@ -181,7 +181,7 @@ async def test_an_address_that_is_taken_is_told_in_one_line() -> None:
             await serve(build_app({}), port=port)
         assert str(caught.value) == (
             f"cannot listen on 127.0.0.1 port {port}: Address already in use;"
-            " choose another with --port"
+            " choose another port with --port"
         )
 
 

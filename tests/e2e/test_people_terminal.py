@@ -83,7 +83,7 @@ def test_a_passphrase_in_a_terminal_is_never_shown(tmp_path: Path) -> None:
     terminal = Terminal("people", "passphrase", "Ann", *folder)
     terminal.until("New passphrase for Ann: ")
     terminal.type(f"{PASSPHRASE}\n")
-    terminal.until("The same again: ")
+    terminal.until("Repeat the passphrase: ")
     terminal.type(f"{PASSPHRASE}\n")
     assert terminal.wait() == 0
     assert PASSPHRASE not in terminal.text

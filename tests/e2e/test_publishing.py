@@ -199,7 +199,7 @@ def test_what_is_wrong_is_refused_in_one_line(
     car = str(write_package(lab.home, "driver", "car"))
     told = anna.refuses("publish", car, *lab.to)
     assert "warning unused-setting settings.key:" in told
-    assert "; --allow-warnings publishes it despite warnings" in told
+    assert "; --allow-warnings publishes the package despite warnings" in told
     told = anna.refuses("publish", car, *lab.to, "--allow-warnings")
     assert "the token 'x' may publish" in told
     module = (lab.home / "widgets/dial/widget.js").rename(lab.home / "kept.js")

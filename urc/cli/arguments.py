@@ -185,7 +185,7 @@ def profile_path(word: str) -> str:
 
 
 def what_it_has(word: str, known: Iterable[str]) -> str:
-    """Return a suggestion for an unknown name in a profile."""
+    """Return a suggestion for an unknown name: a similar name, or all known names."""
     from difflib import get_close_matches
 
     names = list(known)

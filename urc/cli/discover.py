@@ -135,7 +135,7 @@ async def _nearby(
 ) -> tuple[list[Row], str]:
     """Return the open ports of shipped robots on this machine or on the given hosts.
 
-    The search uses the default values for all settings.
+    Settings without a given value have their default values.
 
     For each rosbridge that replies, the result includes its topics.
     """

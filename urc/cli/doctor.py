@@ -21,7 +21,7 @@ EXAMPLE = "urc doctor"
 
 REQUIRED = {
     "PyYAML": "reads documents",
-    "jsonschema": "explains their problems",
+    "jsonschema": "explains problems in documents",
     "Jinja2": "templates and pages",
     "jmespath": "queries for values in JSON",
     "starlette": "the dashboard's pages",
@@ -183,5 +183,7 @@ def _try_port(port: int) -> str:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise UrcError(f"127.0.0.1:{port}: {reason}; choose another with --port") from error
+            raise UrcError(
+                f"127.0.0.1:{port}: {reason}; choose another port with --port"
+            ) from error
         return f"127.0.0.1:{probe.getsockname()[1]} is free for the dashboard"

@@ -202,7 +202,7 @@ def is_agreed_to(
     """Ask the user, unless `--yes` is given. New permissions require an additional option.
 
     Args:
-        difference: changes from the installed version; None if no version is installed.
+        difference: changes from the version in use; None if there is no version to compare.
         risks: local resources that the package itself specifies.
         arguments: parsed arguments with ``yes``, ``allow_more`` and ``takes_risks``.
         question: question to the user, such as ``Update it?``.

@@ -147,7 +147,7 @@ def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
 
 
 def _passphrase(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Set a person's passphrase, and end the person's sign-ins."""
+    """Set a person's passphrase, and end the person's browser sign-ins."""
     from urc.access.administration import replace_passphrase
     from urc.access.passphrases import hash_of
 
@@ -172,7 +172,7 @@ def _typed(name: str) -> str:
 
     try:
         first = getpass(printable(f"New passphrase for {name}: "))
-        again = getpass("The same again: ")
+        again = getpass("Repeat the passphrase: ")
     except EOFError:
         raise UrcError("no passphrase was typed; nothing was changed") from None
     if first != again:

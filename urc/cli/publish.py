@@ -124,7 +124,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
     if found:
         told = "; ".join(problem.headline for problem in found[:_TOLD_MOST])
         only = all(one.severity == "warning" for one in found)
-        hint = "; --allow-warnings publishes it despite warnings" if only else ""
+        hint = "; --allow-warnings publishes the package despite warnings" if only else ""
         raise PackageError(f"{told}{hint}")
 
 

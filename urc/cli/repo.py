@@ -118,7 +118,7 @@ def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--why",
         metavar="TEXT",
-        help="withdraw, block: reason shown to users who have installed the version",
+        help="withdraw, block: reason shown to users of the version or package",
     )
     parser.add_argument(
         "--signed-by",

@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--path",
         action="store_true",
-        help="print the path of the schema file; without KIND, the paths of all schemas",
+        help="print the path of the schema file; without KIND, the path of the folder with all"
+        " schemas",
     )
 
 

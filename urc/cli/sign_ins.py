@@ -28,12 +28,16 @@ _FEWEST_DIGITS = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: action and selection."""
-    add_actions(parser, _ACTIONS, "list; end ID…: end sign-ins by id, or by the id's first digits")
+    add_actions(
+        parser,
+        _ACTIONS,
+        "list; end ID…: end sign-ins by id, or by at least the first 4 digits of the id",
+    )
     parser.add_argument(
         "--of",
         metavar="NAME",
-        help="list, end: all sign-ins of this person, device or program; a device must then be"
-        " paired again",
+        help="list, end: all sign-ins of this person, device or program; after end, a device must"
+        " be paired again",
     )
     parser.add_argument(
         "--all",

@@ -87,7 +87,7 @@ def ready_addresses(
     Args:
         url: first address of the dashboard, without a key.
         host: value of `--host`.
-        access: the keys of the dashboard.
+        access: the start key, identities and rights of the dashboard.
         certificates: HTTPS certificates; None for plain HTTP.
         tls: public names of a web server in front of the dashboard.
         foxglove: port for Foxglove viewers; None if they use the dashboard's port.

@@ -91,7 +91,7 @@ def tls_of(arguments: argparse.Namespace) -> TlsOptions:
         if parse_host(name) is None:
             raise Misuse(f"--behind-proxy: expected a name like robots.example, found {name!r}")
     if bool(arguments.tls_cert) is not bool(arguments.tls_key):
-        raise Misuse("--tls-cert and --tls-key belong together: give both")
+        raise Misuse("--tls-cert and --tls-key require each other: specify both")
     if arguments.tls and arguments.tls_cert:
         raise Misuse("--tls auto makes a certificate: remove --tls-cert and --tls-key, or --tls")
     if arguments.insecure_plain_http:

@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     name = _transport(profile, arguments.transport)
     line = _line(profile, name, _settings(profile, name, arguments))
     if line.target.keys.is_pinned:
-        raise Misuse(f"transports.{name}: the document already gives the key as host_key")
+        raise Misuse(f"transports.{name}: the document already specifies the key under host_key")
     offers: list[OfferedHostKey] = []
 
     async def look() -> int:

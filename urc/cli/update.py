@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--yes",
         action="store_true",
-        help="do not ask for confirmation, unless an update needs new permissions",
+        help="update without asking; new permissions also require --allow-more",
     )
     parser.add_argument(
         "--allow-more", action="store_true", help="with --yes: also accept new permissions"
@@ -98,7 +98,7 @@ def _update(
         for line in _told(old, plan, difference, origin_lines(plan, store)):
             print(printable(line))
         if not is_agreed_to(difference, difference.risks, arguments, "Update it?"):
-            print(f"{old} stays")
+            print(f"{old} remains installed")
             return False
         change.replace(old, plan)
     audit_packages("update", plan.told)

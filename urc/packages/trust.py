@@ -81,9 +81,9 @@ class PinnedKey:
         if pin is not None and (signature is None or signature.key != pin.key):
             found = f"signed by another key, {signature}" if signature else "not signed"
             raise PackageError(
-                f"{self._url}: the index is {found}, but the key {fingerprint(pin.key)} is pinned;"
-                f" if the maintainer confirms the change, run 'urc repo remove {self._url}' and add"
-                " the repository again"
+                f"{self._url}: the index is {found}, but the key {fingerprint(pin.key)} is pinned."
+                f" If the maintainer confirms this, run 'urc repo remove {self._url}' and add the"
+                " repository again"
             )
         if head is None or signature is None:
             return

@@ -66,7 +66,7 @@ def test_the_first_key_is_kept_and_no_other_is_believed(lab: Signed) -> None:
     lab.write(3, lab.other)
     for instead in (None, (lab.folder / HEAD).read_bytes(), unsigned, b"{"):
         lab.web.instead[HEAD] = instead
-        lab.refuses("but the key SHA256:.* is pinned; if the maintainer confirms the change")
+        lab.refuses("but the key SHA256:.* is pinned. If the maintainer confirms this")
         assert len(lab.client.entries()) == 2
         assert "its last index is used" in lab.said.pop()
     lab.web.instead.clear()
