@@ -40,7 +40,7 @@ def media_type(data: bytes) -> str:
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Return the width and height of an image in pixels; None if `data` does not show the size.
+    """Return the width and height of an image in pixels; None if the size is unknown.
 
     The result for AVIF is always None, because AVIF stores the size in nested boxes. Browsers limit
     the size of AVIF images themselves.
@@ -53,7 +53,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def pixels(data: bytes) -> int:
-    """Return the number of pixels in an image; 0 if `data` does not show the size."""
+    """Return the number of pixels in an image; 0 if the size is unknown."""
     width, height = picture_size(data) or (0, 0)
     return width * height
 

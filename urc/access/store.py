@@ -95,7 +95,10 @@ class Invitation(NamedTuple):
 
 
 class AccessStore:
-    """One SQLite file with identities. Methods block for milliseconds, so servers use a thread."""
+    """A SQLite file with people, devices, programs, sign-ins and pairing codes.
+
+    The methods block for a few milliseconds, so servers call them in a thread.
+    """
 
     def __init__(self, folder: Path) -> None:
         """Open the file, and create it if it is missing.

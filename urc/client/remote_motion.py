@@ -241,7 +241,8 @@ def plain_arguments(arguments: Mapping[str, Reading]) -> Arguments:
     """Return arguments in a form that the server accepts.
 
     Raises:
-        UrcError: an argument is not None, a number, text, a boolean, or a list of such values.
+        UrcError: an argument has an unsupported type. Supported are None, numbers, text, booleans
+            and lists of these.
     """
     return {name: _plain(name, value) for name, value in arguments.items()}
 

@@ -105,7 +105,7 @@ def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
 def next_head(
     old: IndexHead | None, number: int, digest: str, index_signer: IndexSigner | None
 ) -> IndexHead:
-    """Return a head for an index: the old head while more than half of its validity remains.
+    """Return an index's head; reuse a current head while more than half of its validity remains.
 
     Args:
         old: current head; None if there is no valid head.

@@ -102,7 +102,7 @@ def plan_root(
         wanted: range of versions of the package.
         found: available packages, as returned by `merged`.
         store: store whose archives need no download.
-        pinned: lock that the result must equal; None for no such condition.
+        pinned: lock that the result must equal; None accepts any result.
 
     Raises:
         PackageError: see `plan_requirement`.
