@@ -39,7 +39,7 @@ _LATE: Final = "the sign-in took too long, or began in another browser: try agai
 
 
 class OidcRedirect(NamedTuple):
-    """The start of a sign-in."""
+    """The redirect that begins a sign-in."""
 
     url: str
     """Address of the provider's page."""

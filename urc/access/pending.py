@@ -1,7 +1,8 @@
 """Pending sign-ins, which briefly wait for their second request and can be used only once.
 
-Layer 4. Pure. A passkey signs a challenge from the server. An OpenID Connect provider returns the
-browser with a state. The limits restrict the memory that unknown visitors can occupy.
+Layer 4. Pure. A passkey signs a challenge from the server. An OpenID Connect provider sends the
+browser back with a state from the server. The limits restrict the memory that unknown visitors can
+occupy.
 """
 
 import ipaddress

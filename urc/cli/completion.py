@@ -53,7 +53,7 @@ def _parsers_of(tree: argparse.ArgumentParser) -> Iterable[argparse.ArgumentPars
 
 
 def _robots(prefix: str, **_: object) -> list[str]:
-    """Return all robot names, and the documents that begin with `prefix`."""
+    """Return all robot names, and the documents in the folder of `prefix`, unfiltered."""
     from urc._folders import data_folder
     from urc.packages.store import Store
 
@@ -67,7 +67,7 @@ def _robots(prefix: str, **_: object) -> list[str]:
 
 
 def _documents(prefix: str, **_: object) -> list[str]:
-    """Return the YAML files and folders that begin with `prefix`."""
+    """Return the YAML files and folders in the folder of `prefix`; argcomplete filters them."""
     folder = Path(prefix).parent if not prefix.endswith("/") else Path(prefix)
     try:
         found = sorted(folder.iterdir())

@@ -49,7 +49,7 @@ SettingsOf = Callable[[Profile], Mapping[str, Value]]
 The function raises `UrcError` if the settings are invalid.
 """
 _LOOK = (320, 240)
-"""Columns and rows of the preview on a robot's card."""
+"""Width and height of the top view on an emulated robot's card, in pixels."""
 
 
 def _nothing(_: Profile) -> Mapping[str, Value]:

@@ -143,7 +143,7 @@ def _clock(data: Path) -> _Finding:
     from urc.web.serve.clock_check import clock_warning
 
     warning = clock_warning(data)
-    text = warning or "not earlier than any known event"
+    text = warning or "no sign that the clock is behind"
     return _Finding("clock", not warning, text, is_required=False)
 
 

@@ -196,7 +196,7 @@ def _invite(store: "AccessStore", arguments: argparse.Namespace) -> int:
     record(store, "people invite", name=person.name, roles=roles_text(person.grants))
     print_link(store.file.parent, address, "join", code)
     complain(
-        f"for {person.name} ({roles_text(person.grants)}): works once,"
+        f"invitation for {person.name} ({roles_text(person.grants)}): works once,"
         f" valid for {minutes_of(arguments.valid)}"
     )
     return 0

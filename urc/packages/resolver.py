@@ -148,4 +148,4 @@ def _there_is(key: PackageId, entries: Entries) -> str:
     if usable:
         shown = ", ".join(usable[-8:])
         return f"there is {shown}" if len(usable) <= 8 else f"there is …, {shown}"
-    return "every version requires another version of URC" if known else "there is none"
+    return "every version requires a different version of URC" if known else "there is none"

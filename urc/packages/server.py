@@ -189,7 +189,7 @@ _ANSWER_HEADERS: Final = {
 }
 _THESIS: Final = ("drivers", "widgets", "interfaces")
 _LASTING: Final = "public, max-age=31536000, immutable"
-"""Cache header for archives, which never change."""
+"""Value of the header ``cache-control`` for archives, which never change."""
 
 
 def repository_app(

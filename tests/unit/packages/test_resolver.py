@@ -97,7 +97,7 @@ def test_a_package_for_another_language_version_is_passed_over() -> None:
     later = IndexEntry("widget", "dial", "2.0.0", "0" * 64, 1, language=2)
     found = resolve(key, "*", {key: [later, entry("widgets/dial", "1.0.0")]})
     assert found[key].version == "1.0.0"
-    with pytest.raises(PackageError, match="every version requires another version of URC"):
+    with pytest.raises(PackageError, match="every version requires a different version of URC"):
         resolve(key, "*", {key: [later]})
 
 
