@@ -167,8 +167,8 @@ def merged(
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
     """Return every version of every package with its source, including withdrawn versions.
 
-    For each package, all versions come from the first source that contains the package. A source
-    that is added later therefore cannot offer a newer version of a known package.
+    For each package, all versions come from the first source that contains the package. A later
+    source therefore cannot provide a newer version of a package from an earlier source.
 
     Args:
         sources: package sources, in the order in which they are queried.
