@@ -241,8 +241,7 @@ def plain_arguments(arguments: Mapping[str, Reading]) -> Arguments:
     """Return arguments in a form that the server accepts.
 
     Raises:
-        UrcError: an argument has an unsupported type. Supported are None, numbers, text, booleans
-            and lists of these.
+        UrcError: an argument is not a number, text, a boolean, None or a list of these.
     """
     return {name: _plain(name, value) for name, value in arguments.items()}
 

@@ -133,8 +133,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """Number of times that engine frames were refused because their counter values were already
-        used."""
+        """Number of times that engine frames were refused, because a counter value was used."""
 
     # -- requests from the engine
 

@@ -143,7 +143,7 @@ class Lease:
         """Grant the free lease to `client`."""
         state = self.state
         if not includes(client.role, "drive"):
-            return LeaseRefused("viewers cannot drive")
+            return LeaseRefused("watchers cannot drive")
         if state.latched_by:
             return LeaseRefused(self.latched)
         if state.holder is not None and state.holder.id != client.id:
@@ -158,7 +158,7 @@ class Lease:
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
         if not includes(client.role, "drive"):
-            return LeaseRefused("viewers cannot drive")
+            return LeaseRefused("watchers cannot drive")
         if state.asked_by is not None and state.asked_by.id != client.id:
             return LeaseRefused(f"{_called(state.asked_by)} has already asked for control")
         for_s = min(max(for_s, SHORTEST_REQUEST_S), LONGEST_REQUEST_S)

@@ -53,8 +53,8 @@ def test_files_and_names_are_kept() -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("--tls-cert", "c.pem"), "--tls-cert and --tls-key belong together"),
-        (("--tls-key", "k.pem"), "--tls-cert and --tls-key belong together"),
+        (("--tls-cert", "c.pem"), "--tls-cert and --tls-key require each other"),
+        (("--tls-key", "k.pem"), "--tls-cert and --tls-key require each other"),
         (("--tls", "auto", *FILES), "--tls auto makes a certificate"),
         (("--insecure-plain-http", "--tls", "auto"), "--insecure-plain-http turns HTTPS off"),
         (("--insecure-plain-http", *FILES), "--insecure-plain-http turns HTTPS off"),

@@ -29,7 +29,12 @@ def test_a_sound_widget_has_no_findings(folder: Path, capsys: Output) -> None:
     ("name", "before", "after", "found"),
     [
         ("template.html.j2", "{% endif %}", "", ": error bad-template: "),
-        ("template.html.j2", "options.label", "optons.label", ": error unknown-name: there is no"),
+        (
+            "template.html.j2",
+            "options.label",
+            "optons.label",
+            ": error unknown-name: templates have no",
+        ),
         ("template.html.j2", "options.label", "options.lable", "not among the options in the man"),
         ("template.html.j2", "options.label", "options['lable']", "not among the options in the"),
         ("template.html.j2", "options.label", "options.label | upercase", "No filter named"),

@@ -92,7 +92,7 @@ def test_one_asks_at_a_time_and_may_ask_again() -> None:
     lease.acquire(ANNA, 0.0)
     lease.request(BERT, 1.0)
     assert lease.request(CARL, 2.0) == LeaseRefused("Bert has already asked for control")
-    assert lease.request(EVE, 2.0) == LeaseRefused("viewers cannot drive")
+    assert lease.request(EVE, 2.0) == LeaseRefused("watchers cannot drive")
     again = lease.request(BERT, 3.0)
     assert isinstance(again, LeaseChanged)
     assert (again.state.asked_by, again.state.asked_until) == (BERT, 13.0)

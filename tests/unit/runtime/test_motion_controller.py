@@ -39,7 +39,7 @@ def test_who_has_not_the_controls_moves_nothing() -> None:
     it.drive("ann", "take")
     assert it.tick("bob", speed=1) == "ann has the controls"
     assert it.drive("bob", "take") == "ann has the controls"
-    assert it.drive("vic", "take") == "viewers cannot drive"
+    assert it.drive("vic", "take") == "watchers cannot drive"
     assert it.tick("ann", "beep") == "'beep' is not a held command of this robot"
     assert it.heard() == []
 

@@ -112,7 +112,7 @@ def test_a_replaced_authority_is_announced(monkeypatch: pytest.MonkeyPatch, tmp_
     assert "all devices must trust it" in note
     on_machine(monkeypatch, "141.30.1.2")
     (note,) = LocalCertificate(tmp_path, "0.0.0.0", ["robots.example"]).load().notes
-    assert "exclude 141.30.1.2" in note
+    assert "cannot certify 141.30.1.2" in note
 
 
 def given(folder: Path, name: str) -> tuple[Path, Path]:

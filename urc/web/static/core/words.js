@@ -30,7 +30,7 @@ const SENTENCES = [
   mark("{name} has the controls"),
   mark("{name} has already asked for control"),
   mark("No screen is asking you for control"),
-  mark("viewers cannot drive"),
+  mark("watchers cannot drive"),
   mark("watchers can stop the robot, but cannot reset it"),
   mark("Taking over needs the role maintain"),
   mark("nothing is stopped"),
