@@ -32,7 +32,7 @@ from dataclasses import dataclass
 BEAT_NS = 5_000_000
 """Interval between checks for a late wake-up, in nanoseconds."""
 LOOK_NS = 20_000_000
-"""Interval between checks for waiting processes, in nanoseconds."""
+"""Interval between checks of how long processes have waited for a processor, in nanoseconds."""
 WAITED_NS = 2_000_000
 """Shortest reported wait for a processor, in nanoseconds."""
 LATE_NS = 5_000_000

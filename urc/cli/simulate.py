@@ -102,7 +102,7 @@ class UnansweredLog(logging.Handler):
         self._tell = tell
         self._clock = clock
         self._counts: dict[str, int] = {}
-        """Counts since the last output, by warning."""
+        """Number of times that each warning has occurred since it was last printed."""
         self._told_at: dict[str, float] = {}
         self._forgotten = 0
         """Number of unprinted warnings without a separate count."""

@@ -29,7 +29,8 @@ TICK_S: Final = 0.05
 """Period of the ticks of a held control, in seconds. After an interruption begins, up to one tick
 may pass before the first write."""
 AFRESH_S: Final = 0.03
-"""Time to reset and reopen a nearby connection and write the stop, in seconds."""
+"""Time for resetting and reopening the connection to a nearby robot and writing the stop, in
+seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
 """Age of unsent bytes at which a connection counts as stalled, in seconds. A stalled connection is
 reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte written one tick

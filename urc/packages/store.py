@@ -293,7 +293,7 @@ class StoreTransaction:
         self._store.write_state(self._store.state().with_waiver(key))
 
     def end_waiver(self, key: PackageId) -> None:
-        """Require a package's signature again; raise `PackageError` on failure."""
+        """Require a package's signature again; raise `PackageError` without a waiver."""
         self._store.write_state(self._store.state().without_waiver(key))
 
 

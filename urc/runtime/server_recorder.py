@@ -78,7 +78,7 @@ class ServerRecorder:
         now: Callable[[], float] = time.monotonic,
         secrets: Iterable[str] = (),
     ) -> None:
-        """Create a recorder without events.
+        """Create a recorder that passes each audit entry to `note`.
 
         Args:
             note: callback for each entry; must not block.

@@ -138,7 +138,8 @@ def _check_step(part: Node, hold: Hold, step_s: float, problems: Problems) -> No
         problems.warn(
             part.must("step"),
             "long-step",
-            f"the robot keeps moving for {shown_duration(step_s)} after the release",
+            f"the robot may keep moving for up to {shown_duration(step_s)} after the control is"
+            " released",
             hint="shorten the steps, because a step cannot be interrupted",
         )
 

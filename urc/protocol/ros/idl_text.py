@@ -57,7 +57,7 @@ def parse_idl(name: str, text: str) -> Definitions:
 
 
 class _Type:
-    """A parsed type reference that no field uses yet."""
+    """A parsed type reference, independent of any field."""
 
     __slots__ = ("bound", "length", "name")
 

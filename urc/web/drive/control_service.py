@@ -189,7 +189,7 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def name_screen(self, operator: OperatorSession, name: str) -> None:
-        """Set the name of a screen on this computer or of a visitor who has not signed in.
+        """Set the screen name of a page on this computer or of a visitor without a sign-in.
 
         People, devices and programs keep the names of their sign-ins. If another page already has
         the name, the screen number is appended, so that no page can impersonate another.

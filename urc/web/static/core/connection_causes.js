@@ -31,7 +31,7 @@ const CAUSES = {
   name: { cause: mark("The host name in {place} is unknown."), step: mark("Check the spelling, or enter a numeric address.") },
   "host-key": {
     cause: mark("URC does not trust the host key of {place}."),
-    step: mark("Compare the host key with the robot's, then run “urc trust”."),
+    step: mark("Compare the host key with the one on the robot. If they match, run “urc trust”."),
   },
   permission: {
     cause: mark("URC has no permission to open {place}."),
