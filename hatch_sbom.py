@@ -30,7 +30,7 @@ _HASH = re.compile(r"--hash=sha256:([0-9a-f]{64})")
 
 
 class LockedPackage(NamedTuple):
-    """A Python package in the lock."""
+    """A Python package in the lock file, with one locked version."""
 
     name: str
     version: str
@@ -52,11 +52,11 @@ class NpmPackage(NamedTuple):
     licence: str
     """SPDX expression."""
     sha512: str
-    """SHA-512 of the archive, in hex digits."""
+    """SHA-512 of the package's npm archive, in hex digits."""
 
 
 def python_packages(root: Path) -> Iterator[LockedPackage]:
-    """Yield the packages in the lock; raise `KeyError` for a package without a licence."""
+    """Yield the packages in the lock file; raise `KeyError` for a package without a licence."""
     licences: dict[str, str] = tomllib.loads((root / _LICENCES).read_text("utf-8"))
     project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
     extra = {_NAME.match(one)[0] for one in project["optional-dependencies"]["demo"]}  # type: ignore[index]  # each begins with a name
@@ -82,7 +82,7 @@ def npm_packages(root: Path, names: list[str]) -> Iterator[NpmPackage]:
 
 
 def sbom(root: Path, vendor: Path, version: str, names: list[str]) -> bytes:
-    """Return the SBOM of a wheel.
+    """Return the SBOM of a wheel as JSON bytes.
 
     Args:
         root: folder of the sources, with the lock files.
@@ -117,7 +117,7 @@ def sbom(root: Path, vendor: Path, version: str, names: list[str]) -> bytes:
 
 
 def _module(one: NpmPackage, vendor: Path) -> dict[str, Any]:
-    """Return a vendored package, with its files as parts."""
+    """Return the SBOM component of a vendored package, with its files as subcomponents."""
     home = vendor / one.name
     ref = f"pkg:npm/{quote(one.name, safe='/')}@{one.version}"
     files = sorted(file for file in home.rglob("*") if file.is_file())
@@ -146,7 +146,7 @@ def _module(one: NpmPackage, vendor: Path) -> dict[str, Any]:
 
 
 def _package(one: LockedPackage) -> dict[str, Any]:
-    """Return a Python package, with the hashes of all files of its version."""
+    """Return the SBOM component of a Python package, with the hashes of all its files."""
     ref = f"pkg:pypi/{one.name}@{one.version}"
     marker = [{"name": "urc:marker", "value": one.marker}] if one.marker else []
     return {
