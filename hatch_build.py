@@ -106,7 +106,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         return Path(self._temporary.name)
 
     def _vendor_folder(self, root: Path) -> Path:
-        """Return the `urc_vendor` of an unpacked sdist, or build `urc_vendor` in the temporary folder."""
+        """Return `urc_vendor` from an unpacked sdist, or build it in the temporary folder."""
         packed = root / "urc_vendor"
         if packed.is_dir():
             return packed
