@@ -1,4 +1,4 @@
-"""The ages of values shown on a page, for `browser_peers`."""
+"""Measure the ages of the values shown on a page, for `browser_peers`."""
 
 import asyncio
 import json
@@ -77,7 +77,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
     Args:
         one: the page.
         seconds: duration of the measurement, starting with the first value.
-        rate_hz: rate at which the robot sends its clock's time.
+        rate_hz: number of times per second that the robot sends its clock's time.
 
     Raises:
         TooFew: the page showed fewer values than `LEAST_SHARE` requires.
@@ -97,5 +97,5 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
 
 def _age_ms(now_ms: float, told_ms: float) -> float:
-    """Return the age of a value whose timestamp wraps at the clock's period."""
+    """Return the age of a value in milliseconds; the timestamps restart at 0 after `MODULUS_MS`."""
     return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

@@ -1,8 +1,9 @@
 """Frame rate of every shipped robot's page in WebKit without a graphics processor.
 
 Without a graphics processor, Mesa composes the page in software, so layers and large repaints lower
-the frame rate. Before each page, an empty page is measured; its rate shows how busy the machine is.
-A page that misses the goal is measured again, because another program may have slowed the page.
+the frame rate. Before each robot's page, an empty page is measured; its frame rate shows how busy
+the machine is. A page that misses the goal is measured again, because another program may have
+slowed the page.
 """
 
 import tempfile
@@ -48,7 +49,7 @@ class Rates:
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Count the frames of all pages, or only of pages with large pictures."""
+    """Measure the pages of all robots; without `full`, only pages with large pictures."""
     robots = ROBOTS if full else WITH_PICTURES
     with (
         webkit_window() as window,

@@ -54,7 +54,7 @@ COUNT = """
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A browser page with its debugging connection."""
+    """An open page, with a debugging connection to its browser."""
 
     page: Page
     line: CDPSession
@@ -112,7 +112,7 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
 async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
     """Measure the frame rate and processor time of a running page.
 
-    Other programs have little effect on the measured processor time.
+    The processor time hardly depends on the load that other programs cause.
 
     Args:
         one: a page that already shows values.
@@ -162,5 +162,5 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
 
 
 def at_share(ordered: Sequence[float], share: float) -> float:
-    """Return a quantile of the values."""
+    """Return the value below which the given share of the sorted values lies."""
     return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)

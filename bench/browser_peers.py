@@ -1,4 +1,4 @@
-"""Ages of shown values: URC compared with a hand-written page, Node-RED and NiceGUI.
+"""Ages of the values that URC, a hand-written page, Node-RED and NiceGUI show.
 
 One robot sends its clock's time over TCP to each of the four dashboards, 50 times a second. A real
 Chromium opens one dashboard after another. After each drawn frame, the page measures the age of a
@@ -101,7 +101,7 @@ async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -
 
 
 async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
-    """Return the ages from one measurement; repeat the measurement if too few values were shown."""
+    """Return the ages of the shown values; measure again if the page showed too few values."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
             await ages(one, SETTLE_S, 0.0)  # it shows values, so it has started

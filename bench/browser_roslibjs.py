@@ -2,8 +2,8 @@
 
 Both pages show a map with a trail, an attitude, a stick, a camera and a value, in areas of equal
 size. Both pages get data from the same rosbridge server: URC's page through a real ``urc serve``,
-the roslibjs page directly. The processor time includes all processes of Chromium. Rounds of the two
-pages alternate.
+the roslibjs page directly. The processor time includes all processes of Chromium. The two pages are
+measured in turn, once per round.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from bench.rig.programs import Server, peer
 __all__ = ["run"]
 
 Row = dict[str, Any]
-"""Share of one core, and number of images shown per second, for each page."""
+"""Processor time as a share of one core, and images shown per second, for each page."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 5.0, 15.0

@@ -3,7 +3,7 @@
 The emulated robot sends its camera images, map, laser scans and battery state over rosbridge. One
 plain page shows only the same images, at the same size. The other plain page is hand-written with
 roslib and has the same widgets in the same places. The processor time includes the renderer and the
-GPU process. Rounds of the pages alternate, in one Chromium without a graphics processor.
+GPU process. The three pages are measured in turn, in one Chromium without a graphics processor.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ from bench.rig.programs import Program, Server, peer
 __all__ = ["run"]
 
 Costs = dict[str, Any]
-"""Share of a core and images shown per second, for each page."""
+"""Processor time as a share of one core, and images shown per second, for each page."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 10.0, 20.0
@@ -44,7 +44,7 @@ OURS, PICTURE, ROS = "URC", "picture alone", "roslib"
 MEASURED = ("renderer", "GPU")
 """Types of the measured processes, as Chromium names them."""
 SLOTS = {"map": "map", "laser": "laser", "stick": "stick", "camera": "camera", "battery": "value"}
-"""Cell of the roslib page for each slot of URC's page."""
+"""Name of the roslib page's cell, keyed by the corresponding slot of URC's page."""
 LIVE = """
 (count) => document.querySelectorAll(".urc-grid [data-state=live]").length >= count
 """

@@ -1,4 +1,4 @@
-"""Frame rate of a page with sixty widgets that receive ten thousand values a second.
+"""Frame rate of a page whose sixty widgets together receive ten thousand values a second.
 
 Real widgets show values from a real server. A second measurement slows the page's processor by a
 factor of six, to simulate an old phone. If one frame is too short to draw all sixty widgets, the
@@ -25,7 +25,7 @@ LOOK_S, LOOK_IF_FULL_S = 3.0, 8.0
 ROUNDS, ROUNDS_IF_FULL = 2, 9
 COLUMNS, ROWS = 10, 6
 EVERY = 3
-"""The page receives and shows every third signal."""
+"""The page receives and shows only every third signal of the robot."""
 KINDS = (
     ("value", "value", ""),
     ("gauge", "value", "V"),

@@ -21,7 +21,7 @@ WARM_UP = 1000
 
 
 class Driver(Protocol):
-    """The interface of the compared drivers."""
+    """The interface that URC's driver and the hand-written driver share."""
 
     async def flood(self, count: int) -> None:
         """Request `count` lines, and wait until all lines have arrived."""

@@ -3,7 +3,7 @@
 The code is tidy and, like URC, has the features that every driver for a real robot needs:
 
 - A speed is clamped, and NaN is refused, because `max` and `min` would turn NaN into full speed.
-- The driver accepts readings at any time, and stores the newest reading of every signal.
+- The robot may send readings at any time; the driver stores the newest reading of every signal.
   Out-of-range and non-finite values are dropped, and invalid lines are counted.
 - A request has a timeout. A late reply is not assigned to the next request, and after a missing
   reply, later replies are still assigned correctly.
@@ -24,7 +24,7 @@ __all__ = ["StreamDriver"]
 
 REPLY_S = 1.0
 LATE_S = 2 * REPLY_S
-"""Time after which a request no longer expects its reply, in seconds."""
+"""Time after which even a late reply to a request is no longer expected, in seconds."""
 MOST_WAITING = 256
 MOST_LINE = 8192
 MOST_UNSENT = 262_144
@@ -73,7 +73,7 @@ def read(line: bytes, now: float) -> list[Sample] | None:
 
 
 class _Robot:
-    """The robot's values and a driver's pending requests."""
+    """The newest readings from the robot, and the driver's pending requests."""
 
     def __init__(self) -> None:
         self.latest: dict[str, Sample] = {}
@@ -114,7 +114,7 @@ class _Robot:
         return answer
 
     def lost(self) -> None:
-        """Fail all pending requests."""
+        """Let all pending requests fail with `ConnectionError`."""
         while self._waiting:
             answer, _ = self._waiting.popleft()
             if not answer.done():

@@ -28,10 +28,10 @@ def robot(*, is_beside: bool) -> Iterator[int]:
     """Run the robot inside a `with` block; yield the robot's port.
 
     Args:
-        is_beside: whether the robot shares the driver's processor, if the system supports this. If
-            the robot runs on another processor, a reply sometimes arrives before the driver sleeps,
-            and sometimes after. The benchmark would then measure the cost of waking up instead of
-            the driver's work.
+        is_beside: whether to run the robot on the driver's processor, where the system supports
+            this. On another processor, the robot's reply arrives sometimes before and sometimes
+            after the driver goes to sleep. The benchmark would then measure wake-ups instead of the
+            driver's work.
     """
     allowed = (
         os.sched_getaffinity(0) if is_beside and hasattr(os, "sched_getaffinity") else set[int]()

@@ -1,4 +1,4 @@
-"""A URC profile that replaces the driver of `bench.driver_hand`, run as for an operator."""
+"""A URC profile that does the work of `bench.driver_hand`, in an ordinary session."""
 
 import tempfile
 from collections.abc import AsyncIterator
@@ -58,7 +58,7 @@ commands:
 
 
 def profile() -> Profile:
-    """Return the loaded profile."""
+    """Return the benchmark robot's profile, loaded from a temporary file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.yaml"
         path.write_text(DOCUMENT, encoding="utf-8")

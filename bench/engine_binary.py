@@ -1,8 +1,8 @@
 """Processor time for a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
-back. URC uses the same kind of declaration as an ordinary profile. The hand-written code is typical
-of a careful author who does not use URC. This code uses one precompiled `struct.Struct` and the
+back. URC reads a declaration such as an ordinary profile contains. The hand-written code is what a
+careful author would write without URC. This code uses one precompiled `struct.Struct` and the
 standard library's CRC, which is written in C.
 """
 
@@ -105,7 +105,7 @@ def driver_of(text: str) -> Driver:
 
 
 class ByHand:
-    """A hand-written decoder that converts a byte stream to the samples of each frame."""
+    """A hand-written decoder that finds the frames in a byte stream and returns their samples."""
 
     def __init__(self) -> None:
         self._left = b""
@@ -193,7 +193,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
 def _seconds(
     function: Callable[..., object], argument: object, times: int = 20_000
 ) -> Callable[[], float]:
-    """Return a function that measures the CPU time of a number of calls, in seconds."""
+    """Return a function that measures the CPU time of `times` calls, in seconds."""
 
     def measure() -> float:
         began = time.process_time()

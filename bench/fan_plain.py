@@ -1,4 +1,4 @@
-"""A plain loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
+"""The baseline of `fanout`, a loop of sends: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
 
 The program accepts the clients, answers each handshake with status 101, and sends frames to each
 client at the given rate. The program prints its port at the start, and its processor time in

@@ -1,8 +1,8 @@
 """Processor time for sending 200 values to 50 pages: URC compared with a plain loop of sends.
 
-The benchmark measures the processor time of the server, including readings and encoding. The pages
-and the robot run in other processes. The loop sends the same number of bytes to the same number of
-pages, but does not handle values or WebSockets.
+The measured processor time includes the server's work of reading the robot's data and encoding the
+values. The pages and the robot run in other processes. The loop sends the same number of bytes to
+the same number of pages, but does not handle values or WebSockets.
 """
 
 import subprocess
@@ -34,7 +34,7 @@ _sample = partial(tuple.__new__, Sample)
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the processor times of URC and the loop."""
+    """Compare the processor time of URC's server with that of the plain loop."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     _, size = run_loop(_urc(CLIENTS, ticks))

@@ -1,4 +1,4 @@
-"""How slow pages affect other pages: two of twenty pages read nothing.
+"""Effect of slow pages on the other pages, if two of twenty pages read nothing.
 
 A third page reads only a quarter of its data. The baseline is a server with an unbounded queue for
 each page. In the baseline, the slow page's data ages as its queue grows.
@@ -45,7 +45,7 @@ class Look(NamedTuple):
 
     ticks: int
     healthy: int
-    """Smallest number of frames that any healthy page received."""
+    """Number of frames received by the healthy page that received the fewest."""
     age_ms: float
     """Age of the slow page's data in the last quarter of the run, in milliseconds."""
     growth_mb: float

@@ -1,7 +1,7 @@
 """Results of a run: printed as lines of JSON, and optionally written into the documentation.
 
 `./dev bench --full --write-docs` writes the results into docs/motion.md and docs/performance.md,
-between HTML comments.
+between the HTML comments that mark each result's place.
 """
 
 import json
@@ -17,10 +17,10 @@ BARS = 40
 """Longest bar of a histogram, in characters."""
 
 _UNITS = {"ms": "ms", "us": "us", "mb": "MB", "hz": "Hz"}
-"""Unit in a column's title, by the suffix of the column's name."""
+"""Unit to show in a column's title, keyed by the suffix of the column's name."""
 
 told: list[dict[str, object]] = []
-"""Results of this run."""
+"""Results of all benchmarks in this run, for the documentation."""
 
 
 def tell(figures: Mapping[str, object]) -> None:

@@ -1,6 +1,6 @@
 """Measurement of ratios: baseline and subject alternate, and the result is the median ratio.
 
-Times vary with the machine's load, but the ratio of two times in one run is stable.
+Times depend on the machine's load, but the ratio of two times from the same run hardly does.
 """
 
 import json
@@ -18,7 +18,7 @@ PROCESS_TIMEOUT_S = 60
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A benchmark's goal: a name and an upper bound for the ratio."""
+    """A benchmark's goal: the name of a ratio, and the ratio's upper bound."""
 
     name: str
     """Name of the measured ratio: subject / baseline."""

@@ -40,7 +40,7 @@ class Kept:
 
 
 def _code() -> str:
-    """Return an identifier for the measured code version."""
+    """Return a hash of URC's Python files, which identifies the measured version."""
     total = hashlib.sha256()
     for file in sorted((_ROOT / "urc").rglob("*.py")):
         total.update(file.read_bytes())

@@ -1,8 +1,9 @@
 """Processor time that the server and its guards use for each driven robot.
 
 Rounds with idle and with driven robots alternate; the difference is the processor time that driving
-uses. Pages are open in all rounds. While a finger rests, the page repeats its values 20 times a
-second. While a finger moves, the values change in every frame.
+uses. Pages are open in all rounds. While a finger rests on a control, the page repeats the held
+values 20 times a second. While a finger moves, the page sends new values in every frame of its
+display.
 """
 
 import statistics
@@ -96,7 +97,7 @@ def _spent(
 
 
 def _drive(pages: Sequence[TimedPage], rate_hz: int, seconds: float) -> None:
-    """Send staggered ticks from each page at this rate; with a rate of 0, only receive."""
+    """Send `rate_hz` staggered ticks a second from each page; if `rate_hz` is 0, only receive."""
     step_ns = int(1e9 / (rate_hz or FINGERS["at rest"]) / len(pages))
     next_ns = time.monotonic_ns()
     end_ns = next_ns + int(seconds * 1e9)

@@ -1,4 +1,4 @@
-"""Frame counters shared by held motion over UDP, polls, a keepalive and another control.
+"""Test frame counters that held motion over UDP shares with polls, a keepalive and another control.
 
 Gestures of 5 to 60 s run in parallel. The receiving socket checks that counters increase without
 gaps, and that the last frame is a stop. An interrupted run of the benchmark can be continued.
@@ -22,7 +22,7 @@ SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Run gestures until enough of them are valid."""
+    """Run gestures until the required number of valid gestures is reached."""
     wanted, robot_count = (GESTURES_IF_FULL, ROBOTS_IF_FULL) if full else (GESTURES, ROBOTS)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run

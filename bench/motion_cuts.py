@@ -1,9 +1,10 @@
 """Motion after the link to a driven robot is cut, on every kind of transport.
 
 Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
-guards, and robots, brokers and login servers. Each robot's link is cut at different moments. The
-cut lengths are evenly distributed on a logarithmic scale. Every second control is released during
-the cut. Without root and /dev/net/tun, the benchmark is skipped with a message.
+guards, and robots, brokers and login servers. The links of different robots are cut at different
+moments. The cut lengths are evenly distributed on a logarithmic scale. In every second cut, the
+control is released during the cut. Without root and /dev/net/tun, the benchmark is skipped with a
+message.
 """
 
 import json
@@ -60,7 +61,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
 
 
 def _cut_one(rig: CutRig, index: int, plan: list[tuple[float, float]]) -> list[Cut]:
-    """Run the plan's remaining cuts in one of several threads; repeat invalid cuts."""
+    """Run cuts from the shared plan until it is empty; repeat invalid cuts."""
     cuts: list[Cut] = []
     while True:
         try:

@@ -1,6 +1,6 @@
 """Time until driven robots stop after the server hangs or dies.
 
-A signal freezes or kills the server, or a backtracking pattern blocks the server. The guards check
+The server is frozen or killed by a signal, or blocked by a backtracking pattern. The guards check
 the leases, so the limit is the same as for a lost operator.
 """
 

@@ -2,9 +2,9 @@
 
 In short windows, the benchmark measures the latency from the driving page's socket to its robot.
 The windows alternate between a normal page, a page that floods another server, and a page that
-floods the same server. Any flood uses the machine's processor time, in the flooding page and in its
-server. The goal therefore compares the two floods. The result with the normal page is printed, but
-has no goal.
+floods the same server. Every flood uses processor time of the machine, both in the flooding page
+and in its server. The goal therefore compares the two floods. The result with the normal page is
+printed, but has no goal.
 """
 
 import statistics
@@ -31,7 +31,7 @@ WAYS = {"quiet": "outside", "flood elsewhere": "flood", "flood": "flood"}
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure the three cases alternately."""
+    """Measure the normal page and the two floods in turn."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     taken: dict[str, list[list[float]]] = {way: [] for way in WAYS}

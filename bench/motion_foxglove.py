@@ -1,4 +1,4 @@
-"""Data that a driven robot received after its Foxglove SDK server was frozen or killed.
+"""Data that a driven robot receives after its Foxglove SDK server is frozen or killed.
 
 Signals either freeze the real server for 5 s, or kill it. A new server starts 1 s after a kill.
 Several robots are driven in parallel, each with its own server, session and guard. An interrupted

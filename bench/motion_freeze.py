@@ -1,4 +1,4 @@
-"""Data received after a driven robot's program was frozen for 5 s.
+"""Data that a driven robot's program receives after it was frozen for 5 s.
 
 SIGSTOP and SIGCONT freeze and resume a substitute for rosbridge, while the kernel continues to
 accept data for it. Several robots are driven in parallel, each with its own program, session and

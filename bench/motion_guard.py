@@ -1,7 +1,7 @@
 """Time until a driven robot stops after its guard is killed.
 
-A new guard replaces the killed guard within half a second. Before anything else, the new guard
-sends the stop.
+A new guard replaces the killed guard within half a second. The first frame that the new guard sends
+is the stop.
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""Data sent to robots at rest after a stop, on every kind of transport in parallel.
+"""Data that reaches stopped robots, measured on all kinds of transport in parallel.
 
 Each robot is driven once and released. The robot's page stays in control and continues to receive
 heartbeats. After the stop and its repetitions, no byte may arrive, because zero-speed commands
@@ -23,12 +23,12 @@ __all__ = ["run"]
 
 LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
 SETTLED_S = STOP_FOR_S + 0.5
-"""Time after the first stop within which all repetitions arrive, even over a broker, in seconds."""
+"""Longest time from the first stop to its last repetition, even over a broker, in seconds."""
 SPARE_S = 120.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Count the frames that arrive after the stop."""
+    """Count the frames that arrive after the stop and its repetitions."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_idle: needs root and /dev/net/tun"}))
         return []

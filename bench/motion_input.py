@@ -1,9 +1,9 @@
 """Time from a release until the robot receives the stop, for each of the twelve ways to release.
 
-A real Chromium drives a robot through a real ``urc serve`` with its guard. The robot timestamps
-received data. Each time is measured on the machine's monotonic clock, from the page's event until
-the stop's first byte arrives at the robot. The lease lasts one second, so a stop after its expiry
-would be obvious. A late trial is repeated if the machine caused the delay.
+A real Chromium drives a robot through a real ``urc serve`` with its guard. The robot stores the
+time at which each byte arrives. Each time is measured on the machine's monotonic clock, from the
+page's event until the stop's first byte arrives at the robot. The lease lasts one second, so a stop
+after its expiry would be obvious. A late trial is repeated if the machine caused the delay.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 5, 50
 MOST_TIMES = 3
-"""Maximum number of trials on a busy machine, as a multiple of the required number."""
+"""Maximum number of trials, as a multiple of the required number, if trials are invalid."""
 MOST_MS = 100.0
 WAIT_S = 15.0
 DOCUMENT = """\
@@ -67,7 +67,7 @@ EVENTS = {
     "context menu": "contextmenu",
     "pad lost": "gamepaddisconnected",
 }
-"""Event that the page receives, for each way to release."""
+"""DOM event that the page receives, keyed by the way to release."""
 # Runs before the page's scripts, so that the page's own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};

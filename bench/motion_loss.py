@@ -1,9 +1,9 @@
 """Unwanted stops of a robot on a link that loses packets.
 
 Pages drive over a relay with a round-trip time of 100 ms and random loss in both directions. After
-each stop, a page starts a new gesture. For comparison, one run uses a single connection, and the
-other also uses URC's second connection for lossy links. The benchmark needs root and /dev/net/tun;
-otherwise, it is skipped with a message.
+each stop, a page starts a new gesture. One run uses a single connection; the other run also uses
+URC's second connection for lossy links. The benchmark needs root and /dev/net/tun; otherwise, it is
+skipped with a message.
 """
 
 import json
@@ -25,7 +25,8 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Machine delay above which a stop is excused, in ms, and the time before the stop, in ns."""
+"""A stop is excused if the machine was delayed by more than `LATE_MS` within this time before
+it."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Largest allowed number of stops per minute, by packet loss in percent.
 

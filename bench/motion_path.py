@@ -23,14 +23,14 @@ from bench.rig.programs import Program, Robots, Server
 __all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 
 TIMES_RELAY = 1.5
-"""Largest allowed ratio for the median and the 99th percentile."""
+"""Largest allowed ratio of URC's latency to the relay's, for the median and the 99th percentile."""
 TICKS, TICKS_IF_FULL = 150, 600
 ROUNDS, ROUNDS_IF_FULL = 3, 7
 TICK_NS = 20_000_000
 """Tick interval in nanoseconds: shorter than a page's interval, longer than `hold.repeat`."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
-"""Smallest share of ticks that must arrive; a busy machine drops some ticks."""
+"""Minimum share of ticks that must arrive; on a busy machine, some ticks are dropped."""
 PROFILE = """\
 urc: 1
 kind: robot
@@ -50,7 +50,7 @@ Ticker = Callable[[int], int]
 
 
 class TimedPage(Page):
-    """A page that timestamps each tick."""
+    """A page that puts a number into each tick and stores the tick's send time."""
 
     def begin_anew(self) -> None:
         """Release control and take it again for a new gesture, like an operator after a stop."""
@@ -82,7 +82,7 @@ class TimedPage(Page):
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure both paths alternately."""
+    """Measure the latency of URC and of the relay in turn."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:

@@ -1,7 +1,7 @@
 """Time from the revocation of a right until the holder's robot receives the stop.
 
 People, devices and programs drive real robots in the rig through a real ``urc serve``. Another
-process ends their rights in the data folder, while their pages continue to send ticks.
+process revokes their rights in the data folder, while their pages continue to send ticks.
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""Time from losing an operator until the robot receives the stop, by kind of loss.
+"""Time from the loss of an operator until the robot receives the stop, for each kind of loss.
 
 Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
 time is measured from the last effective tick to the first byte of the stop. With root access, a

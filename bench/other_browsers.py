@@ -24,7 +24,7 @@ RELEASES, RELEASES_IF_FULL = 3, 20
 STOPS, STOPS_IF_FULL = 1, 5
 RESTARTS, RESTARTS_IF_FULL = 1, 3
 HARMLESS = ("WebGL context", "ResizeObserver loop completed")
-"""Text that occurs in harmless console messages.
+"""A console message that contains any of these texts is harmless.
 
 Without a graphics processor, Firefox has no WebGL. The widgets then draw in 2D or show a message.
 WebKit logs a message whenever a widget receives a size change only in the next frame.
@@ -34,7 +34,7 @@ WebKit logs a message whenever a widget receives a size change only in the next 
 def checked(
     opened: Callable[[], AbstractContextManager[Window]], *, full: bool
 ) -> Sequence[Result]:
-    """Check all or a few pages in one browser, and drive the rover."""
+    """Check all pages in one browser (without `full`, a few), and drive the rover."""
     with opened() as window, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
         window.resize(*DESKTOP)
         faults = _pages(window, Path(folder) / "demo", ROBOTS if full else FEW)

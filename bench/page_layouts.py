@@ -1,4 +1,4 @@
-"""Layout of every shipped robot's page, on all screens, in all languages and text sizes.
+"""Check the layout of every shipped robot's page, on all screens, in all languages and text sizes.
 
 The test `tests/e2e/robots/test_page_layout.py` measures a sample of these pages. An interrupted run
 can be continued.

@@ -36,16 +36,16 @@ Rows = Sequence[Mapping[str, Any]]
 
 FIRST_PICTURE_MS: Final = 10_000
 BETWEEN_FRAMES_MS: Final = 20
-"""Longest allowed 95th percentile."""
+"""Longest allowed 95th percentile of the time between frames."""
 SAMPLE: Final = 24
-"""Number of documents without `--full`."""
+"""Number of documents that are checked without `--full`."""
 AT_ONCE: Final = 8
-"""Number of documents that are checked before their results are stored."""
+"""Number of documents whose results are stored together."""
 ROUNDS, ROUNDS_IF_FULL = 2, 7
 DRIVE_S: Final = 12.0
 HAND_HZ: Final = 50
 LEAST_SHARE: Final = 0.5
-"""Smallest share of the time in which the stick must be held; a busy machine ends gestures."""
+"""Minimum share of the drive with a held stick; a busy machine ends some gestures early."""
 MOST_GESTURES: Final = 30
 COMMAND_TIMEOUT_S: Final = 60
 PICTURE_MS: Final = 110_000
@@ -130,7 +130,7 @@ async def _compare(browser: Browser, address: str, left: Sequence[str], kept: Ke
 
 
 def _comparable(report: Mapping[str, Any]) -> list[tuple[object, ...]]:
-    """Return the parts of each problem to compare, or the output of a check without a report."""
+    """Return the compared fields of each problem, or the check's output if there is no report."""
     return shown_report(dict(report)) if "problems" in report else [("no report", str(report))]
 
 

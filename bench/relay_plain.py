@@ -1,4 +1,4 @@
-"""A minimal Python relay from a WebSocket to the robot's connection. See `motion_path`."""
+"""A minimal Python relay that forwards WebSocket messages to the robot. See `motion_path`."""
 
 import asyncio
 import json

@@ -1,7 +1,7 @@
 """A robot that sends a fixed text at a fixed rate: ``python -m bench.robot LINE TICKS RATE``.
 
-`LINE` is the file descriptor of an inherited socket. The robot starts when it receives data, and
-closes the socket at the end.
+`LINE` is the number of an inherited file descriptor, a socket. The robot starts when it receives
+data, and closes the socket at the end.
 """
 
 import socket

@@ -1,4 +1,4 @@
-"""Time to read a ROS message, and a comparison of random messages with the library rosbags.
+"""Compare URC's reading of ROS messages with the library rosbags, in time and in values.
 
 URC reads five fields of an Odometry message; rosbags always reads the whole message. With
 ``--full``, URC reads 10 000 random messages of each type in both byte orders. The values must equal

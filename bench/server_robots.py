@@ -3,8 +3,8 @@
 Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
 receives each change. Robots and pages run in two other processes, which only send or count bytes.
 Additional rows show how the costs grow with the number of robots, signals and pages. These rows
-also show the share of lines that reach no page. Drivable robots have guards in separate processes,
-which are measured separately.
+also show the share of the robots' lines that do not reach a page. Drivable robots have guards in
+separate processes, which are measured separately.
 """
 
 import json
@@ -61,7 +61,7 @@ class Load(NamedTuple):
 
 
 class Look(NamedTuple):
-    """Frame totals and processor times at one moment."""
+    """The pages' frame count and the processes' processor times, both since the start."""
 
     frames: int
     """Number of frames received by all pages."""
@@ -79,7 +79,7 @@ LOADS = (
     Load(100, 20, 200),
     *(Load(robots, 20, robots, can_drive=True) for robots in (10, 25)),
 )
-"""All loads to measure with `full`; one client may have at most 256 pages."""
+"""Loads to measure with `full`; a server allows one client at most 256 pages."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

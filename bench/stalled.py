@@ -23,7 +23,7 @@ VALUES = b'{"t":"v",'
 
 
 class Page(Viewer):
-    """A page that parses frames, and answers pings."""
+    """A page that parses WebSocket frames and answers pings."""
 
     def __init__(self, port: int, path: str) -> None:
         super().__init__(port, path, [])
@@ -32,7 +32,7 @@ class Page(Viewer):
         self.is_open = True
 
     def read(self, most: int, *, is_aged: bool = False) -> int:
-        """Read a limited number of bytes; return the number of bytes read."""
+        """Read at most `most` bytes; return the number of bytes read."""
         try:
             data = self.line.recv(most)
         except BlockingIOError:

@@ -1,4 +1,4 @@
-"""All tests that `./dev test` samples: every case, and twelve times as many examples.
+"""Run in full all tests that `./dev test` samples: every case, and twelve times as many examples.
 
 A function with several cases is one step. All other functions of a file together form one step. An
 interrupted run can be continued.
@@ -23,7 +23,7 @@ _SAMPLED: Final = "from tests.effort import"
 _FOLDERS: Final = ("tests/contract", "tests/e2e", "tests/unit")
 """Folders whose tests `tests/sampling.py` samples."""
 _STEPS_IN_QUICK: Final = 20
-"""Number of steps without `--full`."""
+"""Number of steps to run without `--full`."""
 _COLLECT: Final = (sys.executable, "-m", "pytest", "--collect-only", "-q")
 _RUN: Final = (sys.executable, "-m", "pytest", "-q", "-x", "--no-header")
 

@@ -1,4 +1,4 @@
-"""Repeat trials that measure the time until a robot stops, and report their results."""
+"""Repeat and report trials that measure the time until a robot stops."""
 
 from collections.abc import Callable, Sequence
 from math import inf
@@ -20,11 +20,11 @@ def repeated(
     """Repeat rounds until enough trials are valid, or the maximum number of rounds is reached.
 
     Args:
-        death: cause of the stops.
+        death: what makes the robots stop, such as the loss of an operator.
         bout: function that runs one round with all robots.
         wanted: required number of valid trials.
         robot_count: number of trials in one round.
-        kept: store of the trials, so that an interrupted run can continue.
+        kept: file of finished trials, from which an interrupted run continues.
     """
     trials = [trial for row in kept.rows if (trial := Trial.of(row)).death == death]
     while len(trials) < MOST_BOUTS * wanted:

@@ -22,7 +22,7 @@ HANDSHAKE = (
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
 KEY = os.environ.get("URC_BENCH_KEY")
-"""A real server's start key; the default is the key that tests use."""
+"""Start key of the server; the default is the key of test servers."""
 CHUNK = 1 << 18
 OPEN_TIMEOUT_S = 10
 

@@ -1,4 +1,4 @@
-"""A dashboard with watching pages, to measure the server's processor time for each update."""
+"""A dashboard and its watching pages, for measuring the server's processor time for each update."""
 
 import asyncio
 import json
@@ -68,7 +68,7 @@ class Robot:
         self._ticks = ticks
 
     async def heard(self, tell: Callable[[int], None]) -> None:
-        """Start the robot, and call `tell` after each received chunk, until the robot ends."""
+        """Start the robot; call `tell` for each received chunk of data, until the robot ends."""
         loop = asyncio.get_running_loop()
         done = loop.create_future()
         tick = 0
@@ -96,7 +96,7 @@ class Robot:
 async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
     """Start a robot, which waits until it receives data.
 
-    Like a real robot, the process wakes the server through a readable socket. A timer in the
+    Like a real robot, the process wakes the server by making a socket readable. A timer in the
     server's process would use several times as much processor time and distort the measurement.
     """
     ours, theirs = socket.socketpair()

@@ -9,12 +9,12 @@ CHANNELS, CHANNELS_HZ = 200, 50
 
 
 def is_whole(channel: int) -> bool:
-    """Return whether a value is an integer, for widgets that show states."""
+    """Return whether the channel's values are integers, for a widget that shows states."""
     return channel % 30 == 15
 
 
 def channels(tick: int) -> dict[str, float]:
-    """Return all values, from 0 to 100; every value changes in every tick."""
+    """Return the values of all channels, each from 0 to 100; every value changes in every tick."""
     values = [(tick * 1.7 + each * 3.1) % 100 for each in range(CHANNELS)]
     return {
         f"s{each}": round(value) if is_whole(each) else round(value, 1)

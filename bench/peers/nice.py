@@ -8,7 +8,7 @@ from nicegui import app, ui
 robot_port, port = int(sys.argv[1]), int(sys.argv[2])
 labels: set[ui.label] = set()
 listening: list[asyncio.Task[None]] = []
-"""References that keep the tasks alive; the event loop holds only weak references."""
+"""Running tasks; the event loop's weak references do not protect them from garbage collection."""
 
 
 @ui.page("/")

@@ -29,7 +29,7 @@ MODULES = HERE.parents[1] / "node_modules"
 PAGES = {"/roslib": HERE / "roslib.html", "/picture": HERE / "picture.html"}
 PICTURE = (640, 480)
 GRAIN, QUALITY = 11, 75
-"""Noise and JPEG quality that result in images of about 47 kB."""
+"""Noise amplitude and JPEG quality, chosen so that each image has about 47 kB."""
 
 
 def header() -> dict[str, object]:
@@ -90,7 +90,7 @@ def battery(at_s: float) -> dict[str, object]:
 
 
 def pictures() -> list[str]:
-    """Return a list of different base64-encoded images."""
+    """Return fifteen different images, each as base64 text."""
     chance = random.Random(1)  # noqa: S311 - noise, the same in each run
     made = []
     for number in range(15):
@@ -108,7 +108,7 @@ CAMERA_HZ = 15
 
 
 def camera(at_s: float) -> dict[str, object]:
-    """Return a message with the next image."""
+    """Return an image message with the next of the fifteen images."""
     data = PICTURES[int(at_s * CAMERA_HZ) % len(PICTURES)]
     return {"header": header(), "format": "jpeg", "data": data}
 

@@ -71,7 +71,7 @@ class Gesture(NamedTuple):
 class _Robot(asyncio.DatagramProtocol):
     def __init__(self) -> None:
         self.heard: list[tuple[int, int, str]] = []
-        """Source port (different for each connection), counter and words of each frame."""
+        """Source port (different for each connection), counter and text of each frame."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.DatagramTransport", transport)
@@ -130,7 +130,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control throughout and another one at times; then release both, or stop sending."""
+    """Hold one control throughout and another at times; then release both, or stop all ticks."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
     controller.join(Operator("hand", "hand", "drive"))
     controller.attach(session)
@@ -170,7 +170,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 
 async def _follow(session: Session, controller: MotionController) -> None:
-    """Forward reported stops to the motion controller until cancelled."""
+    """Report every stop that the guard has sent to the motion controller, until cancelled."""
     assert session.backend is not None
     while True:
         for command, reason in await session.backend.stops():

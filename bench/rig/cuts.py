@@ -30,16 +30,16 @@ __all__ = ["LATE_MS", "Cut", "CutRig"]
 LATE_MS = 300.0
 """Age beyond which motion counts as late, in milliseconds."""
 BURST_MS = 100.0
-"""Longest time from late motion to the stop in milliseconds, if late motion is allowed."""
+"""Longest time from late motion to the stop, in milliseconds, if a transport allows late motion."""
 LEAD_S = 0.2
 WATCH_S = 1.0
 READY_S = 25.0
 ATTEMPTS = 3
-"""Number of attempts to start driving a robot."""
+"""Maximum number of attempts to start driving a robot."""
 
 
 class NotDrivenError(AssertionError):
-    """A page failed to move its robot; a single failure is tolerated."""
+    """A page failed to move its robot; the rig tries up to `ATTEMPTS` times."""
 
 
 class Cut(NamedTuple):
@@ -70,7 +70,7 @@ class Cut(NamedTuple):
 
     @property
     def is_stop_needed(self) -> bool:
-        """Whether the robot must receive a stop."""
+        """Whether the robot must receive a stop, as after a release or a long cut."""
         if not self.bounds.is_told:
             return False
         return not self.was_held or self.lasted_s >= self.bounds.unnoticed_s
@@ -161,7 +161,7 @@ class CutRig:
         return range(len(self.kinds))
 
     def port(self, index: int) -> int:
-        """Return the port that identifies the robot's link in the order to cut this link."""
+        """Return the port that names the robot's link in an order to the relay."""
         first = FIRST_PORT.get(self.kinds[index])
         return self.robots.ports[index] if first is None else first + index
 
@@ -170,7 +170,8 @@ class CutRig:
 
         Args:
             seconds: duration of the cut.
-            order: ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down a``.
+            order: ``cut`` for both directions, ``cut a`` or ``cut b`` for one direction, or ``down
+                a``.
         """
         return self._trial(self.indexes, seconds, order, self._share())
 
@@ -180,7 +181,8 @@ class CutRig:
         Args:
             index: the robot's index in the rig.
             seconds: duration of the cut.
-            share: share of the cut before the control's release, in every second cut.
+            share: share of the cut that passes before the control is released; every second cut has
+                a release.
         """
         for _ in range(ATTEMPTS - 1):
             try:
@@ -333,7 +335,7 @@ def _fault(
     was_held: bool,
     burst_ms: float,
 ) -> str:
-    """Describe the violation of the motion contract after a cut, or return ""."""
+    """Return a description of the violation of the motion contract after a cut, or ""."""
     texts = [one.text for one in heard]
     moved = [text for text in texts if text != "M 0"]
     stop = texts.index("M 0") if "M 0" in texts else len(texts)

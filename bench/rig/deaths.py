@@ -1,6 +1,6 @@
 """Times from losing an operator to the stop, for eight kinds of loss.
 
-In a round of trials, all robots are driven in parallel, each by one page, and all pages vanish.
+In a round of trials, one page drives each robot, all in parallel; then all pages vanish.
 Each motion value is the send time of its tick, so the robots' logs contain all results.
 """
 
@@ -29,7 +29,7 @@ HEALED_S = 0.4
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Longest delay until a process's wait for a processor is reported, in nanoseconds."""
+"""Longest time from the end of a process's wait for a processor to its report, in nanoseconds."""
 WITNESSES = 2
 """Number of idle programs that measure late wake-ups, as an estimate of the server's delays."""
 
@@ -66,9 +66,9 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    The value is the sum of two delays. The first is the longest wake-up delay of the robots'
-    process. The second is the larger of two: the longest wake-up delay of an idle program, and the
-    waits for a processor on a tick's path. This path leads through page, relay, server and guard.
+    The value is the sum of two delays. The first delay is the longest wake-up delay of the robots'
+    process. The second delay is the longest wake-up delay of an idle program, or the waits for a
+    processor on a tick's path, if longer. This path leads through page, relay, server and guard.
     """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
@@ -114,7 +114,8 @@ class Rig:
             robot_count: number of robots and of parallel pages.
             has_relay: whether a relay connects pages and server; a relay needs root.
             options: additional options for ``urc serve``.
-            inside: command prefix that starts the server in another network namespace.
+            inside: words to put before the server's command, to start it in another network
+                namespace.
         """
         self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
         self._numbers = 0
@@ -180,7 +181,7 @@ class Rig:
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
-        """Send orders to the relay, such as a delay or a loss."""
+        """Send orders to the relay, such as to delay or drop packets."""
         self._link().do(*orders)
 
     def drive(
@@ -241,7 +242,7 @@ class Rig:
         return self.relay
 
     def _await_stop(self, index: int, began_ns: int) -> int:
-        """Wait until a robot has received motion and then a stop; return the number of lines."""
+        """Wait until a robot has received motion, then a stop; return the number of its lines."""
 
         def is_still() -> bool:
             texts = [one.text for one in self.robots.since(index, began_ns)]

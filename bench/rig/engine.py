@@ -12,13 +12,13 @@ ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
 """Time limit for replacing a killed guard, in ms; the new guard sends a stop first."""
 OPEN_MS = 100.0
-"""Additional time for the new connection and the transfer, in ms."""
+"""Time that the limit adds for the new guard's connection and for sending the stop, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 
 
 class EngineRig(Rig):
-    """A rig of robots that are driven during a failure of the server."""
+    """A rig for driving robots while their server fails."""
 
     can_hang = True
 
@@ -73,7 +73,7 @@ class EngineRig(Rig):
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
-        """Return one trial, or None if a busy machine had already stopped the robot."""
+        """Return one trial, or an empty list if a busy machine had already stopped the robot."""
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots

@@ -21,7 +21,7 @@ LATE_S = 0.005
 
 
 class Robot(ServerListener):
-    """The server's callbacks, which run in the server's own threads."""
+    """Callbacks for the Foxglove SDK's server, which calls them in its own threads."""
 
     def __init__(self) -> None:
         self.said: queue.SimpleQueue[str] = queue.SimpleQueue()

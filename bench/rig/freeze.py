@@ -30,12 +30,13 @@ from urc.runtime.session import Session
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
 
 HEARD_MS: Final = 500.0
-"""Latest allowed send time of received motion, in milliseconds after the start of the freeze."""
+"""Latest allowed send time of motion that still arrives, in milliseconds after the freeze
+begins."""
 STOP_MS: Final = 200.0
 """Longest allowed time from the end of the freeze to the stop, in milliseconds."""
 REVIVED_MS: Final = 1000.0
 """Longest allowed time from the start of a new program to the stop, in milliseconds; the limit of
-`bench.rig.kinds` for transports that open slowly."""
+`bench.rig.kinds` for transports that take long to open."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0
@@ -63,7 +64,7 @@ class Freeze(NamedTuple):
     stop_ms: float
     """Time from the end of the freeze to the stop, in milliseconds; `inf` if there was no stop."""
     is_last: bool
-    """Whether nothing arrived after the stop."""
+    """Whether the stop was the last line that arrived."""
     late_ms: float
     """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
@@ -81,7 +82,7 @@ class Freeze(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the trial is invalid because the machine was too slow."""
+        """Whether the trial is invalid: the machine was too slow, or the robot was at rest."""
         is_late = not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
         return is_late or not self.was_moving
 
@@ -99,8 +100,8 @@ async def freeze(
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
     If `via` is rosbridge, the robot's program is a substitute for rosbridge; if `via` is foxglove,
-    the program is the SDK's server. With `is_killed`, the program is killed instead, and a new
-    program starts after `lasts_s` seconds.
+    the program is the SDK's server. If `is_killed` is true, the program is killed instead, and a
+    new program starts `lasts_s` seconds later.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]

@@ -2,7 +2,8 @@
 
 Each kind defines the robot's address (see `bench.rig.robot_process`), its document, and limits
 after a cut. If a connection reopens immediately, no motion older than 300 ms may arrive, and the
-stop must arrive within 100 ms. Slow or undetected reconnections have other limits.
+stop must arrive within 100 ms. Kinds that reconnect slowly, or whose lost connection is not
+detected, have other limits.
 """
 
 import shutil
@@ -35,7 +36,8 @@ KINDS: Final = (
 )
 _AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
 FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
-"""First port of third-party programs; each robot has a program in a separate namespace."""
+"""Port of the first robot's third-party program, by kind; the following robots use the next
+ports."""
 
 
 class Bounds(NamedTuple):
@@ -104,7 +106,7 @@ _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
     "ros": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
 }
-"""A slow request, which delays motion on the same connection."""
+"""A request whose slow reply delays motion on the same connection."""
 
 
 class Counterpart(Program):
@@ -114,7 +116,7 @@ class Counterpart(Program):
         """Run `command`, and wait until it listens on `port`."""
         self.port = port
         self.options: dict[str, str] = {}
-        """Values for the placeholders in the robot's document."""
+        """Values that replace the placeholders of the robot's document, keyed by placeholder."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
         # The script kills by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)

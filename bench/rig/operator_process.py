@@ -35,7 +35,7 @@ FLOOD_NS = 1_000_000
 ANSWER_S = 20.0
 _PR_SET_PDEATHSIG = 1
 FLOOD = 400
-"""Number of messages in a burst that makes a server disconnect the page."""
+"""Number of messages in one burst, enough to make a server disconnect the page."""
 
 
 class Plan(NamedTuple):
@@ -118,7 +118,7 @@ class Page:
         self._sort()  # the first messages may have arrived with the handshake
 
     def say(self, message: dict[str, Any]) -> bool:
-        """Send a message if sending does not require waiting; return whether it was sent."""
+        """Send a message if the socket accepts it immediately; return whether it was sent."""
         return self._frame(1, json.dumps(message).encode())
 
     def close(self) -> None:
@@ -286,7 +286,7 @@ def live(plan: Plan) -> None:
 
 @contextlib.contextmanager
 def _no_release_meanwhile() -> Iterator[None]:
-    """Delay the order to release, so that no release overtakes a tick with a lower number."""
+    """Postpone an order to release, so that the release does not overtake an earlier tick."""
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
     try:
         yield

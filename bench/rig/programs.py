@@ -157,7 +157,7 @@ class Program:
 
 @contextlib.contextmanager
 def peer(script: str, *arguments: object) -> Iterator[int]:
-    """Run a program from ``peers/``; yield the program's port."""
+    """Run the script from ``bench/peers``; yield the port that it prints."""
     command = [sys.executable, "-P", str(HERE.parent / "peers" / script), *map(str, arguments)]
     with Program(command) as program:
         yield int(program.wait_for("ready", 30.0)[1])
@@ -189,8 +189,8 @@ class Robots(Program):
         self.waits: dict[tuple[int, int], list[tuple[int, float]]] = {}
         """Waits for a processor: end times, and durations in ms.
 
-        The key contains the process that waited and the watched process, which is the same process
-        or its parent.
+        The key has two process ids: the process that waited, and the watched process, which is the
+        same or its parent.
         """
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
@@ -221,7 +221,7 @@ class Robots(Program):
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
         """Return the largest delay in the robots' process between two times, in milliseconds.
 
-        A delay counts if any part of it is within the span.
+        A delay counts if any part of it lies between the two times.
         """
         with self.changed:
             found = [late for at, late in self.late if _overlaps(at, late, from_ns, until_ns)]
@@ -230,7 +230,7 @@ class Robots(Program):
     def waited_ms(self, from_ns: int, until_ns: int, path: Collection[int] | None = None) -> float:
         """Return how long a tick may have waited for watched processes, in milliseconds.
 
-        The path of a tick leads through several watched processes, and through one child of each.
+        A tick passes through several watched processes, and through one child of each.
         The result is therefore the sum of the processes' waits that overlap the span.
 
         Args:
@@ -259,7 +259,7 @@ class Operators(Program):
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """Text after the first word and the plan's number in a report, by word and number."""
+        """Rest of each report, keyed by the report's first word and the plan's number."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:

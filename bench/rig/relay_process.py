@@ -65,7 +65,7 @@ class Weather:
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """Whether all packets from a side are lost, for each side."""
+    """Whether all packets that a side sends are lost, keyed by side."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
     """Blocked ports of each side. A side's packets to or from a blocked port are lost."""
 
@@ -99,7 +99,7 @@ def switch(side: Side, device: bytes, *, is_up: bool) -> None:
 
 
 def ports_of(packet: bytes) -> tuple[int, int]:
-    """Return the two ports of a TCP or UDP packet over IPv4, or zeros."""
+    """Return the two ports of a TCP or UDP packet over IPv4; zeros for any other packet."""
     if packet[0] >> 4 != 4 or packet[9] not in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
         return 0, 0
     head = (packet[0] & 0x0F) * 4
@@ -110,7 +110,7 @@ def ports_of(packet: bytes) -> tuple[int, int]:
 
 
 class Relay:
-    """The loop that forwards packets."""
+    """The loop that forwards packets between the sides and executes orders."""
 
     def __init__(self) -> None:
         self.weather = Weather()

@@ -19,7 +19,8 @@ from urc.access.store import AccessStore
 __all__ = ["REVOKED_BOUND_MS", "REVOCATIONS", "RevocationRig"]
 
 REVOCATIONS: Final = ("person", "device", "role", "token")
-"""Ways to end a right: remove a person, remove a person's device, lower a role, or end a token."""
+"""Ways to revoke a right: remove a person, remove a person's device, lower a role, or end a
+token."""
 REVOKED_BOUND_MS: Final = 300.0
 """Longest time from the revocation to the first byte of the stop, in milliseconds."""
 _KNOWN_S: Final = 10.0
@@ -36,7 +37,7 @@ class _Holder(NamedTuple):
 
 
 class RevocationRig(Rig):
-    """A rig whose pages belong to people, devices and programs."""
+    """A rig whose pages are signed in as people, devices and programs."""
 
     def __init__(self, folder: Path, *, robot_count: int = 20) -> None:
         """Start all programs; `folder` also contains the server's data."""
@@ -109,7 +110,7 @@ class RevocationRig(Rig):
     def _trial(self, death: str, index: int, began_ns: int, span_ns: tuple[int, int]) -> Trial:
         """Return one robot's result: it must stop after the revocation and not move again.
 
-        `span_ns` contains the times before and after the revocation.
+        `span_ns` contains the times immediately before and after the revocation, in nanoseconds.
         """
         asked_ns, revoked_ns = span_ns
         before = [one for one in self.robots.since(index, began_ns) if one.time_ns <= asked_ns]

@@ -44,7 +44,7 @@ _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
 class Ear:
-    """A decoder of lines from one connection."""
+    """The decoder of one connection, which cuts received bytes into lines."""
 
     opening = b""
     """Bytes that the robot sends first on a new connection."""
@@ -227,12 +227,12 @@ class Others:
     def __init__(self, process: str) -> None:
         self.process = process
         self._everybody = [process]
-        """The process and its children, including children that outlive the process."""
+        """The process and all children found so far, even after the process itself has ended."""
         self._waited: dict[str, int] = {}
         self._has_looked = False
 
     def look(self) -> list[tuple[str, int]]:
-        """Return the processes that waited since the last check, with the times in nanoseconds."""
+        """Return each wait for a processor since the last check: process id and nanoseconds."""
         found: list[tuple[str, int]] = []
         with (
             contextlib.suppress(OSError),  # the process has ended

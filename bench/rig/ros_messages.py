@@ -54,14 +54,14 @@ _CONSTANTS: Final = {
     for store in (ROS2, ROS1)
     for name, kind in store.types.items()
 }
-"""Names to exclude from the fields, by class; rosbags declares constants like fields."""
+"""Names that are constants, not fields, keyed by class; rosbags declares both alike."""
 _TIMES: Final = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _LETTERS: Final = "abcdefghijklmnopqrstuvwxyz_/ 0123456789äß€漢😀"
 _STRANGE: Final = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e308, 5e-324)
 
 
 class RandomMessages:
-    """A source of random messages with strings and sequences of any small length."""
+    """A source of random messages, whose strings and sequences are empty or short."""
 
     def __init__(self, store: Typestore, seed: int) -> None:
         self._store = store

@@ -16,7 +16,8 @@ from types import FrameType
 from urc.cli.main import main
 
 HELD_UP_NS = 800_000_000
-"""Duration of the block, which exceeds every lease in the rig and the age limit for inputs."""
+"""Duration of the block in seconds, longer than every lease in the rig and the age limit for
+inputs."""
 FIRST_LETTERS = 20
 
 

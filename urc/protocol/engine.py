@@ -12,8 +12,8 @@ tests, playback and the simulator share this engine.
     events = engine.finish(now)                   # close gracefully; each connection ends with a
         `Close`
 
-A returned `Close` means that the engine has discarded the connection. The owner must then close the
-connection without calling `closed`.
+If the engine returns `Close`, it has already discarded its state of the connection. The owner must
+then close the connection without calling `closed`.
 
 Theory of operation. Conversations, polls, commands and sequences do not call each other. A
 conversation also returns internal events: `ExchangeEnded` for a finished request, `Matched` for an
@@ -137,7 +137,8 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether any of the driver's conditions or steps depends on earlier samples."""
+        """Whether a condition or step of the driver reads stored samples, so that samples must be
+        stored."""
 
     # -- methods
 
@@ -163,7 +164,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum time from a command or received data to any deadline it creates, in seconds."""
+        """Minimum time from a command or received data to a deadline that it sets, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
@@ -225,7 +226,7 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """Stop all sequences and refuse autonomous motion; an empty `reason` allows it again.
+        """Stop all sequences and refuse autonomous motion; an empty `reason` allows motion again.
 
         Login sequences continue, because a stop can reach the robot only after the login.
         """
@@ -238,7 +239,7 @@ class Engine:
         return self._settle([], now)
 
     def finish(self, now: float) -> list[Event]:
-        """Close all connections in an orderly way; each `Close` follows within `GOOD_BYE_S`."""
+        """Run ``on_close`` on all connections; a `Close` for each follows within `GOOD_BYE_S`."""
         events: list[LineEvent] = []
         self._schedule.stop()
         for line in self.lines.values():
@@ -263,7 +264,7 @@ class Engine:
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink` exactly once.
 
-        The command is not sent if `unless` returns a reason.
+        If `unless` returns a reason when the command is due to be sent, the command fails instead.
         """
         found = self._commands.get(command)
         if found is None:

@@ -1,4 +1,4 @@
-"""Input and output events, which are the engine's only external interface."""
+"""Requests to the engine, and the events that the engine returns to its owner."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Request(NamedTuple):
 
 
 class Open(NamedTuple):
-    """Connect this transport for a waiting request (``connection: per_request``)."""
+    """Open this transport's connection for a waiting request (``connection: per_request``)."""
 
     transport: str
 
@@ -50,8 +50,7 @@ class Send(NamedTuple):
     is_secret: bool = False
     """Whether `data` contains a secret and must not be shown or logged."""
     counted: CountedFrame | None = None
-    """The frame with its counter numbers if the guard also sends on the connection; otherwise
-    None."""
+    """The frame and its counter numbers; None unless the guard also sends on the connection."""
 
 
 class Close(NamedTuple):
@@ -69,7 +68,7 @@ class Ready(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Samples, in order, from frames that arrived together; computed signals are included."""
+    """The samples of frames that arrived together, in order, including computed signals."""
 
     transport: str
     """Name of the transport; "" for samples that changed without a frame (a delayed alarm)."""
@@ -108,7 +107,7 @@ class Violation(NamedTuple):
 
 
 class NumbersUsed(NamedTuple):
-    """This connection's counters have advanced, so previously rendered stop frames may be outdated.
+    """A frame has used counter numbers, so stop frames rendered earlier may be outdated.
 
     `NumbersUsed` occurs only on connections that share counters with motion frames
     (`MotionEncoder.share`).

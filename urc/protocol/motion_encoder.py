@@ -26,13 +26,13 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Number of counter values that other frames can use before the stops must be rendered again."""
+"""Number of counter values that other frames may use before stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion is currently impossible; the message gives the reason."""
+    """The robot cannot be moved at present; the message states the reason."""
 
 
 class _Way:
@@ -72,8 +72,7 @@ class MotionEncoder:
         self._made: dict[str, Made] = {}
         """Cached stop frames, keyed by command."""
         self._lengths: dict[str, int] = {}
-        """Number of stops to render in advance for each held command, keyed by shared
-        connection."""
+        """Number of stops to render in advance for each held command, keyed by connection."""
         for one, command in self._held.items():
             line = command.transport
             lines[line].has_motion = True
@@ -83,7 +82,7 @@ class MotionEncoder:
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
-        """Share the counters with the sender of motion frames, which must confirm the sent numbers.
+        """Share the counters with the sender of motion frames, which must report the sent numbers.
 
         Args:
             repeating: connections on which every stop is sent several times, because frames may be
@@ -96,7 +95,7 @@ class MotionEncoder:
     def set_counters(
         self, line: str, stand: Mapping[str, int], *, is_settled: bool
     ) -> list[MotionEvent]:
-        """Update the shared counters of a connection.
+        """Store the counter numbers that were actually transmitted on a shared connection.
 
         Args:
             line: name of the connection.
@@ -169,8 +168,8 @@ class MotionEncoder:
     ) -> Payload | CountedFrame:
         """Return the frame of `command` with `arguments`, ready to send.
 
-        In half-duplex mode, the result is empty while a reply is pending. The setpoint is then
-        skipped, and the next setpoint is sent instead.
+        On a half-duplex connection, the returned frame is empty while a reply is pending. The
+        caller then skips this setpoint and sends the next one later.
 
         On a shared connection, the frame's counter numbers are provisional until `set_counters`
         confirms them after the transmission.

@@ -2,7 +2,7 @@
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
 Text from a document enters the generated source only inside the `repr()` of a constant. `linecache`
-keeps the source for the lifetime of the function, so that tracebacks show the generated lines.
+keeps the source as long as the function exists, so tracebacks show the generated lines.
 """
 
 import weakref
@@ -18,7 +18,7 @@ _numbers = count(1)
 def function_of(
     name: str, arguments: str, lines: Sequence[str], scope: Mapping[str, object]
 ) -> Callable[..., Any]:
-    """Return a function with the body `lines`.
+    """Compile `lines` as the body of a new function, and return the function.
 
     Args:
         name: name of the function, a Python identifier.

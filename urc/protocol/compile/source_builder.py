@@ -16,7 +16,7 @@ BUILTINS = {"bytes": bytes, "int": int, "len": len, "round": round, "type": type
 
 
 class SourceBuilder:
-    """Source text of a function under construction."""
+    """The source text of a generated function, to which lines are added one by one."""
 
     def __init__(self) -> None:
         self.scope: dict[str, Any] = dict(BUILTINS)

@@ -1,7 +1,7 @@
 """The form for envelopes: publish, call, goal and request.
 
 Pure. An envelope has an address (attributes) and a body. The body uses another form, such as JSON.
-JSON bodies are not encoded as text, because each message transport has its own encoding.
+A JSON body stays plain data, because each message transport encodes it in its own way.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,9 +32,9 @@ class _AddressPiece(NamedTuple):
 class PathTemplate:
     """A writer for addresses: request paths, and the names of topics, services and actions.
 
-    An argument value fills exactly one segment of the address, so the value cannot redirect the
-    request. An argument value that provides the whole address may have several segments. Setting
-    values are trusted, like the document's own text.
+    An argument value may fill only one segment of the address, so it cannot redirect the request.
+    An argument value that provides the whole address may have several segments. Setting values are
+    trusted, like the document's own text.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ def place_writer(name: str, tree: object) -> PathTemplate | None:
 
 
 def _path(text: str, is_whole: bool) -> str:
-    """Return a value quoted for use in a URL path."""
+    """Return a value percent-encoded for a URL path; refuse values that change the path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
         raise NotWritable(f"{quoted(text)} would change the path")
@@ -96,7 +96,7 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 
 
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
-"""Attributes that identify an envelope; all other attributes are delivery options."""
+"""Attributes that form an envelope's address; all other attributes are delivery options."""
 _TEXTS: Final = ("query", "headers")
 """Attributes whose values map names to text."""
 

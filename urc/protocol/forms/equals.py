@@ -48,7 +48,7 @@ class AnyReader:
         return NOTHING
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return an empty frame, which always matches."""
+        """Return an empty frame, because this form matches every frame."""
         return b""
 
 

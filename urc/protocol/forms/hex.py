@@ -16,7 +16,7 @@ _PLAIN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\|\s*([a-z0-9]+)\s*)?")
 
 
 class BytesWriter:
-    """A writer for concatenated pieces; it also reads fixed-width values back."""
+    """A writer that joins constants and values to bytes; it also reads fixed-width values back."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._pieces = cast("tuple[bytes | Template, ...]", spec.options["pieces"])
@@ -93,7 +93,7 @@ class BytesWriter:
 
 
 def _word_of(source: str) -> str:
-    """Return the last filter in an expression."""
+    """Return the last filter in an expression, such as ``u16be``."""
     return source.rpartition("|")[2].strip()
 
 

@@ -1,6 +1,6 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. `HeadReader` wraps the body's reader, for both reading and writing.
+Pure. `HeadReader` adds these fields to the body's reader, for both reading and writing.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from urc.protocol.values.payload import Frame, NotWritable, PayloadReader
 __all__ = ["LOCATION", "STATUS", "HeadReader", "is_redirect"]
 
 STATUS: Final = "status"
-"""Name used for the status in header declarations."""
+"""Name under which declarations read the status code, as if it were a header."""
 _REDIRECTS: Final = 3
 """First digit of redirect status codes."""
 LOCATION: Final = "location"
@@ -29,7 +29,7 @@ def is_redirect(frame: Frame) -> bool:
 class HeadReader:
     """A reader for the status and headers, with another reader for the body.
 
-    Fields for missing HTTP headers are omitted.
+    If a header is missing from the response, its field is omitted.
     """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec) -> None:

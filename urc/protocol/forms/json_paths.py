@@ -1,11 +1,11 @@
 """The form ``json`` for reading: fields at paths in a document.
 
-Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
-`msgspec` decoder skips all other data, and a generated function extracts the fields
+Theory of operation. Paths without expressions become `msgspec` types with one member for each path
+step. The `msgspec` decoder skips all other data, and a generated function extracts the fields
 (`urc.protocol.compile.source`). If a document has a different structure, the decoder raises an
 error. The reader then decodes the whole document and follows the paths step by step. JMESPath
-expressions always require decoding the whole document. Typed and complete decoding return the same
-fields.
+expressions always require decoding the whole document. Decoding with the types and decoding the
+whole document return the same fields.
 """
 
 import json

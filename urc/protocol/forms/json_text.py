@@ -13,7 +13,7 @@ __all__ = ["JsonWriter", "filled", "matches"]
 
 
 class JsonWriter:
-    """A writer for compact JSON; it also reads back the values of plain names and counters."""
+    """A writer for compact JSON; it reads back values whose template is a name or a counter."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
@@ -51,7 +51,7 @@ class JsonWriter:
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of plain names; None if the rest of the document differs."""
+        """Return the values of templates that are only a name; None if the rest differs."""
         payload = frame.payload
         try:
             value = payload.body if isinstance(payload, Envelope) else json.loads(frame.text)

@@ -15,7 +15,7 @@ from urc.protocol.compile.source import function_of
 __all__ = ["ExtractionPlan", "PathNode", "build_pick", "plan_of"]
 
 _LISTS_TO = 64
-"""Maximum array index for typed decoding; higher indices are rarely needed."""
+"""Maximum array index for typed decoding; a path with a higher index decodes the whole document."""
 
 
 class _Shape:
@@ -28,7 +28,7 @@ class _Shape:
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape at the next path step; create the shape if it is missing."""
+        """Return the required type at the next path step; create it if it is missing."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:
@@ -105,7 +105,7 @@ class ExtractionPlan(NamedTuple):
 
 
 def plan_of(paths: Mapping[str, JsonPath]) -> ExtractionPlan | None:
-    """Return the plan; None if types cannot express the paths."""
+    """Return the plan for these paths; None if no type can express them."""
     shape = _Shape()
     want = PathNode(shape)
     for name, path in paths.items():

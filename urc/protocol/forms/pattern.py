@@ -18,7 +18,7 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["CASTS", "PatternReader", "pattern_source"]
 
 _BLANK: Final = r"\s\x1c-\x1f"
-"""ASCII characters that Python's `split` and `float` treat as whitespace."""
+"""The ASCII characters that Python's `split` and `float` treat as whitespace."""
 _SOURCES: Final[Mapping[FieldKind, str]] = {
     "integer": r"[+-]?[0-9]{1,400}+",
     "number": r"[+-]?(?:(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
@@ -59,7 +59,8 @@ class PatternReader:
             if hole.name
         ]
         self._words = _words(self._holes, self._tail)
-        """Words in the pattern; None if the pattern needs a regular expression."""
+        """Literal words and fields of the pattern; None if only a regular expression can read
+        it."""
         self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
@@ -104,7 +105,7 @@ class PatternReader:
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the literal words and the fields; None if a field is only part of a word."""
+    """Return the pattern as literal words and fields; None if a field is only part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before

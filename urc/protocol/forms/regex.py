@@ -12,7 +12,7 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["RegexReader"]
 
 _WIDEST: Final = 16
-"""Maximum length of an alternative spelling of a number, in characters."""
+"""Maximum length, in characters, of the spellings of a number that are tried."""
 _PLACES: Final = 6
 
 
@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return a field's text in the format of the group, for example with leading zeros."""
+        """Return a field's text as its named group requires it, for example with leading zeros."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:

@@ -21,7 +21,8 @@ class SplitReader:
         self._has_more = bool(options["has_more"])
         self._strip = cast("str | None", options["strip"])
         self._tail = cast("str", options.get("tail", ""))
-        """Name of the field for all remaining parts, or ""."""
+        """Name of the field that contains all remaining parts as a list; "" if there is no such
+        field."""
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -41,7 +42,7 @@ class SplitReader:
         }
 
     def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
-        """Return the parts, keyed by name; the last name maps to a list of all remaining parts."""
+        """Return the parts, keyed by name; the last name has a list of all remaining parts."""
         first, strip = len(self._names) - 1, self._strip
         if len(parts) < first:
             return None
@@ -105,7 +106,7 @@ class KeyvalueReader:
         return found or None
 
     def _bare(self, pairs: list[str]) -> dict[str, object] | None:
-        """Remove and return the leading parts; None if one is missing or a key-value pair."""
+        """Remove and return the leading parts; None if one is missing or has a separator."""
         parts = [part for part in pairs if part.strip(self._strip)]
         front = parts[: len(self._first)]
         if len(front) < len(self._first) or any(self._separator in part for part in front):

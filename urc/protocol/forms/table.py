@@ -1,8 +1,8 @@
-"""The readers and writers for each form, and functions that build readers and writers.
+"""Tables of the forms' readers and writers, and functions that build a declared reader or writer.
 
 Pure. Each value in `READERS` and `WRITERS` is a factory with the parameters ``(spec, context)``,
-which returns a reader or a writer. Each engine calls the factory once for each declaration.
-`urc.protocol.values.payload` defines the interfaces of readers and writers.
+which returns a reader or a writer. An engine calls each declaration's factory once, when the engine
+is created. `urc.protocol.values.payload` defines the interfaces of readers and writers.
 """
 
 from urc.model.payload import ReadSpec, WriteSpec

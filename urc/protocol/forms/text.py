@@ -21,7 +21,7 @@ back."""
 
 
 class TextWriter:
-    """A writer for rendered templates; it also reads back the values of plain names."""
+    """A writer for text from a template; it also reads back expressions that are only a name."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._template = cast("Template", spec.options["template"])
@@ -78,7 +78,7 @@ class TextWriter:
 
 
 class _TextPiece(NamedTuple):
-    """A field and the following literal text; the first piece has no field."""
+    """A field and the literal text after it; the first piece has only literal text."""
 
     name: str
     """Name of the field; "" for an expression that cannot be read back."""

@@ -19,7 +19,7 @@ from urc.protocol.values.payload import CodecContext, Frame, NotWritable, Payloa
 __all__ = ["TopicReader", "frame_of", "listened", "matches", "paths_by_topic", "topic_of"]
 
 FEEDBACK = "/feedback"
-"""Suffix of an action's feedback topic."""
+"""Suffix that turns an action's name into the name of its feedback topic."""
 
 
 class TopicReader:
@@ -80,7 +80,7 @@ def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
 
 
 def frame_of(payload: Payload, encoding: str) -> Frame:
-    """Return a received payload as a frame; bytes in an envelope become the payload."""
+    """Return received data as a frame; if an envelope contains bytes, they become the payload."""
     if not isinstance(payload, Envelope):
         return Frame(payload, encoding)
     attributes, body = payload.attributes, payload.body

@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 SKIPPED: Final = ""
-"""Violation code for a frame that a `switch` drops silently."""
+"""Violation code of a frame that is dropped without being reported."""
 Open = Callable[[bytes], bytes]
 
 
@@ -47,7 +47,7 @@ class FrameFault(NamedTuple):
     """Violation code: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
     message: str
     closes: bool = False
-    """Whether the violation requires closing the connection."""
+    """Whether the connection must be closed because of the violation."""
 
 
 class Decoder(Protocol):
@@ -99,7 +99,7 @@ class StreamDecoder:
         self._is_lost = False
         """Whether the bytes since the last frame are invalid; invalid bytes are reported once."""
         self._is_case = False
-        """Whether the decoder belongs to a case of a `switch`."""
+        """Whether the decoder reads the frames of one case of a `switch`."""
 
     @property
     def pending(self) -> int:
@@ -132,7 +132,7 @@ class StreamDecoder:
         return []
 
     def restart(self) -> None:
-        """Reset the state for a new frame that a `switch` assigns to the decoder."""
+        """Prepare the decoder for a frame that a `switch` has assigned to it."""
         self._is_lost = False
         self._is_case = True
 

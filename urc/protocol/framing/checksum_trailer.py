@@ -1,8 +1,8 @@
 """Checksums after variable-length text.
 
 Pure. On sending, a `ChecksumTrailer` adds the checksum to the content between a frame's markers; on
-receipt, it removes the checksum. Once the checksum is removed, all other parts of the content have
-fixed positions.
+receipt, it removes the checksum. After the checksum is removed, all other declared parts of the
+content have fixed positions.
 """
 
 from urc.model.framing import TrailerSpec
@@ -12,7 +12,7 @@ __all__ = ["ChecksumTrailer"]
 
 
 class ChecksumTrailer:
-    """A checksum after text, or after each line of the text."""
+    """A checksum of variable position: after a frame's text, or after each line of the text."""
 
     def __init__(self, spec: TrailerSpec, start: bytes) -> None:
         self._spec = spec

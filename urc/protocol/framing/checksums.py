@@ -15,7 +15,7 @@ __all__ = ["BadFrame", "Checksum", "cut"]
 
 
 class BadFrame(UrcError):
-    """Bytes that are not a valid frame."""
+    """Received bytes are not a valid frame, or a payload cannot become a frame."""
 
     def __init__(self, code: str, message: str, *, closes: bool = False) -> None:
         super().__init__(message)
@@ -49,7 +49,7 @@ class Checksum:
         frame[place : place + self.size] = right
 
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
-        """Return the bytes of the correct checksum, computed over `window`.
+        """Return the bytes of the checksum that `frame` should have, computed over `window`.
 
         Return None if the salt table has no row for the frame but permits such frames; the receiver
         then skips the check.
@@ -81,7 +81,7 @@ class Checksum:
         return BadFrame("bad-checksum", message, closes=self.spec.closes)
 
     def saltless(self, frame: bytes | bytearray) -> BadFrame:
-        """Return the error for a frame to send that has no row in the salt table."""
+        """Return the error for an outgoing frame that has no row in the salt table."""
         number = self.spec.salt.number(frame)
         return BadFrame("no-salt", f"the salt table of the checksum has no row {number}")
 
@@ -112,7 +112,7 @@ class Checksum:
 
 
 def cut(frame: bytes | bytearray, window: ByteRange) -> tuple[int, bytes]:
-    """Return the start and the bytes of `window`; raise `BadFrame` if `frame` is too short."""
+    """Return start offset and bytes of `window`; raise `BadFrame` if `frame` is too short."""
     start, stop, _ = slice(window.start, window.stop).indices(len(frame))
     if start > stop:
         raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")

@@ -53,7 +53,7 @@ class DelimiterFraming(NamedTuple):
 
 
 class DelimiterDecoder(StreamDecoder):
-    """A decoder for delimited frames that takes linear time even if bytes arrive one at a time.
+    """A decoder for delimited frames, in linear time even if the bytes arrive one at a time.
 
     A frame over the size limit is dropped and reported once. After a dropped frame, decoding
     continues at the next delimiter.
@@ -76,8 +76,8 @@ class DelimiterDecoder(StreamDecoder):
         """Number of scanned bytes that contain no delimiter."""
         self._is_skipping = False
         self._credit: RescanBudget | None = None
-        """Rescan budget for a case of a `switch`; None outside a `switch`. In a `switch`, only
-        the first byte of a frame over the size limit is dropped."""
+        """Rescan budget if the decoder reads a case of a `switch`; otherwise None. In a `switch`,
+        only the first byte of a frame over the size limit is dropped."""
 
     def restart(self) -> None:
         """Reset the state for a new frame that a `switch` assigns to the decoder."""
@@ -111,7 +111,7 @@ class DelimiterDecoder(StreamDecoder):
         return None
 
     def ahead(self) -> list[bytes]:
-        """Return all complete frames if several are buffered, without removing them.
+        """If several complete frames are buffered, return them without removing them.
 
         The returned list is empty if any frame requires a check or exceeds the size limit. `skip`
         removes processed frames from the stream.
@@ -127,7 +127,7 @@ class DelimiterDecoder(StreamDecoder):
         return frames if max(map(len, frames)) <= self._max_bytes else []
 
     def skip(self, count: int, size: int) -> None:
-        """Remove the first `count` frames of `ahead`; `size` is their total size in bytes."""
+        """Remove the first `count` frames from `ahead`; together, they have `size` bytes."""
         if count:
             self._stream.at += size + count * len(self._delimiter)
             self._searched = 0

@@ -1,7 +1,7 @@
 """Length fields with a variable number of digits: ``#3512``, ``512:``.
 
-Pure. The payload starts after the last digit or the terminator, and the length and `adjust` count
-from there.
+Pure. The payload starts after the last digit or the terminator; the length and `adjust` count from
+this position.
 """
 
 from urc.model.framing import LengthSpec
@@ -17,7 +17,7 @@ class DigitLength:
         self._spec = spec
         self._base = 10 if spec.spelling == "dec" else 16
         self.end = spec.offset + (spec.size + 1 if spec.is_counted else 1 + len(spec.until))
-        """Minimum number of frame bytes needed to read the length field."""
+        """Number of frame bytes that must be present before the length field can be read."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
         """Return the size of the frame at `at`, in bytes; negative if invalid, None if unknown."""

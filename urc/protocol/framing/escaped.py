@@ -2,9 +2,10 @@
 
 Theory of operation. Markers (start, end, delimiter) are sent unchanged. Byte stuffing is the last
 step of encoding, so the length field and the checksum refer to the original bytes. If every marker
-byte in the content is escaped, an ordinary search finds the markers. If a marker begins with the
-escape byte and the content contains doubled escape bytes, the decoder processes all escapes in
-order. A frame with a length field is decoded byte by byte up to its length.
+byte in the content is escaped, the decoder finds markers by an ordinary search. If a marker begins
+with the escape byte and the content contains doubled escape bytes, the decoder processes all
+escapes in order. A frame with a length field is decoded byte by byte, until it has the stated
+length.
 """
 
 from functools import partial
@@ -104,7 +105,8 @@ class _DoubledDecoder(StreamDecoder):
         self._start, self._end = framing.codec.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
-        """Number of scanned frame bytes that contain no end marker; -1 before a frame starts."""
+        """Number of the frame's bytes already scanned for the end marker; -1 before a frame
+        starts."""
 
     def restart(self) -> None:
         super().restart()
@@ -147,7 +149,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return a frame, a violation or None; if None and `_searched` is -1, search again."""
+        """Return a frame, a violation or None; after None with `_searched` at -1, call again."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)

@@ -1,4 +1,4 @@
-"""Conversion between a payload and its frame, according to the frame layout.
+"""Conversion of payloads to frames and back, according to a frame layout.
 
 Pure. A `FrameCodec` implements one layout. The framings find the frames in the stream and use the
 codec to convert each frame.
@@ -22,11 +22,11 @@ __all__ = ["BadFrame", "LengthField", "FrameCodec", "length_of"]
 Open = Callable[[bytes], bytes]
 
 _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
-"""Initial values of the CRCs that the standard library computes, keyed by CRC parameters."""
+"""Initial values of those CRCs that the standard library can compute, keyed by CRC parameters."""
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:
-    """Return a function that decodes a frame to its payload, using `slow` in uncommon cases."""
+    """Return a function that decodes a frame to its payload, and calls `slow` in uncommon cases."""
     spec = layout.checksum
     if spec is not None and not _is_common(spec):
         return slow
@@ -114,7 +114,7 @@ class FrameCodec:
     def close(self, payload: bytes) -> bytes:
         """Return `payload` as a frame; raise `BadFrame` if the payload does not fit.
 
-        All bytes outside the payload and the frame's declared parts are zero.
+        Bytes of the layout that neither the payload nor a declared part fills are zero.
         """
         layout = self.layout
         if self._stuffing is not None:

@@ -42,7 +42,7 @@ class IdleFraming(NamedTuple):
 
 
 class DatagramFraming(NamedTuple):
-    """Frames that arrive complete: each received block of bytes is one frame."""
+    """Framing for transports that deliver complete frames: each received block is one frame."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -92,7 +92,8 @@ class _WholeDecoder(StreamDecoder):
 class _IdleDecoder(_WholeDecoder):
     """A decoder for frames that end with silence.
 
-    The argument `now` to `push` is the time of receipt. Without `now`, only `tick` ends frames.
+    The argument `now` of `push` is the time at which the bytes were received. If `push` gets no
+    time, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:

@@ -1,9 +1,9 @@
 """The framing ``json``: consecutive JSON objects or arrays.
 
-Theory of operation. Only brackets and quotes determine the end of a value. A regular expression
-finds the brackets and quotes, so every byte is scanned once. Blanks, line endings and the record
-separator of RFC 7464 may separate two values. Mismatched brackets and control characters inside
-strings are invalid: all data up to the error is dropped.
+Theory of operation. The end of a value is found from brackets and quotes alone. A regular
+expression finds the brackets and quotes, so every byte is scanned once. Blanks, line endings and
+the record separator of RFC 7464 may separate two values. After mismatched brackets or a control
+character inside a string, all data up to the error is dropped.
 """
 
 import re

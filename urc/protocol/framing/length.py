@@ -65,7 +65,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._plain = (
             0 if self._start or self._end or not self._least <= size <= max_bytes else size
         )
-        """Size of every frame in bytes if frames can be cut without checking them; otherwise 0."""
+        """Fixed frame size in bytes if frames need no check; otherwise 0."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream, data = self._stream, self._stream.data
@@ -136,7 +136,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._stream.at += count
 
     def _endless(self, there: int) -> FrameFault | None:
-        """Wait for the remaining bytes of a variable-size length field."""
+        """Return None while more bytes may complete the length field, otherwise a violation."""
         return self._bad_length(there) if there >= self._max_bytes else None
 
     def _bad_length(self, size: int) -> FrameFault | None:

@@ -1,6 +1,6 @@
 """The receive buffer of one connection and the budget for rescanning bytes.
 
-Pure. The decoders in `urc.protocol.framing` use both.
+Pure. The decoders in `urc.protocol.framing` use both classes.
 """
 
 from typing import Final
@@ -30,7 +30,7 @@ class ReceiveBuffer:
 
 
 class RescanBudget:
-    """The number of bytes that may be rescanned; it grows with each consumed byte.
+    """A limit on the bytes that a decoder may scan again; each consumed byte raises the limit.
 
     The total number of scanned bytes is at most (`RATE` + 1) · stream size + `MOST`.
     """
@@ -43,7 +43,7 @@ class RescanBudget:
 
     @property
     def is_full(self) -> bool:
-        """Whether the budget is at its maximum."""
+        """Whether the budget has its maximum, `MOST` bytes."""
         return self._left >= self.MOST
 
     def earn(self, count: int) -> None:

@@ -30,12 +30,11 @@ _SMALL: Final = 256
 _GROWTH: Final = 8
 """A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005
-"""How long, in seconds, the robot must be silent before a larger buffer is searched regardless of
-its growth."""
+"""Silence after which a larger buffer is searched regardless of its growth, in seconds."""
 
 
 class RegexFraming(NamedTuple):
-    """Frames that match a pattern.
+    """A framing whose received frames are the matches of a pattern.
 
     If `tx` is declared, every sent frame ends with `tx` and need not match the pattern.
     """
@@ -104,7 +103,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._codec = codec
         self._tried = 0
-        """Number of searched bytes that contain no match."""
+        """Number of bytes already searched without a match."""
         self._newest = 0.0
 
     @property

@@ -1,6 +1,6 @@
 """Byte stuffing: ``slip`` (RFC 1055) and ``cobs`` (Cheshire and Baker, 1999).
 
-Both framings replace one byte value in the payload and use that value to end each frame.
+Both framings end each frame with one byte value, and replace this value in the payload.
 """
 
 import re

@@ -19,7 +19,7 @@ _ANY: Final = range(256)
 
 
 class Stuffing:
-    """Linear-time encoding and decoding of byte stuffing."""
+    """Encoder and decoder of declared byte stuffing; both take linear time."""
 
     def __init__(self, spec: EscapeSpec) -> None:
         self.spec = spec
@@ -27,7 +27,7 @@ class Stuffing:
         self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
         """Whether the escape byte is escaped by doubling, so that it may also begin a marker."""
         self.meant = _meant(spec)
-        """Decoded byte for each byte that may follow the escape byte."""
+        """Decoded byte, keyed by the byte after the escape byte."""
         if spec.after:
             self._plain, self._inserted = spec.after, bytes((spec.insert,))
             self._pair = re.compile(re.escape(spec.after) + b"(.?)", re.DOTALL)
@@ -82,7 +82,7 @@ class Unstuffer:
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest decoded bytes, for recognising the sequence before an inserted byte."""
+        """Newest decoded bytes, to detect the sequence after which a byte is inserted."""
 
     def feed(self, byte: int) -> bool:
         """Process one byte; return False for an invalid byte."""

@@ -1,8 +1,8 @@
 """The framing ``switch``: several framings on one stream, selected by the first bytes.
 
 Theory of operation. All cases of a switch share one `ReceiveBuffer`. The first bytes of a frame
-select the case. After each frame or violation, a new selection starts. Bytes that match no case are
-skipped.
+select the case. After each frame or violation, the next bytes select a case again. Bytes that match
+no case are skipped.
 """
 
 import re
@@ -81,7 +81,7 @@ class SwitchFraming(NamedTuple):
 
 
 def _is_text(payload: bytes) -> bool:
-    """Return whether an emulated robot's payload is probably a text line, not a binary frame."""
+    """Return whether an emulated robot's payload has only printable ASCII, like a line of text."""
     return payload.isascii() and payload.decode("ascii").isprintable()
 
 
@@ -136,7 +136,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """End the case after the result `found`; return None if it repeats a reported violation."""
+        """Deselect the case after the result `found`; return None for a repeated violation."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False

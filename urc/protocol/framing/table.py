@@ -1,6 +1,6 @@
-"""Framings: conversion between byte streams and frames.
+"""The table of framings, which convert byte streams to frames and frames to bytes.
 
-Pure. This module contains the table of framings and builds framings from their declarations. Each
+Pure. This module also builds framings from their declarations. Each
 family of framings is imported on first use. `urc.protocol.framing.base` defines the interfaces of
 framings.
 """

@@ -1,10 +1,10 @@
 """Timeouts for any framing, and removal of terminal escape sequences.
 
 Theory of operation. An incomplete frame blocks all later frames. For example, a corrupted length
-field may require bytes that never arrive. With a timeout, the wait ends after a period of silence.
-After the timeout, bytes are dropped one by one, until the remaining bytes contain valid frames.
-Terminal escape sequences are removed before framing, because they could split a marker or other
-text.
+field may require bytes that never arrive. With a timeout, the decoder stops waiting after a period
+of silence. After the timeout, bytes are dropped one by one, until the remaining bytes contain valid
+frames. Terminal escape sequences are removed before framing, because they could split a marker or
+other text.
 """
 
 import re
@@ -50,7 +50,7 @@ class TimeoutFraming(NamedTuple):
 
 
 class _PatientDecoder:
-    """A decoder that adds a timeout to another decoder."""
+    """A decoder that adds a timeout for incomplete frames to another decoder."""
 
     def __init__(self, stream: ReceiveBuffer, framing: TimeoutFraming) -> None:
         self._stream = stream
@@ -70,7 +70,7 @@ class _PatientDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """Time at which an incomplete frame times out, or the framing's deadline if earlier."""
+        """Time at which an incomplete frame times out, or the inner decoder's earlier deadline."""
         if self._told:
             return float("-inf")
         own, timeout = self._decoder.deadline, self._framing.timeout_s

@@ -19,7 +19,7 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""Terminators of comments, CDATA sections and declarations, keyed by their first characters."""
+"""Last characters of comments, CDATA sections and declarations, keyed by the first characters."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
@@ -100,7 +100,7 @@ class _XmlDecoder(StreamDecoder):
                 return fault
 
     def _to_mark(self) -> FrameFault | None:
-        """Advance to the next ``<``."""
+        """Advance to the next ``<``; return a violation for other characters between elements."""
         stream, data = self._stream, self._stream.data
         blank = self._blank.match(data, stream.at)
         if blank is not None:
@@ -110,7 +110,7 @@ class _XmlDecoder(StreamDecoder):
         return self._skip(start - stream.at) if start > stream.at else None
 
     def _to_end(self) -> int:
-        """Return the end offset of the element or of a section before it, or `_WAIT` or `_BAD`."""
+        """Return the end offset of the element, or of a section before it; or `_WAIT` or `_BAD`."""
         while True:
             if self._until:
                 step = self._through_special()

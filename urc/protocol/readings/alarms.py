@@ -1,9 +1,9 @@
 """Alarm states of signals over time.
 
-Callers pass the time, because the module does not read a clock. A value that reaches the limit
-causes an alarm, and so does an alarm state. The alarm ends when the value is within the limit by at
-least ``hysteresis``. The key ``for`` sets how long the value must be beyond the limit before the
-alarm begins. The key ``off_delay`` delays the alarm's end. A delayed change happens at
+Callers pass the time, because the module does not read a clock. An alarm begins if the value
+reaches a limit or is one of the signal's alarm states. The alarm ends when the value is within the
+limit by at least ``hysteresis``. The key ``for`` sets how long the value must be beyond the limit
+before the alarm begins. The key ``off_delay`` delays the alarm's end. A delayed change happens at
 `AlarmMonitor.deadline`, even without another sample.
 """
 
@@ -47,9 +47,9 @@ class AlarmMonitor:
             for word in limits.states
         }
         self._due: dict[Alarm, float] = {}
-        """Start times of pending and active alarms, keyed by crossed level."""
+        """Times at which pending alarms begin, or active alarms began, keyed by level."""
         self._ends: dict[Alarm, float] = {}
-        """End times of active alarms whose value is normal again, keyed by level."""
+        """Times at which active alarms end because the value is normal again, keyed by level."""
         self._begun: frozenset[Alarm] = frozenset()
         """Levels whose alarm has begun."""
 
@@ -101,7 +101,7 @@ class AlarmMonitor:
             self._due.pop(level, None)
 
     def tick(self, now: float) -> Alarm:
-        """Return the alarm for the newest value at `now`."""
+        """Apply all delays that have expired by `now`; return the alarm of the newest value."""
         if self._ends:
             for level in [level for level, end in self._ends.items() if end <= now]:
                 del self._ends[level], self._due[level]

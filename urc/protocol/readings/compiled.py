@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["build_fast_read"]
 
 _KEEPS_ASCII: Final = frozenset(("utf-8", "ascii", "latin-1"))
-"""Encodings that are supersets of ASCII."""
+"""Encodings in which ASCII characters have the same bytes as in ASCII."""
 
 
 def build_fast_read(
@@ -53,7 +53,7 @@ def build_fast_read(
 
 
 def _head_check(prefix: str, encoding: str) -> list[str]:
-    """Return source lines that reject most frames without `prefix`.
+    """Return source lines that reject most of the frames that do not begin with `prefix`.
 
     Frames with leading blanks or non-ASCII bytes pass the generated check, because the decoder may
     skip blanks or report undecodable bytes.
@@ -144,7 +144,7 @@ def _of_pattern(
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the words of a pattern; None if any field is only part of a word."""
+    """Return the fields and literal words of a pattern; None if a field is only part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before

@@ -1,7 +1,7 @@
 """Generated JSON decoders: one function per declaration, from bytes to samples.
 
 Pure. A generated decoder supports only JSON documents in which every field is present and has the
-declared type. A second function for the same paths supports documents with missing or null fields.
+declared type. A second generated function supports documents in which fields are missing or null.
 The ordinary decoder reads all other documents, as in `urc.protocol.readings.compiled`.
 """
 

@@ -70,7 +70,7 @@ def _numbers(items: tuple[Item, ...]) -> list[Item]:
 
 
 def _is_sure(item: Item | None, value: Value) -> bool:
-    """Return whether every value of the item is a finite number of the signal's type."""
+    """Return whether every value that the item can have is a finite number of the signal's type."""
     if item is None:
         return False
     if value.signal.type == "number":

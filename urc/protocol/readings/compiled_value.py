@@ -39,11 +39,11 @@ class Value(NamedTuple):
 
     signal: Signal
     convert: str
-    """Expression that converts the raw text; "" means no conversion."""
+    """Source text of the expression that converts the raw text; "" means no conversion."""
     checks: tuple[str, ...]
-    """Conditions for a valid value; ``{v}`` stands for the value."""
+    """Conditions that a valid value meets, as source text; ``{v}`` stands for the value."""
     raw_checks: tuple[str, ...] = ()
-    """Conditions for a valid value; ``{r}`` stands for the raw text."""
+    """Conditions that the raw text of a valid value meets; ``{r}`` stands for the raw text."""
     is_finite: bool = True
     """Whether the value is always finite, or `checks` reject infinity and not-a-number."""
 

@@ -20,7 +20,7 @@ class DataChangeFilter:
         self._told: Sample | None = None
         self._pending: Sample | None = None
         self._since = 0.0
-        """Arrival time of the first sample with the value of `_pending`, in seconds."""
+        """Arrival time of the first sample that had the pending value, in seconds."""
 
     @property
     def deadline(self) -> float | None:
@@ -28,7 +28,7 @@ class DataChangeFilter:
         return None if self._pending is None else self._since + self._settle_s
 
     def filter(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report: the new sample, an update to the last sample, or None."""
+        """Return the sample to report, with its own or the last reported value; None to report none."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
             self._pending = None

@@ -18,8 +18,8 @@ from urc.protocol.values.decode import Convert, build_converter
 __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
-"""Function that takes a frame's fields and the time. It returns the samples and a message for each
-rejected value."""
+"""Function that takes the fields of a frame and the time of receipt. It returns the samples and a
+message for each rejected value."""
 
 
 class _Computed(NamedTuple):
@@ -97,7 +97,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values from sources other than frames, in the same way as fields."""
+        """Convert values that do not come from a frame, in the same way as a frame's fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -110,7 +110,7 @@ class Readings:
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal, so that it needs `follow`."""
+        """Return whether a formula or a timed alarm needs the signal's samples from `follow`."""
         return name in self._kept
 
     @property
@@ -147,7 +147,7 @@ class Readings:
         return samples
 
     def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
-        """Compute all signals that depend on `samples` and append the new samples to `samples`."""
+        """Compute all signals that depend on `samples`, and append their samples to `samples`."""
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:

@@ -49,7 +49,7 @@ def longest_s(driver: Driver, name: str) -> float:
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the minimum time from a frame or command to a new deadline, in seconds, or 0.
+    """Return the minimum time from a frame or command to a deadline that it sets, in seconds.
 
     The deadlines of replies, polls and stale connections count, but those of sequences and framing
     timeouts do not. The result is 0 if the minimum is unknown.
@@ -95,7 +95,7 @@ def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float
 
 
 def _steps_s(steps: tuple[Step, ...], one_s: Callable[[Step], float]) -> float:
-    """Return the maximum duration of `steps` in seconds, counting every round and both branches."""
+    """Return the maximum duration of `steps` in seconds, with all repetitions and both branches."""
     total_s = 0.0
     for step in steps:
         total_s += one_s(step)
@@ -171,7 +171,7 @@ def lines_of(name: str, driver: Driver) -> frozenset[str]:
 
 
 def needs_readings(driver: Driver) -> bool:
-    """Return whether any of a driver's conditions or steps depends on earlier samples."""
+    """Return whether a driver has conditions or steps that use signals."""
     specs = driver.transports.values()
     return (
         any(

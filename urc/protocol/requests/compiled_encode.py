@@ -32,11 +32,11 @@ _IN_NUMBERS: Final = frozenset(b"0123456789+-.einfa")
 """Bytes that may occur in the text of a number."""
 _MOST_DIGITS: Final = 20
 _LARGEST: Final = 1e308
-"""Maximum finite value, as in `urc.protocol.requests.encode`."""
+"""Maximum value of an argument, as in `urc.protocol.requests.encode`."""
 
 
 class _Unsupported(Exception):
-    """A part of the template cannot be translated to Python."""
+    """The template contains an expression that cannot be translated to Python."""
 
 
 def build_fast_encode(
@@ -87,7 +87,7 @@ def _text_of(
 
 
 def _written(checks: list[str], text: str, encoding: str) -> list[str]:
-    """Return source lines that write `text` if all `checks` are true."""
+    """Return source lines that return `text` as bytes if all `checks` are true."""
     return [
         f"    if {' and '.join(checks)}:",
         "        try:",

@@ -12,16 +12,16 @@ __all__ = ["SignalState", "ConditionScope"]
 
 
 class SignalState:
-    """The newest samples of all signals and the latched STOP."""
+    """The state that conditions use: the newest sample of each signal, and the latched STOP."""
 
     def __init__(self, signals: Mapping[str, Signal], names: Mapping[str, object]) -> None:
         self._signals = signals
         self.names = names
-        """Additional names in conditions, such as ``settings``."""
+        """Values of the additional names in conditions, such as ``settings``."""
         self.latched = ""
         """Reason for refusing autonomous motion; "" if motion is allowed."""
         self.stops = 0
-        """Number of stops. A motion request made before the last stop is not sent."""
+        """Number of stops. A motion command that was requested before the last stop is not sent."""
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
@@ -35,7 +35,7 @@ class SignalState:
             self._last[sample.signal] = sample
 
     def reading(self, name: str, now: float, since: float) -> Sample | None:
-        """Return the newest sample; None if stale at `now` or older than `since`."""
+        """Return the signal's newest sample; None if it is stale at `now` or arrived before `since`."""
         sample = self._last.get(name)
         if sample is None or sample.time_s < since:
             return None

@@ -43,7 +43,7 @@ class Connection:
         """Whether all requests may be sent; otherwise, only login and close requests may be
         sent."""
         self.last_sent = float("-inf")
-        """Time of the last sent frame that resets the robot's watchdog, in seconds."""
+        """Time, in seconds, at which a frame that resets the robot's watchdog was last sent."""
         self.counting: frozenset[str] | None = None
         """Labels of requests that reset the robot's watchdog; None means all requests."""
         self.counters = Counters()
@@ -57,11 +57,11 @@ class Connection:
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)
         self.held = HoldReplies()
-        """Handler for replies to held commands."""
+        """Matching of replies to held commands, which bypass the queue."""
         self.is_behind = False
-        """Whether buffered frames are waiting for `process_frames`."""
+        """Whether received frames remain in the buffer until `process_frames` is called again."""
         self._askers: dict[object, object] = {}
-        """Sequences that made numbered requests, keyed by request number."""
+        """Sequences whose numbered requests are pending, keyed by request number."""
         self._is_leaving = False
         self._misses = 0
         """Number of consecutive missing replies."""
@@ -148,7 +148,7 @@ class Connection:
         return _disconnected(lost, self.receiver.secrets.hide(reason))
 
     def _lost(self) -> list[Exchange]:
-        """Remove and return the requests that fail because the connection is lost."""
+        """Remove and return all requests that fail when the connection is lost."""
         lost = self._pending_replies.drain()
         if not self.is_per_request:
             return lost + self._request_queue.drain()

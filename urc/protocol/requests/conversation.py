@@ -11,8 +11,9 @@ from the oldest to the newest. A request with a correlation accepts only its own
 requests without a correlation, only the oldest accepts the frame, because replies arrive in order.
 Real-time requests have a separate reply order. After its timeout, a request is *late* and stays in
 flight for another reply timeout. A late reply is dropped so that the next request does not accept
-it. Until the late reply arrives or times out, requests with similar replies wait. After
-`MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
+it. Until the late reply arrives or times out, requests whose replies could be confused with it
+wait. After `MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and
+reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,11 +63,12 @@ class Conversation(Connection):
         super().__init__(spec, messages)
         self._gap_s = spec.min_gap_s
         self.is_scripted = False
-        """Whether a running sequence may be waiting for the next frame."""
+        """Whether a sequence is running that may expect the next frame."""
         self._free_at = float("-inf")
-        """Earliest time of the next request after a reply to a motion frame."""
+        """Earliest time, in seconds, of the next request after a reply to a motion frame."""
         self._may_recut = False
-        """Whether a pending reply or step may have a different framing."""
+        """Whether a pending reply or step may declare a framing that differs from the
+        connection's."""
         self._number = 0
         """Number of the last envelope that expects a reply; numbers are never reused."""
 
@@ -261,7 +263,7 @@ class Conversation(Connection):
         return self.process_frames(now)
 
     def process_frames(self, now: float) -> list[LineEvent]:
-        """Process received frames, up to the first frame that a sequence may have expected.
+        """Process received frames, up to and including the first frame that a sequence may expect.
 
         Later frames may belong to the next step, which must first register an expectation.
         """
@@ -331,7 +333,7 @@ class Conversation(Connection):
         return events
 
     def _recut(self) -> None:
-        """Select the framing of a pending reply or step, or else the connection's framing."""
+        """Switch to the framing of a pending reply or step, or else to the connection's framing."""
         framing = (
             self._pending_replies.framing() if self._pending_replies else None
         ) or self.receiver.framing
@@ -488,8 +490,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events for a frame whose match result for a request is `offer`.
 
-        A provisional reply may also be a message. A `frame` of None means that the message has
-        already been reported.
+        A provisional reply may also be a message. If `frame` is None, the frame has already been
+        reported as a message.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []

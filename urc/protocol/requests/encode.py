@@ -1,6 +1,6 @@
 """Validation of command arguments and their encoding as a frame.
 
-Pure. This module checks the arguments from browsers, scripts and tests.
+Pure. All arguments from browsers, scripts and tests are checked here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ from urc.protocol.values.payload import CodecContext, NotWritable
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
 Encode = Callable[[Mapping[str, object]], Payload]
-"""Function that encodes a namespace to framed bytes or an envelope, or raises `BadArgument`."""
+"""Function that encodes the values of a namespace to framed bytes or an envelope."""
 
 _LARGEST = 1e308
 """Maximum finite value. A comparison with this value also rejects infinity and not-a-number."""
@@ -104,7 +104,7 @@ def _checked(argument: Argument, value: object) -> Reading:
 
 
 def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
-    """Return the checked elements of an array."""
+    """Check each element of an array argument; return the elements as a list."""
     name, wanted = argument.name, argument.size
     if not isinstance(value, (list, tuple)):
         raise BadArgument(f"{name}: expected a list, found {quoted(value)}")

@@ -74,21 +74,22 @@ class CompiledRequest(NamedTuple):
     retries: int = 0
     """Maximum number of retries for the request."""
     is_repeated: bool = False
-    """Whether a missing reply causes a retry, as a retransmission request from the robot does."""
+    """Whether a missing reply causes a retry; a retransmission request from the robot always
+    does."""
     retry: Retry = Retry()
-    """Delays before retries of the request."""
+    """Delays before the first retry and all further retries."""
     has_counters: bool = False
     is_motion: bool = False
     """Whether the request moves the robot. Motion requests fail immediately if the connection is
     not ready."""
     learnt: frozenset[str] = frozenset()
-    """Names of the login values that the request's templates use."""
+    """Names of the values read during the login that the request's templates use."""
     is_fresh: bool = False
-    """Whether the request contains the time or a nonce."""
+    """Whether the request contains the time or a nonce, so it is rendered when it is sent."""
     is_local: bool = False
     """Whether the request's templates use only arguments and counters."""
     queue_s: float = 0.0
-    """Maximum time in the queue, in seconds."""
+    """Maximum time for which the request may wait in the queue, in seconds."""
     plain: Matcher | None = None
     """Reader for the reply if the request expects a single frame that contains only samples;
     otherwise None."""
@@ -113,7 +114,7 @@ class CompiledRequest(NamedTuple):
 
     @property
     def is_in_order(self) -> bool:
-        """Whether only the order of replies identifies the reply."""
+        """Whether the request's reply can be identified only by the order of replies."""
         return self.match is None and not self.is_numbered
 
 
@@ -143,7 +144,7 @@ class Exchange:
     unless: Callable[[], str] | None = None
     """Function that returns why the request is obsolete, or ""; evaluated before sending."""
     waits_until = float("-inf")
-    """Earliest time of a retry, in seconds."""
+    """Earliest time at which a retry may be sent, in seconds."""
     on_sent: Callable[[Payload], None] | None = None
     """Callback for each sent payload."""
 

@@ -35,8 +35,8 @@ __all__ = ["FrameReceiver"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Minimum length of a secret for partial redaction. A shorter secret may occur in ordinary words,
-so the whole message is hidden."""
+"""Minimum length of a secret, in bytes, for which only the secret is removed from a message. A
+shorter secret may occur in ordinary words, so the whole message is hidden."""
 
 
 class SentSecrets:
@@ -54,7 +54,7 @@ class SentSecrets:
             self._texts.append(text)
 
     def hide(self, text: str) -> str:
-        """Return a message with secrets redacted."""
+        """Return a message in which secrets that were sent on the connection are redacted."""
         for secret in self._texts:
             if secret in text:
                 text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN
@@ -82,7 +82,8 @@ class FrameReceiver:
         self.replies = Acknowledgements()
         """Acknowledgements to send."""
         self.collectors: list[Collector] = []
-        """Collectors of values from several messages, cleared when the connection is lost."""
+        """Collectors that build values from several messages; they are reset when the connection is
+        lost."""
         self._expectations: list[Expectation] = []
         self._prompt: tuple[Pattern, Expectation] | None = None
         self.is_listening = False
@@ -106,7 +107,7 @@ class FrameReceiver:
             self.secrets = SentSecrets()
 
     def cut_by(self, framing: Framing) -> None:
-        """Switch to `framing`; its decoder begins with the bytes that remain in the buffer."""
+        """Switch to `framing`, whose decoder begins with the bytes that remain in the buffer."""
         if framing is not self._cut_by:
             self._cut(framing)
 
@@ -132,11 +133,11 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return a clause about an unexpected frame during a wait; "" if no frame arrived.
+        """Return a clause about the last unexpected frame since `since`; "" if there was none.
 
         Args:
             since: start time of the wait, in seconds.
-            instead: text to follow "which is" in the clause, such as "no answer to home".
+            instead: words after "which is" in the clause, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -195,7 +196,7 @@ class FrameReceiver:
         return [Matched(expectation, MatchResult({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events for a declared message; None for other frames."""
+        """Return the events for a frame that a declared message matches; None for other frames."""
         taken = self.messages.decode(frame, now)
         return None if taken is None else self.events_of(*taken)
 

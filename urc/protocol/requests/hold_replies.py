@@ -1,8 +1,9 @@
 """Replies to motion frames: acknowledgements and refusals.
 
-Pure. Motion frames bypass the connection's queue and have no `PendingReply`. This module handles
-robots that reply to each frame. An acknowledgement is expected, and a refusal ends the motion. An
-unsolicited refusal, for example because a safety door is open, also ends the motion.
+Pure. Motion frames bypass the connection's queue and have no `PendingReply`. This module matches
+the replies of robots that reply to every motion frame. An acknowledgement is expected, and a
+refusal ends the motion. An unsolicited refusal, for example because a safety door is open, also
+ends the motion.
 
 In half-duplex mode, motion frames wait for a pending reply, and queued requests wait for replies to
 motion frames. The wait for a reply to a motion frame is short, because a lost reply must not
@@ -67,7 +68,7 @@ class HoldReplies:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """Time until which a reply to a motion frame is awaited, in seconds."""
+        """Time until which queued requests wait for a reply to a motion frame, in seconds."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:
@@ -95,7 +96,7 @@ class HoldReplies:
 
         Args:
             now: current time, in seconds.
-            is_owed: whether a reply to another request is pending.
+            is_owed: whether the reply to a queued request is still pending.
         """
         if not is_owed and now >= self.owed_until_s:
             self._waits_since_s = None
@@ -112,7 +113,7 @@ class HoldReplies:
         return now < self._until_s
 
     def refusals(self, frame: Frame, now: float) -> list[HoldRejected]:
-        """Return all held commands that a frame may refuse."""
+        """Return all held commands whose refusal the frame may be."""
         found = [
             HoldRejected(name, offer)
             for name, one in self._listening(now)

@@ -1,8 +1,8 @@
 """Additional effects of messages: values collected from several frames, and acknowledgements.
 
-Pure. Collecting and acknowledging are part of converting fields to samples, so each occurs exactly
-once per message. Incomplete collected values are discarded when the connection is lost.
-Acknowledgements wait in `Acknowledgements` until the conversation has reported the frame.
+Pure. Both effects are part of converting fields to samples, so each occurs exactly once per
+message. Incomplete collected values are discarded when the connection is lost. Acknowledgements
+wait in `Acknowledgements` until the conversation has reported the frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from urc.protocol.values.convert import Unusable
 __all__ = ["Collector", "Acknowledgements", "answering", "collecting"]
 
 MOST_REPLIES: Final = 256
-"""Maximum number of pending acknowledgements; each frame causes at most one acknowledgement."""
+"""Maximum number of pending acknowledgements; each frame adds at most one."""
 
 
 class Acknowledgements(list[Payload | CountedFrame]):
@@ -36,7 +36,7 @@ class Collector:
         self.forget()
 
     def forget(self) -> None:
-        """Reset the collector; without ``begin``, the next frame is the first part of a value."""
+        """Discard the collected parts; if ``begin`` is not declared, the next frame begins a value."""
         self._parts = [] if self._spec.begin is None else None
         self._size = 0
 
@@ -75,7 +75,7 @@ def _holds(condition: Template | None, names: Mapping[str, object]) -> bool:
 
 
 def _joined(parts: list[object]) -> object:
-    """Return the concatenation of bytes or lists, or a list of other values."""
+    """Return bytes or lists joined to one value, and any other values as a list."""
     if parts and all(isinstance(part, bytes) for part in parts):
         return b"".join(part for part in parts if isinstance(part, bytes))
     whole: list[object] = []

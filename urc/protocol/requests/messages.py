@@ -19,7 +19,7 @@ class Messages:
         self.declared = tuple(declared)
 
     def decode(self, frame: Frame, now: float) -> Taken | None:
-        """Return the samples and rejected values of a frame; None if no message matches.
+        """Return the samples and rejected values of a frame; None if no declared message matches.
 
         If a message matches the frame but rejects a value, the reason is stored in `Frame.fault`.
         """

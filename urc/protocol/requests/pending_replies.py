@@ -41,7 +41,7 @@ class PendingReply:
         self.due = now + ask.answers[0].timeout_s
         """Time at which the reply becomes overdue, or a late transmission is removed."""
         self.size = 0
-        """Number of bytes that the request takes in the robot's receive buffer."""
+        """Number of bytes that the request occupies in the robot's receive buffer."""
         self.since = now
         """Start time of the wait for the current reply, in seconds."""
         self.is_extended = False
@@ -55,7 +55,7 @@ class PendingReply:
 
     @property
     def expectation(self) -> Expectation:
-        """Expectation for the current reply, created on demand."""
+        """Collector of the frames of the current reply, created on first use."""
         if self._expectation is None:
             self._expectation = Expectation(self.exchange.ask.answers[self.stage])
         return self._expectation
@@ -75,7 +75,7 @@ class PendingReply:
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
         """Return the match result for a frame; None if the frame answers another request.
 
-        With `is_message`, only provisional and error replies can match.
+        If `is_message` is true, only provisional replies and error replies can match.
         """
         if self.number is not None:
             return None  # its reply would carry the number; see `answer`
@@ -87,14 +87,14 @@ class PendingReply:
         )
 
     def extend(self, now: float) -> None:
-        """Extend the timeout by another reply timeout, up to the driver's limit."""
+        """Restart the reply timeout, but do not exceed the driver's limit on the total wait."""
         answer = self.expectation.answer
         self.is_extended = True
         late_s = answer.timeout_s if self.is_late else 0.0
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return the elapsed reply timeout as text for messages, such as ``within 2 s``."""
+        """Return the time waited in vain as text for messages, such as ``within 2 s``."""
         answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -169,7 +169,8 @@ class PendingReplies(list[PendingReply]):
     def may_confuse(self, exchange: Exchange) -> bool:
         """Return whether a late reply could be mistaken for this request's reply.
 
-        A late reply to an earlier transmission of the same request is acceptable.
+        A late reply to an earlier transmission of the same request does not count, because it is
+        welcome.
         """
         if not (exchange.ask.answers and exchange.ask.is_in_order):
             return False
@@ -205,7 +206,7 @@ class PendingReplies(list[PendingReply]):
         return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
-        """Return the only transmission if its reply contains only samples; otherwise None."""
+        """Return the pending transmission if there is only one and its reply has only samples."""
         if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
             return None
         return self[0]

@@ -13,14 +13,14 @@ from urc.model.payload import Count, FrameVariants, Numbered, Payload
 __all__ = ["RANKS", "REALTIME", "GcraLimiter", "Counters", "FrameCounters", "Made", "PriorityQueue"]
 
 RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
-"""Rank of each priority; requests with a lower rank are sent first."""
+"""Rank of each priority; the request with the lowest rank is sent first."""
 REALTIME: Final = 0
 
 
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass immediately; the average rate stays within the limit. A
+    After a pause, two calls may follow immediately; the average rate stays within the limit. A
     minimum gap between calls would instead delay every slightly early call and so reduce the
     average rate.
     """
@@ -30,7 +30,8 @@ class GcraLimiter:
     def __init__(self, rate_per_s: float) -> None:
         self._period_s = 1 / rate_per_s
         self._next_s = float("-inf")
-        """Time at which the next call is due at a constant rate, in seconds."""
+        """Time at which the next call would be due if calls came at the limit's rate, in
+        seconds."""
 
     @property
     def free_at(self) -> float:
@@ -66,7 +67,7 @@ class FrameCounters:
 
     @property
     def count(self) -> Count:
-        """Changes that the frame makes to the connection's counters."""
+        """Counter numbers before and after the frame."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 
@@ -84,7 +85,7 @@ class Counters:
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """Last number of each counter after all pending frames have been transmitted."""
+        """Number that each counter will have after all pending frames have been transmitted."""
         self._known: Mapping[str, int] = {}
         """Last confirmed number of each counter."""
         self.ahead = 0
@@ -96,7 +97,7 @@ class Counters:
         return FrameCounters(self._last)
 
     def draw_urgent(self) -> FrameCounters:
-        """Return the numbers for a frame that overtakes all pending frames."""
+        """Return the numbers for a frame that is sent before all pending frames, such as a stop."""
         return FrameCounters(self._known)
 
     def count(self, draw: FrameCounters) -> None:
@@ -146,7 +147,7 @@ class Counters:
         return FrameVariants(tuple(frames.values()))
 
     def is_near(self, made: Made, most: int) -> bool:
-        """Return whether fewer than `most` numbers have been used since the series was rendered."""
+        """Return whether fewer than `most` frames have been counted since `made` was rendered."""
         key = tuple(sorted(self._known.items()))
         place = next((at for at, one in enumerate(made) if one == key), most)
         return place + self.ahead < most

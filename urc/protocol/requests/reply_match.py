@@ -84,7 +84,7 @@ class CompiledReply(NamedTuple):
     faults: tuple[tuple[Matcher, Template | None], ...] = ()
     lines: int | Pattern | None = None
     framing: Framing | None = None
-    """Framing of the stream while a step waits; None means the framing of the connection or the
+    """Framing while a step waits for this reply; None means the framing of the connection or the
     request."""
     asides: tuple[tuple[Aside, Matcher], ...] = ()
     """Provisional replies, as pairs of kind and matcher."""
@@ -107,9 +107,9 @@ class MatchResult(NamedTuple):
     told: tuple[Matcher, Fields] | None = None
     """Matcher and fields of a provisional or error reply, for updating signals."""
     aside: Aside | None = None
-    """Kind of the provisional reply; None for other frames."""
+    """Kind of provisional reply that the frame is; None if it is not provisional."""
     dropped: str = ""
-    """Human-readable message about dropped lines; "" means that no lines were dropped."""
+    """Message about lines that were dropped from the reply; "" if no lines were dropped."""
 
 
 _MORE: Final = MatchResult()
@@ -152,7 +152,7 @@ class Expectation:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return the frame that may be a refusal; for a counted reply, return all frames so far."""
+        """Return the frame to check for a refusal; for a reply of N lines, join all lines so far."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):
@@ -226,7 +226,7 @@ def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:
 
 
 def _lacks(text: Template | None, fields: Fields) -> bool:
-    """Return whether the error text requires fields that the frame lacks."""
+    """Return whether the template of the error text uses fields that the frame lacks."""
     return text is not None and not text.names <= {*fields, "settings"}
 
 

@@ -37,8 +37,8 @@ class RequestCompiler:
     """A compiler for the requests of one driver.
 
     Raises:
-        BadArgument: a constant frame contains its own delimiter or cannot be encoded. Every method
-            may raise `BadArgument`.
+        BadArgument: a constant frame contains its own delimiter or cannot be encoded. Every public
+            method may also raise `BadArgument`.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class RequestCompiler:
         matchers: list[Matcher],
         context: CodecContext,
     ) -> None:
-        """Wrap the matchers of messages that have acknowledgements or collected values."""
+        """Add the acknowledgements and collected values that messages declare to their matchers."""
         replies, kept = Acknowledgements(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
@@ -132,7 +132,7 @@ class RequestCompiler:
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
         """Return the compiled request for a step.
 
-        Step requests have normal rank and therefore keep the order of the steps.
+        Requests of steps all have normal rank, so they keep the order of the steps.
         """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 

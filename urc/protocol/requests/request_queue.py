@@ -32,7 +32,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         self._spec = spec
         self._pending_replies = pending_replies
         self.size_of = size_of
-        """Function that returns the size of a request on the wire, in bytes."""
+        """Function that returns the size of a request as sent to the robot, in bytes."""
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
         self.next_send = float("-inf")
         """End time of the minimum gap after the last request, in seconds."""
@@ -90,7 +90,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
-        """Return whether a queued request is waiting only for a connection."""
+        """Return whether a queued request could be sent now if there were a connection."""
         return any(_free_at(exchange) <= now for exchange in self)
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
@@ -99,8 +99,8 @@ class RequestQueue(PriorityQueue[Exchange]):
             return None
         first: float | None = None
         barred_from = float("inf")
-        """Time from which a request that does not fit into the robot's buffer blocks later
-        requests."""
+        """Time from which later requests must wait for a request that does not fit into the robot's
+        buffer."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(
                 exchange
