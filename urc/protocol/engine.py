@@ -137,8 +137,7 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether a condition or step of the driver reads stored samples, so that samples must be
-        stored."""
+        """Whether conditions or steps of the driver may use samples, so samples must be stored."""
 
     # -- methods
 

@@ -6,7 +6,7 @@ __all__ = ["soonest"]
 
 
 def soonest(times: Iterable[float | None]) -> float | None:
-    """Return the earliest of `times`, ignoring None; return None if there are no times."""
+    """Return the earliest of `times`, ignoring None; return None if no time is left."""
     first: float | None = None
     for time in times:
         if time is not None and (first is None or time < first):

@@ -55,7 +55,7 @@ class AlarmStore:
         self.fault = ""
         """Reason why alarms currently cannot be stored, or ""."""
         self.lost = 0
-        """Number of events dropped since the start, because too many were waiting."""
+        """Number of events dropped since the start because too many events were waiting."""
         self._most_events = most_events
         self._known: dict[str, dict[str, AlarmRecord]] | None = None
         """Newest record of each alarm, keyed by robot and signal; None before the first `load`."""
@@ -67,7 +67,7 @@ class AlarmStore:
         self._thread: threading.Thread | None = None
 
     def load(self, robot: str) -> list[AlarmRecord]:
-        """Return a robot's records; [] if the file cannot be read.
+        """Return a robot's stored alarm records; [] if the file cannot be read.
 
         Only the first call reads the file, when the server starts.
         """
@@ -148,7 +148,7 @@ class AlarmStore:
                 base.close()
 
     def _next_batch(self) -> tuple[_Records, list[tuple[str, AlarmEvent]]] | None:
-        """Wait for changes and return them; None once the store is closed and has none left."""
+        """Wait for changes and return them; None if the store is closed and has no more changes."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()

@@ -1,6 +1,6 @@
 """The SQLite file of alarms: the current states of all robots' alarms, and their history.
 
-Layer 4. All functions block, so servers call them in a thread. The states are JSON objects, so a
+Layer 4. All functions block, so servers call them in a thread. Each state is a JSON object, so a
 newer version of URC can add attributes. Older versions skip unknown attributes.
 """
 
@@ -37,7 +37,7 @@ FILE: Final = "alarms.sqlite"
 MOST_EVENTS: Final = 100_000
 """Number of newest events to keep in the history."""
 _SPARE: Final = 1000
-"""Number of events beyond the maximum that triggers a deletion."""
+"""Number of events beyond the maximum at which the oldest events are deleted."""
 _VERSION: Final = 1
 _LONGEST_S: Final = 5.0
 """Maximum duration of one search, in seconds."""
@@ -83,13 +83,14 @@ class AlarmQuery(NamedTuple):
     kinds: tuple[str, ...] = ()
     """Kinds of events; empty for all kinds."""
     signals: tuple[str, ...] = ()
-    """Names of signals that match because their titles contain `text`."""
+    """Names of signals whose titles contain `text`, so that their events match too."""
     since: float = 0.0
     """Start of the period, as UTC time in seconds since 1970."""
     until: float = float("inf")
     """End of the period; events at this time are not included."""
     before: int = 0
-    """Number of an event; only older events are returned. 0 starts with the newest event."""
+    """Number of an event in the history; only older events are returned. 0 starts with the newest
+    event."""
     last: int = 100
     """Maximum number of events."""
 

@@ -1,6 +1,6 @@
 """The writer of the audit log, an SQLite file.
 
-The file records motion and administration, with the person and right behind each event.
+The file records motion and administration: who caused each event, and by which right.
 
 Theory of operation. `AuditLog.add` puts an entry into a short queue and returns. The call never
 waits for a disk, because motion and STOP call `add`. A separate thread writes the queued entries
@@ -36,7 +36,7 @@ MOST_WAITING: Final = 4096
 """Maximum number of queued entries."""
 _BATCH: Final = 512
 _GATHER_S: Final = 0.05
-"""How long entries are collected for one batch, in seconds; one commit writes the whole batch."""
+"""How long the thread collects entries for one batch, in seconds; one commit writes the batch."""
 _RETRY_S: Final = 5.0
 """Delay before the next attempt after a write error, in seconds."""
 _CLOSE_S: Final = 2.0

@@ -3,7 +3,7 @@
 Layer 4. All functions block, so servers call them in a thread.
 
 Each exported line has the link before its entry (``before``) and the entry's own link (``chain``).
-Each line can be checked separately, so an export for selected robots can also be checked. Lines
+Each line can be checked on its own, so an export that omits robots can also be checked. Lines
 with consecutive numbers must also match each other.
 """
 
@@ -23,7 +23,7 @@ from urc.runtime.sqlite_file import opened_for_reading
 __all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "exported", "line_of"]
 
 _AT_ONCE: Final = 500
-"""Number of entries per read transaction, limited so that a slow download does not delay the
+"""Maximum number of entries per read transaction, so that a slow download does not delay the
 writer."""
 _SLICE: Final = 25
 _PAUSE_S: Final = 0.001
@@ -40,11 +40,11 @@ class ExportCheck(NamedTuple):
     fault: str
     """Message about the first invalid entry; "" if the export is intact."""
     gap: str
-    """Message about the first missing entry; exports for selected robots have such gaps."""
+    """Message about the first missing entry, or ""; exports for selected robots have such gaps."""
     last: int = 0
     """Number of the last entry."""
     chain: str = ""
-    """Link of the last entry."""
+    """Link (hash) of the last entry."""
 
 
 def check(file: Path) -> str:

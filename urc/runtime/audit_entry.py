@@ -14,12 +14,12 @@ __all__ = ["AuditEntry", "COLUMNS", "FIRST_COLUMNS", "VERSION", "cleaned", "link
 VERSION: Final = 2
 """Version of the links that this version of URC writes."""
 FIRST_COLUMNS: Final = 13
-"""Number of columns covered by links of version 1."""
+"""Number of columns, from the first, that a link of version 1 covers."""
 _LONGEST_TEXT: Final = 1000
 
 
 class AuditEntry(NamedTuple):
-    """One entry. The caller must remove secrets from all text."""
+    """One entry. The caller must remove secrets from all strings."""
 
     at: float
     """UTC time of the event by this machine's clock, in seconds since 1970."""
@@ -34,7 +34,7 @@ class AuditEntry(NamedTuple):
     client: str = ""
     """Identifier of the page's connection to the server, or of a sign-in."""
     epoch: int = 0
-    """Epoch of the lease at the time of the event."""
+    """Epoch of the robot's lease when the event occurred."""
     command: str = ""
     """Name of the command, or of the action on a person, a package or a recording."""
     arguments: str = ""

@@ -1,4 +1,4 @@
-"""Audit entries for one robot: two per motion, not one per tick.
+"""Write one robot's audit entries: two for each motion, instead of one for each tick.
 
 Layer 4. The module is synchronous: callers pass the current time. The functions never block and
 never raise an exception, because motion code calls them. Each motion has a start entry and an end
@@ -99,7 +99,7 @@ class AuditRecorder:
         self._cause: Operator | None = None
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Also report each entry to the taps of a session's hub.
+        """From now on, also report each entry to the taps of a session's hub.
 
         Passing None as the hub ends the reports.
         """
@@ -142,7 +142,7 @@ class AuditRecorder:
 
     @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
-        """Record a control's stop and the reason for it."""
+        """Record that a control has stopped, and why."""
         motion = self._motions.pop(command, None)
         if motion is None:
             return
@@ -160,7 +160,7 @@ class AuditRecorder:
 
     @_harmless
     def refused(self, client: Operator, about: str, message: str, now: float) -> None:
-        """Record the refusal of a tick or request; `about` names the control or the request."""
+        """Record that a tick or request was refused; `about` names the control or the request."""
         about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
         if count := self._refusals.count((client.id, about, message), now):
             outcome = self._hidden(message)

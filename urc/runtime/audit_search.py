@@ -22,7 +22,7 @@ MOST: Final = 1000
 _LONGEST_S: Final = 5.0
 """Maximum duration of one search, in seconds."""
 _STEPS: Final = 50_000
-"""Number of SQLite steps between two checks of the clock."""
+"""Number of SQLite steps after which a search checks whether it has taken too long."""
 _TEXTS: Final = tuple(name for name in COLUMNS if AuditEntry.__annotations__[name] is str)
 
 
@@ -40,7 +40,7 @@ class AuditQuery(NamedTuple):
     who: str = ""
     """Part of the name or address of a person, device or program, or its complete identifier."""
     what: tuple[str, ...] = ()
-    """Kinds of events; empty for all."""
+    """Kinds of events to find; empty for all kinds."""
     text: str = ""
     """Text to find in any column; the case of ASCII letters is ignored."""
     since: float = 0.0

@@ -1,7 +1,7 @@
 """The SQLite table of the audit log: creation, migration, writing and deletion of old entries.
 
 Layer 4. In a file from an older version, missing columns are added in place. Existing rows keep
-version 1, so their links stay valid. Deleting old entries adds an entry, which contains the link of
+version 1, so their links stay valid. After old entries are deleted, a new entry records the link of
 the last deleted entry. The chain can therefore be checked from its new start.
 """
 
@@ -32,7 +32,7 @@ PRUNED: Final = "pruned"
 """Kind of the entry that records deleted entries."""
 FOLLOWS: Final = "SELECT id, chain FROM entries ORDER BY id DESC LIMIT 1"
 _SHARE: Final = 10
-"""Divisor for the number of rows to delete from a full file: 10 deletes a tenth of the rows."""
+"""Divisor that sets how many rows are deleted from a full file: 10 deletes a tenth of the rows."""
 _TYPES: Final = {"at": "REAL", "epoch": "INTEGER", "times": "INTEGER", "lasted_s": "REAL"}
 _LATER: Final = (
     *(f"{name} TEXT NOT NULL DEFAULT ''" for name in COLUMNS[FIRST_COLUMNS:]),
@@ -58,7 +58,7 @@ class AuditRow(NamedTuple):
     version: int
     """Version of the link."""
     chain: str
-    """Link: the hash of this entry and all earlier entries."""
+    """Link of the entry: a hash that covers this entry and all earlier entries."""
     entry: AuditEntry
 
 
@@ -73,7 +73,7 @@ class Retention(NamedTuple):
     """Number of newest entries to keep regardless of their age. The whole log is therefore not
     deleted, even if the clock jumps ahead by years."""
     group: int = 100
-    """Minimum number of old entries to delete at once."""
+    """Minimum number of expired entries that are deleted together."""
 
 
 def connected(file: Path) -> sqlite3.Connection:
@@ -96,7 +96,7 @@ def connected(file: Path) -> sqlite3.Connection:
 
 
 def select(base: sqlite3.Connection) -> str:
-    """Return the start of a query for `row_of`; the query also works with older tables."""
+    """Return the start of a query whose rows `row_of` can read, even in older tables."""
     has = _columns(base)
     later = [name if name in has else f"'' AS {name}" for name in COLUMNS[FIRST_COLUMNS:]]
     version = "version" if is_migrated(base) else "1 AS version"

@@ -49,7 +49,7 @@ LEFT_OUT: Final = re.compile(
     r"|simulator_host_key|audit-before-\w+\.sqlite|.*\.(?:new|broken)|.*\.sqlite-(?:wal|shm|journal)",
     re.ASCII,
 )
-"""Files that URC recreates, or that belong to only one run of a server."""
+"""Files that are not backed up: URC recreates them, or they belong to one run of a server."""
 MANIFEST: Final = "urc-backup.json"
 MOST_FILES: Final = 20_000
 MOST_BYTES: Final = 2_000_000_000
@@ -58,7 +58,7 @@ _MANIFEST_BYTES: Final = 4096
 _BLOCK: Final = 1 << 20
 _END_BYTES: Final = 22
 _ENTRY_BYTES: Final = 512
-"""Maximum size of one entry in the archive's directory, in bytes."""
+"""Average size that the entries of the archive's directory may have, in bytes."""
 _DAMAGE: Final = (
     zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, RuntimeError, OverflowError,
 )  # fmt: skip
@@ -68,7 +68,7 @@ _PRIVATE: Final = 0o600
 
 
 class BackupError(UrcError):
-    """The backup cannot be written, read or restored."""
+    """A backup cannot be written, read or restored; the message states the reason."""
 
 
 class BackupManifest(msgspec.Struct, frozen=True):
@@ -113,7 +113,7 @@ def parts_in(data: Path) -> tuple[list[str], list[str]]:
 def write_backup(data: Path, file: Path, manifest: BackupManifest) -> tuple[list[str], list[str]]:
     """Write a backup of a data folder; return the files in the backup and the unknown files.
 
-    The archive appears only when it is complete, and only its owner can read it.
+    The file gets its name only when it is complete, and only its owner can read it.
 
     Args:
         data: the data folder.
@@ -160,7 +160,7 @@ def _write_parts(archive: zipfile.ZipFile, data: Path, work: Path) -> tuple[list
 
 @contextmanager
 def _still(packages: Path) -> Iterator[None]:
-    """Prevent other processes from changing the installed packages."""
+    """Keep other processes from changing the installed packages while the context is open."""
     if not packages.is_dir():
         yield
         return

@@ -17,7 +17,7 @@ class Timer(Protocol):
 
 
 class Clock(Protocol):
-    """The only source of time for all code that runs a robot."""
+    """The interface of clocks; all code that runs a robot gets the time only from a clock."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -46,7 +46,7 @@ class LoopClock:
 
 
 class PeriodicTimer:
-    """A timer that repeats an action.
+    """A timer that calls an action repeatedly.
 
     The action returns the number of seconds until its next call, or None to end the timer.
     """

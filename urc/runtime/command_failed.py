@@ -1,7 +1,7 @@
 """The failure of a command.
 
-Layer 4. The exception has a separate module, so that clients of a server can import it without the
-engine.
+Layer 4. The module contains only this exception, so that clients of a server can import it without
+the engine.
 """
 
 from urc.problems import UrcError

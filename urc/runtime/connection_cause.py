@@ -1,7 +1,7 @@
 """The causes of failed connections, each with advice for the operator.
 
-Layer 4. Pure. Transports report errors in the words of the operating system or a library. The table
-recognises the usual errors for all pages. Pages translate a cause by its name
+Layer 4. Pure. Transports pass on error messages of the operating system or of a library. The table
+recognises the usual messages, on behalf of all pages. Pages translate a cause by its name
 (`core/connection_causes.js`).
 """
 
@@ -34,7 +34,7 @@ class _CauseRow(NamedTuple):
     """Lower-case words; the row applies if the error message contains one of them."""
     advice: str
     address: str = ""
-    """Prefix of the addresses to which the row applies; "" means all addresses."""
+    """Beginning of the addresses to which the row applies; "" means all addresses."""
 
 
 CAUSES: Final = (
@@ -108,7 +108,8 @@ CAUSES: Final = (
 
 
 _NAMES: Final = re.compile(r"'[^']*'|[^\s:]+:\d+")
-"""Pattern for quoted names and addresses with a port, which must not be mistaken for causes."""
+"""Pattern of quoted names, and of addresses with a port; words in them must not be taken for
+causes."""
 
 
 def cause_of(text: str, address: str = "") -> Cause:

@@ -1,8 +1,8 @@
 """The times at which each robot was last used and last sent data, stored across restarts.
 
 Layer 4. The store keeps the times in memory. The method `save` writes a small file and may block,
-so the server calls `save` in a thread. If the file is lost, only the order of the robots in the
-menu changes.
+so the server calls `save` in a thread. Losing the file changes only the order of the robots in the
+menu.
 """
 
 import logging
@@ -32,7 +32,8 @@ class ContactTimes(NamedTuple):
     """UTC time at which a page or program last used the robot, in seconds since 1970; None means
     never."""
     seen_at: float | None = None
-    """UTC time at which a connection to the robot was last live; None means never."""
+    """UTC time at which a connection to the robot was last live, in seconds since 1970; None means
+    never."""
 
     @property
     def newest(self) -> float:
@@ -60,12 +61,13 @@ class ContactStore:
     """
 
     def __init__(self, file: Path | None = None) -> None:
-        """Read the file; a missing or damaged file counts as empty. None means no file."""
+        """Read the file, which counts as empty if missing or damaged; None stores no times."""
         self._file = file
         self._times: dict[str, ContactTimes] = {}
         self._is_changed = False
         self._lock = threading.Lock()
-        """Lock that lets only one thread write the file at a time."""
+        """Lock held while the file is written, so that two threads do not write it at the same
+        time."""
         if file is not None:
             self._load(file)
 

@@ -14,7 +14,7 @@ __all__ = ["Coverage", "Exercised", "measure", "summary"]
 
 _KINDS: Final[tuple[Kind, ...]] = ("command", "poll", "message")
 _NAMED_MOST: Final = 3
-"""Maximum number of names in the summary; a longer list is replaced by counts."""
+"""Maximum number of names in the summary; if there are more, it states their number instead."""
 
 
 class Coverage(NamedTuple):
@@ -38,7 +38,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return a short summary of the untested parts, or "" if everything is tested."""
+    """Return a short list of the untested commands, polls and messages; "" if there are none."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

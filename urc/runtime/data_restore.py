@@ -4,9 +4,9 @@ Layer 4. The files are extracted and checked in a separate folder, ``restoring-â
 files move to ``replaced-â€¦``, and the new files replace them. After an error, the old files are
 moved back.
 
-A STOP that is latched in the data folder or in the backup is latched afterwards. Block lists that
-are newer than the backup's stay in force. A replaced audit log stays in the data folder under
-another name.
+After the restore, every STOP is latched that was latched in the data folder or in the backup. If
+the data folder has a newer block list than the backup, the newer block list stays in force. A
+replaced audit log stays in the data folder under another name.
 """
 
 import json
@@ -32,7 +32,7 @@ __all__ = ["check_target", "is_interrupted", "restore"]
 _LATCHES: Final = "latches"
 _PACKAGES: Final = "packages"
 _SIDE_FILES: Final = ("-wal", "-shm", "-journal")
-"""Suffixes of the files that SQLite stores next to a database."""
+"""Suffixes of the additional files that SQLite writes for a database."""
 _LATCH_BYTES: Final = 4096
 _OLD: Final = "replaced-????????"
 """Pattern for the names of the folders that contain replaced files."""
@@ -125,7 +125,7 @@ def _check_base(file: Path) -> None:
 
 
 def _merge_latches(new: Path, old: Path) -> None:
-    """Keep stopped robots stopped, and never decrease the epoch of a lease."""
+    """Latch each STOP that is latched in either folder, and keep the higher epoch of each lease."""
     for kept in old.rglob("*.latch.json"):
         restored = new / kept.relative_to(old)
         now, then = _latch(kept), _latch(restored)
@@ -138,7 +138,7 @@ def _merge_latches(new: Path, old: Path) -> None:
 
 
 def _merge_blocks(new: Path, old: Path) -> None:
-    """Keep the newer version of each block list."""
+    """Keep the newer of the two versions of each block list."""
     try:
         known = BlockStore(old).all()
     except PackageError:

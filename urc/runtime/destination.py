@@ -27,14 +27,15 @@ _MANNERS: Final = frozenset(
         "replies",
     )
 )
-"""Transport options that do not affect the destination. Any other option, including those of
-third-party transports, counts as part of the destination."""
+"""Transport options that do not affect the destination. All other options, including those of
+third-party transports, are part of the destination."""
 
 
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:
     """Return a digest of a robot's destinations with the given settings.
 
-    Versions of a package with the same transports and destinations have the same digest.
+    Two versions of a package have the same digest if their transports and destinations are the
+    same.
 
     Args:
         profile: profile with the transports.

@@ -28,7 +28,7 @@ class DataChangeFilter:
         return None if self._pending is None else self._since + self._settle_s
 
     def filter(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report, with its own or the last reported value; None to report none."""
+        """Return the sample to report, with its own or the last reported value, or None."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
             self._pending = None

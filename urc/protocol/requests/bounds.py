@@ -171,7 +171,7 @@ def lines_of(name: str, driver: Driver) -> frozenset[str]:
 
 
 def needs_readings(driver: Driver) -> bool:
-    """Return whether a driver has conditions or steps that use signals."""
+    """Return whether a driver has conditions or steps that may use signals."""
     specs = driver.transports.values()
     return (
         any(

@@ -35,7 +35,7 @@ class SignalState:
             self._last[sample.signal] = sample
 
     def reading(self, name: str, now: float, since: float) -> Sample | None:
-        """Return the signal's newest sample; None if it is stale at `now` or arrived before `since`."""
+        """Return the newest sample; None if it is stale at `now` or arrived before `since`."""
         sample = self._last.get(name)
         if sample is None or sample.time_s < since:
             return None

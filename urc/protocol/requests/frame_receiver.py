@@ -35,7 +35,7 @@ __all__ = ["FrameReceiver"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Minimum length of a secret, in bytes, for which only the secret is removed from a message. A
+"""Minimum length of a secret, in characters, for which only the secret is removed from a message. A
 shorter secret may occur in ordinary words, so the whole message is hidden."""
 
 

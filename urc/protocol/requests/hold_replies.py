@@ -68,7 +68,7 @@ class HoldReplies:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """Time until which queued requests wait for a reply to a motion frame, in seconds."""
+        """Time until which other frames wait for a reply to a motion frame, in seconds."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:

@@ -36,7 +36,7 @@ class Collector:
         self.forget()
 
     def forget(self) -> None:
-        """Discard the collected parts; if ``begin`` is not declared, the next frame begins a value."""
+        """Discard the collected parts; without ``begin``, the next frame begins a new value."""
         self._parts = [] if self._spec.begin is None else None
         self._size = 0
 

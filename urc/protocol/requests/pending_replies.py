@@ -169,8 +169,8 @@ class PendingReplies(list[PendingReply]):
     def may_confuse(self, exchange: Exchange) -> bool:
         """Return whether a late reply could be mistaken for this request's reply.
 
-        A late reply to an earlier transmission of the same request does not count, because it is
-        welcome.
+        A late reply to an earlier transmission of the same request does not count, because it
+        answers the request.
         """
         if not (exchange.ask.answers and exchange.ask.is_in_order):
             return False

@@ -152,7 +152,7 @@ class Expectation:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return the frame to check for a refusal; for a reply of N lines, join all lines so far."""
+        """Return the frame to check for a refusal; in a reply of N lines, all lines so far."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):

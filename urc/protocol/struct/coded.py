@@ -30,11 +30,11 @@ Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
-"""Key in `out` for the error of the first invalid item; no item has this name."""
+"""Key in `out` under which the first invalid item's error is stored; no item has this name."""
 
 
 class OtherFrame(Exception):
-    """The received bytes do not match the declared frame."""
+    """The received bytes are not the declared frame, so another declaration may match."""
 
 
 def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
@@ -62,7 +62,7 @@ def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
 
 
 def coded_step(item: Item) -> Step:
-    """Return the step that reads a number with a special encoding."""
+    """Return the step that reads a number with a special encoding into its field."""
     read, meaning, const, name = coded_reader(item.number), meaning_of(item), item.const, item.id
 
     def step(data: bytes, at: int, end: int, out: Out) -> int:

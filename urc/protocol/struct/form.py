@@ -69,7 +69,7 @@ class StructWriter:
 
 
 def _with_counters(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], dict[str, str]]:
-    """Return the items, with an id for each counter, and a mapping from the ids to ``seq.NAME``."""
+    """Give each counter an id; return the items, and the names ``seq.NAME`` keyed by these ids."""
     named, counters = list(items), dict[str, str]()
     for place, item in enumerate(items):
         counter = counter_in(item.value.source) if item.value is not None else ""

@@ -16,7 +16,7 @@ LARGEST_FRAME = 1 << 20
 
 
 GAP = "gap of "
-"""Prefix of a gap's key in the scope, before the item id; ids contain no spaces."""
+"""Prefix that a gap's key has in the scope, before the item's id; no id contains a space."""
 
 
 class Backpatch(NamedTuple):
@@ -78,7 +78,7 @@ def evaluate(template: Template, scope: Scope) -> Any:
 
 
 def solved(expression: Template, only: str, number: int, name: str) -> int:
-    """Solve the linear equation `expression` = `number` for the variable `only`."""
+    """Return the value of the variable `only` at which the linear `expression` equals `number`."""
     at_zero = evaluate(expression, {only: 0})
     slope = evaluate(expression, {only: 1}) - at_zero
     solution = round((number - at_zero) / slope) if slope else 0

@@ -45,10 +45,11 @@ __all__ = [
 Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
-"""Function that returns a size or count (-1 means up to the end) and the start of the data."""
+"""Function that returns a size or count (-1: up to the end) and the offset at which the data
+starts."""
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
-"""A part of ``bits``: item, shift, mask, sign bit (0 if unsigned) and decoding function."""
+"""One number inside a ``bits`` item: item, shift, mask, sign bit (0 if unsigned) and decoder."""
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
@@ -74,7 +75,7 @@ def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | 
 
 
 def build_steps(items: tuple[Item, ...], encoding: str) -> tuple[Step, ...]:
-    """Return the steps for the items at one level."""
+    """Return one step for each item of a frame or of an inner struct."""
     return tuple(build_step(item, encoding) for item in items)
 
 
@@ -130,7 +131,7 @@ def _number_step(item: Item, encoding: str) -> Step:
 
 
 def const_of(item: Item) -> Any:
-    """Return the constant as it is read back from a frame; 0.1 in 32 bits is not exactly 0.1."""
+    """Return a constant as a frame returns it: 0.1 in 32 bits is not exactly 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
     return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)

@@ -1,6 +1,6 @@
 """Generated functions that read struct items, one per declaration.
 
-Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python code. The
+Pure. Each run of fixed items becomes one `struct.Struct` and Python code without loops. The
 closures of `urc.protocol.struct.read` read all other items. Tests require equal results from the
 generated functions and the closures.
 """
@@ -52,7 +52,7 @@ def _is_open_end(item: Item) -> bool:
 def add_fixed(
     source: SourceBuilder, items: tuple[Item, ...], encoding: str, data: str
 ) -> tuple[list[str], dict[str, str]] | None:
-    """Add source that unpacks a frame of items with fixed positions; return None if impossible.
+    """Add source that unpacks a frame; return None unless all items have fixed positions.
 
     Args:
         source: builder of a function that returns None for a non-matching frame.
@@ -126,7 +126,7 @@ def _add_leaf(
     lines: list[str],
     fields: list[str],
 ) -> None:
-    """Add the source lines and the ``'name': value`` pairs of one item."""
+    """Add the source lines of one item to the lists, and its ``'name': value`` pairs."""
     item = leaf.item
     if item.kind == "bits":
         for part, shift, mask, sign, _ in leaf.bit_parts():

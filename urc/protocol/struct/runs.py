@@ -19,13 +19,13 @@ MOST_IN_A_RUN = 256
 
 
 class FixedField(NamedTuple):
-    """A fixed item in a run."""
+    """An item of fixed size in a run, with its field name and format characters."""
 
     item: Item
     name: str
     """Name of the field, including the names of outer structs; "" if the item has no field."""
     outer: str
-    """Joined names of the outer structs."""
+    """Names of the outer structs, joined to one prefix; "" outside structs."""
     code: str
     """Format characters for `struct`; "x" means that the item has no value."""
     endian: Literal["", "big", "little"] = ""

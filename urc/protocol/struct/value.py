@@ -1,4 +1,4 @@
-"""Conversion between raw forms and values of struct items.
+"""Conversion of struct items from their raw form to a value, and back.
 
 Pure. The closures and the slow paths of generated functions share the conversions in this module.
 The raw form of an item is the number or the bytes in the frame. The value of an item is a field or
@@ -120,7 +120,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function from a value to its raw number and the value of that raw number."""
+    """Return a function that converts a value to a raw number and that number's exact value."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
@@ -209,7 +209,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes for a string of hex digits."""
+    """Convert a string of hex digits to bytes; raise `NotWritable` for any other value."""
     try:
         return bytes.fromhex(text)
     except ValueError:

@@ -1,9 +1,9 @@
 """Closures that write the values of struct items as bytes.
 
 Pure. These closures are the inverse of the closures in `urc.protocol.struct.read`. Theory of
-operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values
-leave a gap in the frame until the missing number can be computed. Gaps for the size of a later item
-are stored in the scope. Gaps for values that depend on the size of the whole frame are stored in
+operation: every item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of items
+leave a gap in the frame until their number can be computed. Gaps for the size of a later item are
+stored in the scope. Gaps for values that depend on the size of the whole frame are stored in
 `FrameBuilder.late`.
 """
 
@@ -54,7 +54,7 @@ WriteStep = Callable[[FrameBuilder, Scope], None]
 
 
 class StructWriteScope(NamedTuple):
-    """The shared context of all steps in one scope."""
+    """Settings that all steps of one frame or inner struct share."""
 
     encoding: str
     derived: Mapping[str, Template]
@@ -66,7 +66,7 @@ class StructWriteScope(NamedTuple):
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps that write the items in a separate scope."""
+    """Return the steps that write items whose sizes and counts refer only to each other."""
     rules = StructWriteScope(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 
@@ -246,7 +246,7 @@ def _put_size(
     name: str,
     rules: StructWriteScope,
 ) -> None:
-    """Write the size or count `number`, or check `number` against the declared size."""
+    """Write the size or count `number` into its field, or compare it with the declared size."""
     if extent.prefix is not None:
         builder.append(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
@@ -313,8 +313,8 @@ def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep
 def _records_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep:
     """Return the step for a list of nameless structs with different signals.
 
-    Each case with a complete set of fields becomes one struct. Without a switch, the list has at
-    most one struct.
+    Each case of the switch whose fields all have values becomes one struct. Without a switch, the
+    list has at most one struct.
     """
     own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})
     body = _struct_step(item._replace(times=None), own)

@@ -33,7 +33,7 @@ Write = Callable[[Mapping[str, object]], bytes]
 def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
     """Return a function that encodes arguments to a frame, or raises `NotWritable`.
 
-    The generated code works only for valid values. After an error, the closures encode the frame
+    The generated code handles only valid values. After an error, the closures encode the frame
     again. The closures round and convert values, and report invalid values.
     """
     steps = build_write_steps(items, encoding, is_lenient=False)
@@ -62,7 +62,7 @@ def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
 
 
 def _is_quick(leaf: FixedField) -> bool:
-    """Return whether an item can be written independently of other items."""
+    """Return whether an item can be written without the values of other items."""
     item = leaf.item
     inner = item.items if item.kind == "bits" else (item,)
     if any(one.value is not None for one in inner):
@@ -71,7 +71,7 @@ def _is_quick(leaf: FixedField) -> bool:
 
 
 def _written(source: SourceBuilder, leaf: FixedField, encoding: str) -> list[str]:
-    """Return the source for one item's ``pack`` arguments."""
+    """Return the source of the arguments of ``pack`` for one item."""
     item = leaf.item
     if item.kind == "padding":
         return []

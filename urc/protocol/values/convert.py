@@ -1,7 +1,7 @@
 """Conversion of raw values to typed values, and the inverse conversion for emulated robots.
 
 Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
-the result of the previous function. The result None means "not available" and ends the chain.
+the result of the function before it. The result None means "not available" and ends the chain.
 """
 
 import math
@@ -28,7 +28,7 @@ __all__ = [
 Step = Callable[[object], object]
 
 _LARGEST: Final = sys.float_info.max
-"""Maximum magnitude of whole numbers in conversions."""
+"""Largest absolute value of a whole number that a conversion accepts."""
 _DIGITS: Final = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
 
@@ -38,7 +38,7 @@ class BadValue(ValueError):
 
 
 class Unusable:
-    """A marker for a field that could not be converted, with the reason."""
+    """A marker in place of the value of a field that could not be converted, with the reason."""
 
     __slots__ = ("why",)
 
@@ -249,7 +249,7 @@ def _line(offset: float, scale: float) -> Step:
 
 
 def divisor_of(scale: float) -> int:
-    """Return n if `scale` is 1/n, else 0.
+    """Return n if `scale` is 1/n with a whole number n, else 0.
 
     Division is more accurate than multiplication: 3 / 10 is 0.3, but 3 * 0.1 is not.
     """

@@ -1,8 +1,8 @@
 """Decoding of raw fields into typed values.
 
 Pure. Each engine builds the converters once per signal. A value of the wrong type or outside its
-range counts as a violation and never becomes a sample. On a screen, a wrong number would be worse
-than an old number.
+range counts as a violation and never becomes a sample. For an operator, a wrong number on the
+screen is worse than an old one.
 """
 
 import math
@@ -68,7 +68,7 @@ def _usable(convert: Callable[[object], Reading]) -> Convert:
 
 
 def _element_converter(signal: Signal) -> Callable[[object], Value]:
-    """Return the converter for a single value or one element of an array."""
+    """Return the function that converts a single value, or one element of an array."""
     kind = signal.items if signal.type == "array" else signal.type
     conversion = build_conversion(signal.conversion)
     typed = _typed_converter(signal, kind, rounds=bool(conversion))

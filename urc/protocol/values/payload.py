@@ -42,9 +42,10 @@ class Frame:
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Reason why a reader rejected a value in the frame; unset if no reader rejected a value."""
+    """Reason why a reader rejected a value in the frame; not set if no value was rejected."""
     was_text_wanted: bool
-    """Whether a reader needed the text of an undecodable frame; unset if no reader needed it."""
+    """Whether a reader needed the text, although it cannot be decoded; not set if no reader needed
+    it."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
@@ -77,7 +78,7 @@ class Frame:
 
 
 class CodecContext(NamedTuple):
-    """Properties of the connection that readers and writers need."""
+    """Encoding, settings and other properties of a connection, for its readers and writers."""
 
     encoding: str = "utf-8"
     settings: Mapping[str, object] = NOTHING
@@ -106,4 +107,4 @@ class PayloadWriter(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of top-level names for which `write` returns this frame, or None."""
+        """Return the values, keyed by name, for which `write` returns this frame, or None."""

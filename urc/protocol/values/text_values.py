@@ -13,7 +13,7 @@ _COUNTER = re.compile(r"\s*seq\s*\(\s*['\"]([a-z][a-z0-9_]*)['\"][^()]*\)\s*")
 
 
 def counter_in(expression: str) -> str:
-    """Return the counter's name if an expression is a single counter, else ""."""
+    """Return the counter's name if an expression is only a counter, else ""."""
     found = _COUNTER.fullmatch(expression)
     return found[1] if found else ""
 
@@ -36,7 +36,7 @@ def encoded(text: str, encoding: str) -> bytes:
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
-    """Return the first field whose value differs after a frame is read back, or ""."""
+    """Return the first field whose value differs when the frame is read back; "" if none does."""
     for name, value in fields.items():
         if found is None or field_text(found.get(name)) != field_text(value):
             return name

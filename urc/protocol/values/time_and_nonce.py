@@ -1,7 +1,7 @@
 """Times and nonces for sent frames.
 
 Pure. The sources of times and nonces are passed in: a clock and a random generator for a robot, and
-fixed sources for tests. With fixed sources, URC always encodes a document's frames identically.
+fixed sources for tests. With fixed sources, a document's frames always have the same bytes.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ class TimeAndNonce(NamedTuple):
     unix_s: Callable[[], float]
     """Function that returns the Unix time, in seconds."""
     random: Callable[[int], bytes]
-    """Function that returns a given number of random bytes, different for each call."""
+    """Function that returns a given number of random bytes, different at each call."""
 
     def names(self) -> dict[str, object]:
         """Return the namespace for one frame; all its expressions get the same time and nonce."""

@@ -21,7 +21,7 @@ __all__ += ["elements_of", "object_converter"]
 MAX_ELEMENTS = 65536
 """Maximum number of elements in an array."""
 MAX_BYTES = 1 << 24
-"""Maximum size of an image or blob without a declared ``size``, in bytes."""
+"""Maximum size of an image or blob if ``size`` is not declared, in bytes."""
 _BETWEEN = re.compile(r"[\s,;]+")
 _AROUND = " \t\r\n[]()"
 
@@ -64,7 +64,7 @@ def elements_of(raw: object) -> list[object] | tuple[object, ...]:
 
 
 def object_converter(raw: object) -> Reading:
-    """Return a mapping unchanged; raise `BadValue` for other types."""
+    """Return a mapping or None unchanged; raise `BadValue` for any other value."""
     if raw is None or isinstance(raw, Mapping):
         return raw
     raise BadValue(f"{quoted(raw)} is not a mapping")

@@ -1,4 +1,4 @@
-"""Received text that is compared in a correlation. Pure."""
+"""The type of received text in the expressions that match a reply to its request. Pure."""
 
 __all__ = ["WireText"]
 
