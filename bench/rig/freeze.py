@@ -35,8 +35,8 @@ begins."""
 STOP_MS: Final = 200.0
 """Longest allowed time from the end of the freeze to the stop, in milliseconds."""
 REVIVED_MS: Final = 1000.0
-"""Longest allowed time from the start of a new program to the stop, in milliseconds; the limit of
-`bench.rig.kinds` for transports that take long to open."""
+"""Longest allowed time from a new program's start to the stop, in milliseconds; same limit as
+in `bench.rig.kinds` for slow transports."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0

@@ -38,7 +38,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return a short list of the untested commands, polls and messages; "" if there are none."""
+    """Return the untested commands, polls and messages as short text; "" if all are tested."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

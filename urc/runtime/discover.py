@@ -32,7 +32,7 @@ _PLAIN = re.compile(r"std_msgs/(?:msg/)?(?:Bool|String|Float\d+|U?Int\d+)")
 
 
 class RosTopic(NamedTuple):
-    """A topic with at least one publisher or subscriber."""
+    """A topic of the robot that has at least one publisher or subscriber."""
 
     name: str
     type: str
@@ -40,7 +40,7 @@ class RosTopic(NamedTuple):
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Query rosapi for all topics; this function opens and closes the rosbridge transport.
+    """Open the rosbridge transport, ask rosapi for all topics, and close the transport.
 
     Raises:
         TransportError: the bridge or rosapi does not respond, or the reply contains no topics.

@@ -3,9 +3,9 @@
 Layer 4. The module uses neither I/O nor asyncio, so `urc validate` needs no robot, network or
 secret.
 
-A test runs either in a single instant or step by step on a simulated clock. In a one-instant test,
-the driver sends nothing automatically. In a test with steps, the whole driver runs, except polls
-that the test does not name.
+A test runs either in a single instant or step by step on a simulated clock. In a test that runs in
+a single instant, the driver sends only what the test requests. In a test with steps, the whole
+driver runs, except polls that the test does not name.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ __all__ = ["TestReport", "exercise", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
-"""Maximum number of deadlines to handle while waiting for a declared failure."""
+"""Maximum number of deadlines that a test waits for its declared failure."""
 
 
 class TestReport(NamedTuple):
@@ -111,7 +111,7 @@ def _run(
 
 
 def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
-    """Return the requests of a one-instant test, even if the test fails before sending them."""
+    """Return the requests that a one-instant test makes, even if it fails before they are sent."""
     asked: set[Exercised] = set()
     if isinstance(test.reply_to, int):
         poll = driver.polls[test.reply_to]
@@ -127,8 +127,8 @@ def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
 def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
     """Return a copy of the driver with only the polls that the test names.
 
-    In a one-instant test, polls are due immediately. A test without a request checks unsolicited
-    frames and connection steps.
+    In a one-instant test, polls are due immediately. If a test makes no request, the driver keeps
+    its connection steps and keepalives, because the test may check them.
     """
     if test.steps:
         polls = tuple(poll for poll in driver.polls if poll.name in test.polls)
@@ -238,7 +238,7 @@ def _act(trial: TestEngine, step: DialogueStep) -> None:
 
 
 def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
-    """Return the failure messages after a step."""
+    """Check one step's expectations, and return a message for each failure."""
     complaints: list[str] = []
     if step.fails:
         complaints += _check_told(trial, step)
@@ -274,7 +274,7 @@ def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return a copy of the driver without connection steps or unsolicited frames.
+    """Return a copy of the driver without connection steps, keepalives and ``stale_after``.
 
     Args:
         driver: the loaded driver.

@@ -15,7 +15,7 @@ _State = tuple[int, int, int] | None
 
 
 class FileWatcher:
-    """The last known state of each watched file."""
+    """A watch for changed files, which stores the last known state of each file."""
 
     def __init__(self, files: Iterable[str]) -> None:
         self._states = {file: _state(file) for file in files}
@@ -31,7 +31,7 @@ class FileWatcher:
         return [file for file, state in self._states.items() if _state(file) != state]
 
     def states(self) -> list[object]:
-        """Return the state of every file; equal results mean that the files are unchanged."""
+        """Return the current state of each file; if two results are equal, no file has changed."""
         return [_state(file) for file in self._states]
 
 

@@ -22,7 +22,8 @@ from urc.runtime.transport_chain import BuiltTransport, make_lines
 __all__ = ["start_guard_client"]
 
 _SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
-"""Transport types that are not reset immediately, because opening them is slow or may fail."""
+"""Transport types that are not reset at once when they stall, because reopening is slow or may
+fail."""
 
 _SOONER: Final = 0.9
 
@@ -69,7 +70,7 @@ def _held(command: Command, driver: Driver) -> HeldSpec:
 
 
 def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether a stalled transport gets extra time instead of an immediate reset."""
+    """Return whether a stalled transport is given extra time instead of being reset at once."""
     said = {
         one.hold.on_stall
         for one in driver.commands.values()
@@ -84,8 +85,8 @@ def _silent_s(spec: TransportSpec) -> float | None:
     """Return how long a transport may be silent during motion, in seconds; None means no limit.
 
     The result is slightly shorter than the engine's timeout, so that the engine's output does not
-    queue up behind the motion frames. A connectionless transport has no send buffer that a reset
-    could discard.
+    queue up behind the motion frames. Transports without a connection have no limit, because a
+    reset would not discard any unsent data.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

@@ -46,7 +46,7 @@ class MotionFrames(Protocol):
 
 
 class MotionBackend(Protocol):
-    """The interface to the writer of motion frames: a guard process or a guard in this process."""
+    """The interface of the guard that writes motion frames, in this process or its own process."""
 
     def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks of `command` from now on, with the stop frame and time limits in `terms`."""
@@ -64,7 +64,7 @@ class MotionBackend(Protocol):
         """Return whether `command` may still move the robot, or its stop may still be repeated."""
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may still move the robot, as no stop is known to be sent."""
+        """Return whether `command` may still move the robot, because its stop may be unsent."""
 
     def is_open(self, command: str) -> bool:
         """Return whether the transport of `command` is connected, as last reported."""
@@ -109,15 +109,15 @@ class HeldControl:
     """Minimum interval between two frames of the command, in seconds."""
     slew: SlewRateLimiter | None
     defaults: Mapping[str, Reading]
-    """Default values of the arguments with a slew rate limit."""
+    """Default value of each argument whose slew rate is limited, keyed by argument."""
     needs_ready_line: bool
-    """Whether to repeat a stop that was sent before its transport was ready."""
+    """Whether a stop that is sent before the transport is ready must be repeated."""
     is_armed: bool = False
     is_lasting: bool = False
     """Whether the stop frame stays the same while the command is armed."""
     motion_state: Literal["rest", "moving", "ending"] = "rest"
-    """``ending`` means that the control has been released, but the stop has not yet been
-    reported as written."""
+    """``ending``: the control has been released, but its stop has not yet been reported as
+    written."""
     stop: Payload | FrameVariants | None = None
     """Stop frame of the command that was last passed to the motion backend."""
     is_owed_again: bool = False
@@ -136,7 +136,7 @@ class HeldControl:
     def close(self, why: str, epoch: int) -> None:
         """Refuse ticks until the control is released and the lease is newer than `epoch`.
 
-        The first reason is kept, because later reasons are consequences of the first.
+        Only the first reason is stored, because later reasons usually follow from it.
         """
         if not self.needs_release:
             self.why = why

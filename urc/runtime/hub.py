@@ -39,16 +39,16 @@ __all__ = [
 
 
 STREAM_KEPT: Final = 500
-"""Number of stored readings per streamed signal."""
+"""Maximum number of readings that are stored for each streamed signal."""
 
 
 class SampleHistory:
-    """The last readings of selected signals, each with the hub revision at which it arrived."""
+    """The newest readings of selected signals, each with the hub revision in which it arrived."""
 
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
         self._counts: dict[str, int] = {}
-        """Total number of readings per signal, by name."""
+        """Number of readings stored so far, also if since dropped, keyed by signal."""
 
     def __bool__(self) -> bool:
         return bool(self._kept)
@@ -108,13 +108,13 @@ class LinkStatus:
     since_s: float
     """Monotonic time at which the current state began, in seconds."""
     detail: str = ""
-    """Reason for an abnormal state, in one line."""
+    """Reason for the state, in one line; "" in a normal state."""
     attempts: int = 0
     """Number of failed attempts since the last valid frame."""
     faults: int = 0
     """Number of protocol violations since the session began."""
     is_ready: bool = False
-    """Whether the connection is open and its login has ended, even if no data has arrived yet."""
+    """Whether the connection is open and its login is complete, even if no data has arrived yet."""
 
     @property
     def is_opening(self) -> bool:
@@ -165,7 +165,7 @@ class HubSubscription:
             await self._event.wait()
 
     def wake(self) -> None:
-        """Make the waiting `changed` call check its condition again."""
+        """Make a waiting `changed` call check the hub's revision."""
         self._event.set()
 
     def changes(self) -> list[Sample]:
@@ -369,7 +369,7 @@ class Hub:
 
     @property
     def holds_back(self) -> bool:
-        """Whether some traffic is held back."""
+        """Whether some traffic is held back because it may be the beginning of a secret."""
         return self._redactor is not None and self._redactor.is_holding
 
     def tell_rest(self, now_s: float) -> None:
@@ -398,7 +398,7 @@ class Hub:
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
         """Return the newest readings and every streamed reading after `revision`, oldest first.
 
-        Streamed readings before `joined`, the reader's first revision, are omitted.
+        `joined` is the reader's first revision; streamed readings before it are omitted.
         """
         newest = self.changed_since(revision)
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest

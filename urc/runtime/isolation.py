@@ -1,7 +1,7 @@
 """Preview third-party documents in a separate process with limited memory and time.
 
 ``python -m urc.runtime.isolation`` reads a task as JSON from standard input and prints the preview.
-An expensive document therefore cannot slow down the calling program.
+A document that takes much time or memory therefore cannot slow down the calling program.
 """
 
 import json
@@ -96,7 +96,7 @@ def bound_this_process(processor_s: int, memory_bytes: int) -> None:
 
 
 def _said(line: str) -> Any:
-    """Return a permission line as JSON, with translatable text."""
+    """Return one permission as JSON data that keeps its text translatable."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:

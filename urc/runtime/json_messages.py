@@ -3,8 +3,9 @@
 Layer 4. Pure. Recordings and the Foxglove server share this mapping, so a viewer shows both in the
 same way. Images and the log use Foxglove's standard messages.
 
-Viewers read the fields of a message from its schema. Each property therefore has a ``type``, or the
-alternatives of an enumeration. A property without a type makes some viewers reject the whole topic.
+Viewers read the fields of a message from its schema. Each property in a schema therefore has a
+``type``, or the alternatives of an enumeration. A property without a type makes some viewers reject
+the whole topic.
 """
 
 import base64
@@ -48,7 +49,7 @@ _encode: Final = msgspec.json.Encoder(enc_hook=lambda value: _plain(value)).enco
 
 
 class MessageSchema(NamedTuple):
-    """The type of a JSON message."""
+    """The type of a JSON message: its name and JSON Schema."""
 
     name: str
     schema: Mapping[str, object]
@@ -97,7 +98,7 @@ def signal_property(signal: Signal) -> dict[str, object]:
 
 
 def argument_property(argument: Argument) -> dict[str, object]:
-    """Return the schema of a command's argument as a property, without its limits."""
+    """Return the JSON Schema of a command's argument, without its minimum and maximum."""
     if argument.type == "array":
         return {"type": "array", "items": {"type": argument.items}}
     return {"type": argument.type}

@@ -1,7 +1,7 @@
 """A small file for the parts of a lease that survive a restart: latch, epoch and pending stop.
 
-Writing can be slow or fail on a full disk. A stop must not wait for the file. A thread therefore
-writes the newest state, and failures are reported without an exception.
+Writing the file can be slow, and fails on a full disk. A stop must not wait for the file. A thread
+therefore writes the newest state, and failures are reported without an exception.
 """
 
 import asyncio
@@ -51,14 +51,14 @@ class LatchStore:
         self.fault = ""
         """Reason why the newest state cannot be stored, or ""."""
         self.on_fault: Callable[[str], None] = _untold
-        """Callback for every new `fault`, called with "" after a recovery."""
+        """Callback that receives each new `fault`, or "" once the state can be stored again."""
 
     def load(self) -> Latch:
         """Return the stored state.
 
         An unreadable or invalid file counts as latched with a pending stop, because the true state
         is unknown. In a valid file, a missing entry ``owed`` means that a latched stop is pending.
-        Page numbers restart at 1 in each run, so page names from earlier runs are marked.
+        Page numbers restart at 1 with each server, so page names from earlier runs get a mark.
         """
         try:
             with self._file.open("rb") as file:

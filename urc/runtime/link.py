@@ -1,8 +1,8 @@
 """The link to a robot: one transport that exchanges data with the driver's engine.
 
-Theory of operation. `run` is a loop with three waits. First, the loop waits for a reason to
-connect. A persistent link always has a reason; other links need an `Open` event or a request. Then
-the loop waits for the backoff delay, and finally for the end of the connection. A reader and a
+Theory of operation. `run` is a loop with three waits. First, the loop waits until there is a reason
+to connect. A persistent link always has a reason; other links need an `Open` event or a request.
+Then the loop waits for the backoff delay, and finally for the end of the connection. A reader and a
 writer run while the connection is open. The robot, the engine or a rule of the link can end a
 connection. Every connection ends through `_end`, and only `_serve` stops the reader and the writer.
 
@@ -15,8 +15,8 @@ status changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` avoids task switches. Bytes that arrive while the reader waits
-are passed directly to the engine. The engine's bytes are passed directly to the kernel. The reader
-and writer tasks handle bytes that must wait, large amounts of data, and errors.
+are passed directly to the engine. The bytes that the engine sends are passed directly to the
+kernel. The reader and writer tasks handle bytes that must wait, large amounts of data, and errors.
 """
 
 import asyncio
@@ -56,7 +56,7 @@ HURRY_S = 1.0
 """Minimum interval between two attempts that operators request, in seconds. Repeated requests,
 even from many pages, therefore do not flood a robot that refuses connections."""
 SETTLE_S = 1.0
-"""Age at which a connection counts as accepted by the robot, in seconds."""
+"""Time after which an open connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
 """Extra time for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
@@ -103,7 +103,8 @@ class Link:
         self._expects_frames = expects_frames
         self._is_persistent = spec.connection == "persistent"
         self._is_stream = (spec.framing.sent or spec.framing).type != "datagram"
-        """Whether bytes may be joined and split; if false, each piece is a datagram or a message.
+        """Whether sent bytes may be joined and split; if false, each piece is a datagram or a
+        message.
         """
         self._wanted = asyncio.Event()
         if self._is_persistent:
@@ -111,7 +112,7 @@ class Link:
         self._retry_s = clock.now()
         """Monotonic time of the next attempt."""
         self._hurried = asyncio.Event()
-        """Event that ends the backoff early."""
+        """Event that is set to end the current backoff delay early."""
         self._hurried_s = float("-inf")
         """Time of the last request for an immediate attempt."""
         self._ended: asyncio.Future[str] | None = None
@@ -130,7 +131,7 @@ class Link:
         )
 
     def _forget_connection(self) -> None:
-        """Reset the state of one connection."""
+        """Reset the attributes that describe a single connection."""
         self._close_reason: str | None = None
         """The engine's reason for closing the connection; data received after the close is
         dropped."""
@@ -256,7 +257,7 @@ class Link:
             await self._close()
 
     async def _back_off(self) -> None:
-        """Wait until the next attempt; `reconnect` ends the wait early."""
+        """Wait until the next attempt to connect is due; `reconnect` ends the wait early."""
         await asyncio.sleep(0)
         while self._retry_s > self._clock.now():
             self._hurried.clear()
@@ -465,7 +466,7 @@ class Link:
         return None
 
     def _stand(self) -> None:
-        """Publish the state of an accepted connection."""
+        """Publish the state of a connection that the robot has not refused: connecting or live."""
         if self._report.state not in ("lost", "connecting"):
             return
         if not self._is_ready:

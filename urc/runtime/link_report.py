@@ -14,11 +14,11 @@ __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 BURST = 4
 """Number of log entries of one kind before the rate limit applies."""
 REFILL_S = 10.0
-"""Minimum interval between further log entries of one kind, in seconds."""
+"""Minimum interval between log entries of one kind after the first entries, in seconds."""
 HELD_S = 0.3
 """Maximum time to hold back data that may be the beginning of a secret, in seconds."""
 KINDS = 64
-"""Maximum number of kinds of log entries; further kinds from a third-party engine share one rate
+"""Maximum number of kinds of log entries with their own rate limit; all further kinds share one
 limit."""
 
 
@@ -75,7 +75,7 @@ class LinkReport:
 
     @property
     def is_well(self) -> bool:
-        """Whether another valid frame would leave the state unchanged."""
+        """Whether the state is live without a failure, so that a valid frame does not change it."""
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "", *, is_ready: bool = False) -> None:
@@ -83,7 +83,7 @@ class LinkReport:
 
         Args:
             state: the new state.
-            detail: reason for an abnormal state, in one line.
+            detail: reason for the state, in one line; "" for a normal state.
             is_ready: whether the login of a connecting link has ended; a live or silent link is
                 always ready.
         """

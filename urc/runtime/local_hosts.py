@@ -1,7 +1,7 @@
 """Detect hosts that are this machine or have a link-local address.
 
-A package with a fixed local host would connect to programs on the computer of the person who
-installs it. A package may therefore address this machine only through a setting.
+If a package named a fixed local host, it could connect to programs on the computer of the person
+who installs it. A package may therefore address this machine only through a setting.
 """
 
 import ipaddress
@@ -19,7 +19,7 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Pattern for the fixed start of a host that is local regardless of the setting that follows."""
+"""Pattern of a fixed beginning that makes a host local, regardless of the setting after it."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 

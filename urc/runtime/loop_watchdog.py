@@ -1,7 +1,7 @@
 """A watchdog for the event loop; a blocked loop delays all work in this process.
 
 If the loop is blocked, the guard stops motion when the lease expires. The watchdog detects, counts
-and reports each delay. After a long delay, operators must start a new gesture.
+and reports each delay. After a long delay, motion continues only with a new gesture.
 """
 
 import logging
@@ -16,10 +16,10 @@ EVERY_S: Final = 0.1
 LATE_S: Final = 0.1
 """Minimum delay that is counted and reported, in seconds."""
 TOO_LATE_S: Final = 0.5
-"""Delay after which motion is stopped even if the lease is still valid, in seconds."""
+"""Delay, in seconds, after which motion is stopped even if the lease is still valid."""
 QUIET_S: Final = 10.0
-"""Maximum interval between two delays of one series, in seconds. Only the first delay of a series
-is logged."""
+"""Delays that follow each other within this time form one series, in seconds. Only the first delay
+of a series is logged."""
 
 log = logging.getLogger(__name__)
 

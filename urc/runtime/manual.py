@@ -201,7 +201,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
-    """Return the bytes of a constant frame; None if the frame is variable."""
+    """Return the bytes that a command sends; None if they are not always the same."""
     if command.send.names or spec is None:
         return None
     try:
@@ -253,7 +253,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """List what the server sends after a release or a loss of contact with the operator."""
+    """Yield what the server sends after a release, or after it loses contact with the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -340,7 +340,7 @@ def _descriptions(named: Iterable[Signal | Argument | Setting]) -> Iterator[str]
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield the lines of a table, and omit empty columns."""
+    """Yield the lines of a Markdown table without its empty columns."""
     kept = [place for place in range(len(header)) if any(row[place] for row in rows)]
     yield f"| {' | '.join(header[place] for place in kept)} |"
     yield f"|{'---|' * len(kept)}"

@@ -10,7 +10,8 @@ If a control stops without a release, it stays disarmed until its page sends a r
 is still held after a reconnection does not move the robot.
 
 A controller outlives its robot's sessions, because the latch persists while the robot is
-disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
+disconnected. `attach` connects the controller to a session's engine and backend; `detach`
+disconnects it.
 
 This module is synchronous: callers pass the current time. The backend reports each written stop by
 calling `stopped`.
@@ -84,13 +85,15 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._due: set[str] = set()
-        """Held commands whose stop must still be passed to a backend, or was sent too early."""
+        """Held commands whose stop must still be passed to a backend, or passed again because it
+        was too early."""
         self._ended: MotionBackend | None = None
         """Backend of the previous session; it may still deliver stops while that session ends."""
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change to the lease and after each confirmed stop."""
         self.on_moved: Moved = _unseen
-        """Callback for each tick passed to the backend; must neither block nor raise."""
+        """Callback for each tick that is passed to the backend; it must neither block nor raise an
+        exception."""
         self.on_refused: Callable[[str, str], None] = _unrefused
         """Callback that receives the control and the message when the robot refuses to move."""
 
@@ -139,7 +142,7 @@ class MotionController:
 
     @property
     def due(self) -> list[str]:
-        """Held commands whose stops no session has delivered."""
+        """Held commands whose stops have not been delivered in any session."""
         ended = self._ended
         return [
             name
@@ -197,7 +200,7 @@ class MotionController:
         self._screens[client.id] = _Screen(client)
 
     def change(self, client: Operator) -> None:
-        """Replace a page's rights; if the page may not drive, its lease and its motion end."""
+        """Replace a page's rights; if it may no longer drive, its lease and its motion end."""
         screen = self._screens.get(client.id)
         if screen is None:
             return
@@ -328,7 +331,7 @@ class MotionController:
     def _is_disarmed_at_rest(
         self, command: str, control: HeldControl, backend: MotionBackend
     ) -> bool:
-        """Return whether a lost connection has disarmed a control at rest.
+        """Return whether the control is at rest but disarmed, as after a lost connection.
 
         A control that was moving is not armed again: its motion must not resume.
         """
@@ -346,7 +349,7 @@ class MotionController:
         """Handle the release of a control; only its holder may release it.
 
         `number` is the number of the release, or 0 if the release has no number. Ticks with lower
-        numbers no longer count.
+        numbers are then ignored.
         """
         holder = self.lease.state.holder
         control = self._controls.get(command)
@@ -492,7 +495,7 @@ class MotionController:
     def _stop_frames(
         self, commands: Sequence[str] | Mapping[str, object]
     ) -> dict[str, Payload | FrameVariants]:
-        """Return the stop frames.
+        """Return each held command's stop frame.
 
         If rendering fails, use the frame that was rendered when the control was armed.
         """

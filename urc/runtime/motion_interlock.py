@@ -22,7 +22,8 @@ from urc.runtime.running_servers import RunningServer, headers, open_connection,
 __all__ = ["MotionInterlock"]
 
 _ANSWER_S = 2.0
-"""Timeout for a server's reply, in seconds. After the timeout, the server's state is unknown."""
+"""Timeout for a server's reply, in seconds. After the timeout, the state of the server counts as
+unknown."""
 _LOOK_S = 0.1
 _ASK_S = 0.5
 _MOST_BYTES = 4096
@@ -52,7 +53,7 @@ class MotionInterlock:
         """Reason for refusing motion at the last call to `check`; "" if motion is allowed."""
 
     async def check(self) -> str:
-        """Read the interlocks, update `why`, and return its value."""
+        """Read the latch, ask the servers if that is due, and return the new `why`."""
         return await asyncio.to_thread(self._check)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:
@@ -84,7 +85,7 @@ class MotionInterlock:
             self._latched = f"STOP was latched by {by}: reset it first" if by else ""
 
     def _asked(self) -> str:
-        """Ask the servers; return the first reason for refusing motion, or ""."""
+        """Ask all servers who drives the robot; return the first reason to refuse motion, or ""."""
         for file, server in servers(self._data).items():
             why = self._answer(file, server)
             if why:

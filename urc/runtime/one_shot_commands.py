@@ -1,4 +1,4 @@
-"""Commands without a held control: their permission checks, and how STOP affects them.
+"""Commands that no control holds: permission checks, and the effect of STOP.
 
 Layer 4. Only held commands require the lease. All other commands require the role ``drive`` or a
 higher role, so a watcher cannot send commands. A command that starts autonomous motion (``moves``)
@@ -64,7 +64,7 @@ class Drivable(MotionSession, Protocol):
 
 
 class CommandRefused(CommandFailed):
-    """The refusal of a command before anything is sent to the robot."""
+    """A command was refused before anything was sent to the robot."""
 
 
 def can_move(driver: Driver) -> bool:
@@ -79,7 +79,7 @@ def needs_holding(driver: Driver, command: str) -> bool:
 
 
 def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
-    """Return whether a command with these arguments starts motion."""
+    """Return whether a command with these arguments starts autonomous motion."""
     if command.moves_if is None:
         return command.moves
     try:
@@ -144,7 +144,7 @@ class OneShotCommands:
         return role_refusal(client, known.role if known is not None else "drive")
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return the reason for refusing control of a sequence.
+        """Return the reason why the operator may not control a sequence, or "".
 
         Any operator may pause or end a sequence.
         """
@@ -155,7 +155,7 @@ class OneShotCommands:
     # -- session
 
     async def serve(self, session: Drivable) -> None:
-        """Deliver each STOP to a session; deliver a latched or unacknowledged STOP immediately."""
+        """Deliver every STOP to a session; deliver a latched or unacknowledged STOP immediately."""
         self._session = session
         self._pressed.clear()
         if self._controller().lease.latched or self._controller().owed:

@@ -1,7 +1,7 @@
-"""Load a robot's document, with local widgets and installed interfaces.
+"""Load a robot's document, with the widgets in its folder and installed interfaces.
 
-Layer 4. A driver's document does not declare an interface. An installed driver uses the interfaces
-that were installed for it.
+Layer 4. A driver's document does not declare an interface. An installed driver is shown with the
+interfaces that are installed for it.
 """
 
 from os import PathLike

@@ -1,7 +1,7 @@
 """The output buffer of one transport: a bounded queue that reports written data as traffic.
 
-With an empty buffer, a `Prompt` transport passes bytes directly to the kernel. Other bytes wait for
-the writer's task, which may block.
+With an empty buffer, a `Prompt` transport passes bytes directly to the kernel. All other bytes wait
+until the writer task sends them; this task may wait for the transport.
 """
 
 import asyncio
@@ -22,8 +22,7 @@ MAX_QUEUED_BYTES = 262_144
 """Maximum size of the buffer, in bytes; beyond it, the connection is closed with a message.
 """
 STUCK_S = 5.0
-"""How long the robot can go without accepting bytes before the connection counts as stalled, in
-seconds."""
+"""Time without accepted bytes after which the connection counts as stalled, in seconds."""
 
 
 class _BufferedOutput(NamedTuple):
@@ -31,7 +30,7 @@ class _BufferedOutput(NamedTuple):
 
     data: Payload
     shown: Payload
-    """Payload to report as traffic."""
+    """Redacted payload to report as traffic."""
     counted: CountedFrame | None = None
     """Frame with counters, or None. The frame is never joined with other data, because sending may
     change the counters.
@@ -93,7 +92,7 @@ class OutputBuffer:
         self._bytes = 0
         self._has_some = asyncio.Event()
         self._is_idle = False
-        """Whether the writer is waiting for data."""
+        """Whether the writer task waits because the buffer is empty."""
 
     @property
     def is_full(self) -> bool:
@@ -177,7 +176,7 @@ class OutputBuffer:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Make the writer check whether the kernel accepts the remaining data in time."""
+        """Let the writer wait for the kernel to accept the remaining data, with a time limit."""
         self._waiting.append(_BufferedOutput(b"", b""))
         self._has_some.set()
 

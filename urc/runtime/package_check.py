@@ -28,7 +28,7 @@ _FAULT_LONGEST: Final = 500
 
 
 def examine(document: Path) -> list[str]:
-    """Return the errors in a package's document, one line per error.
+    """Return the errors in a package's document as text, one line for each error.
 
     Args:
         document: path of the document, such as ``TOP/drivers/puppet/driver.yaml``; ``TOP`` also
@@ -73,7 +73,7 @@ def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
 
     Args:
         document: path of the document, as for `examine`.
-        total_s: maximum time for the process, in seconds.
+        total_s: time after which the separate process is killed, in seconds.
     """
     command = [sys.executable, "-P", "-m", "urc.runtime.package_check", str(document)]
     try:

@@ -1,8 +1,8 @@
 """A preview of a package's permissions and risks, shown before an installation or update.
 
-Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted,
-but the person who installs the package must be informed. The preview therefore lists constants
-separately from the permissions.
+Files, keys, agents, remote programs and hosts normally come from settings. A package may contain
+them as constants, but the person who installs it must be informed. The preview therefore lists
+constants separately from the permissions.
 """
 
 import re
@@ -107,7 +107,7 @@ def _of_transport(spec: TransportSpec, profile: Profile) -> str:
 
 
 def _told(value: Any, profile: Profile) -> str:
-    """Return an option as written, followed by the defaults of its settings."""
+    """Return an option as the document contains it, followed by the defaults of its settings."""
     if isinstance(value, Template):
         text = value.source
         used = [
@@ -213,10 +213,10 @@ class PackagePreview(NamedTuple):
     """The preview of a package."""
 
     permissions: list[str]
-    """Permissions, one per line."""
+    """Permissions of the package, each as one line of text."""
     wire: Mapping[str, str]
-    """Values of all keys that affect sent bytes, the decoding of replies, or rights. The values are
-    stored by key path, such as ``commands.beep.send``."""
+    """Values of all keys that affect sent bytes, the decoding of replies, or the operators' rights.
+    The values are stored by key path, such as ``commands.beep.send``."""
     risks: list[str]
     """Hard-coded files, keys, programs and hosts; see `risks_of`."""
 

@@ -1,6 +1,6 @@
 """Poses, positions on the Earth and laser scans as Foxglove's standard messages.
 
-Layer 4. Pure. A signal alone is a number or a list without a meaning. The widgets of a
+Layer 4. Pure. A signal on its own is a number or a list whose meaning is unknown. The widgets of a
 profile supply the meaning: a map shows the robot's position, and a scan shows distances around the
 robot.
 
@@ -27,7 +27,7 @@ _UNITS: Final = {
     **dict.fromkeys(("yaw", "heading", "angle_min", "angle_increment"), "rad"),
     **dict.fromkeys(("latitude", "longitude"), "deg"),
 }
-"""Unit of each input in messages."""
+"""Unit in which messages contain each input."""
 _USUAL: Final = {"heading": "deg"}
 """Assumed unit of an input whose signal declares no unit; by default, the unit in messages."""
 _UPRIGHT: Final = {
@@ -42,13 +42,13 @@ _Build = Callable[[WidgetUse, _Values], dict[str, object] | None]
 
 
 class PlaceSource(NamedTuple):
-    """The position or distance messages of one widget."""
+    """The source of one widget's messages: poses, positions or scans."""
 
     slot: str
-    """Slot of the widget."""
+    """Name of the widget's slot."""
     shape: MessageSchema
     frame: str
-    """Coordinate frame of the messages."""
+    """Name of the coordinate frame to which the messages refer."""
     inputs: Mapping[str, str]
     """Signals, keyed by input of the widget."""
     units: Mapping[str, Callable[[float], float]]

@@ -21,7 +21,7 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""Maximum duration of a test for any driver, in seconds, excluding the orderly close."""
+"""Maximum duration of a test without the orderly close, in seconds, for every driver."""
 _ANSWER_S: Final = 4.0
 """Time within which a connected robot must send a frame, in seconds."""
 _FIRST_S: Final = 1.0
@@ -46,7 +46,7 @@ class ProbeResult(NamedTuple):
     text: str
     """Description of the result, in one line."""
     advice: str
-    """Advice in one line; "" if the result is good."""
+    """Advice for the operator, in one line; "" if the result is good."""
     cause: Cause = ""
     """Cause of a failure; "" if the cause is unknown or the result is good."""
 
@@ -102,7 +102,7 @@ def _is_connected(status: LinkStatus) -> bool:
 
 
 def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -> bool:
-    """Return whether the test result of a transport is final.
+    """Return whether more time could not change a transport's test result.
 
     Args:
         status: current state of the transport.
@@ -119,7 +119,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
 
 
 async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, ProbeResult]:
-    """Open and close the transports that would otherwise open only for requests."""
+    """Test each transport that opens only for requests: open it and close it once."""
     driver = session.profile.driver
     tried: dict[str, ProbeResult] = {}
     if not names:

@@ -1,8 +1,8 @@
 """Redact the values of secret settings in all displayed or stored data.
 
-Layer 4, pure. The engine marks secret frames, and the link redacts these frames. For the hub, this
-module redacts other data, such as the echo of a password or a command with a token. An echo may
-arrive in a stream one character at a time. Bytes that may be the beginning of a secret are
+Layer 4, pure. The engine marks secret frames, and the link redacts these frames. This module
+redacts all other data for the hub, such as the echo of a password or a command with a token. An
+echo may arrive in a stream one character at a time. Bytes that may be the beginning of a secret are
 therefore held back until more data arrives, or until a pause.
 """
 
@@ -19,14 +19,15 @@ from urc.runtime.secret_forms import forms
 __all__ = ["REDACTED", "Redactor", "secret_texts", "stand_ins"]
 
 REDACTED = "‹secret›".encode()
-"""Replacement for secret bytes in displayed data."""
+"""Text that replaces a secret in displayed data."""
 
 _SHORTEST = 3
-"""Minimum length of a secret to replace inside a frame. A shorter secret would match too many
-bytes, so a frame that contains a shorter secret is hidden completely."""
+"""Minimum length, in bytes, of a secret that is replaced inside a frame. A shorter secret would
+match too many bytes, so a frame that contains a shorter secret is hidden completely."""
 _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
-"""Minimum length of a truncated secret to redact; shorter parts occur in many words."""
+"""Minimum length, in bytes, of the beginning of a secret to redact; shorter ones occur in many
+words."""
 _SHORTEST_NUMBER = 4
 """Minimum number of digits in a secret number to redact; shorter numbers match too many
 readings."""
@@ -151,7 +152,7 @@ class Redactor:
         return bool(self._held)
 
     def rest(self) -> list[tuple[tuple[str, str], bytes]]:
-        """Return the held-back data of each stream, after a pause."""
+        """Remove and return the held-back data of each stream, because no more data arrived."""
         held = list(self._held.items())
         self._held.clear()
         return [(key, REDACTED if len(data) >= _SHORTEST else data) for key, data in held]

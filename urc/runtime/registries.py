@@ -10,7 +10,7 @@ __all__ = ["built_in_catalog"]
 
 
 def built_in_catalog() -> Registries:
-    """Return the tables of transports and framings."""
+    """Return the table of built-in transport types, and the table of built-in framing types."""
     from urc.protocol.framing.table import FRAMINGS
     from urc.transports.table import TRANSPORTS
 

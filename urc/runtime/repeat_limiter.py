@@ -13,7 +13,7 @@ __all__ = ["RepeatLimiter"]
 _AGAIN_S: Final = 1.0
 """Minimum interval between entries for the same event, in seconds."""
 _MOST_KEPT: Final = 64
-"""Maximum number of different events that are counted separately."""
+"""Maximum number of different events that have their own counts."""
 _Key = TypeVar("_Key", bound=Hashable)
 
 
@@ -24,7 +24,7 @@ class _Repeat:
 
 
 class RepeatLimiter(Generic[_Key]):
-    """A counter for repeated events that do not have an entry yet."""
+    """A limiter that counts repeated events until an entry with the count may be written."""
 
     def __init__(self, burst: int = 16, per_s: float = 16.0) -> None:
         """Create a limiter without events.
@@ -66,10 +66,10 @@ class RepeatLimiter(Generic[_Key]):
                 yield key, count
 
     def forgotten(self, now: float | None = None) -> int:
-        """Return the number of events that are no longer counted separately, and reset the number.
+        """Return the number of events whose own counts were dropped, and reset the number.
 
-        The result is 0 if no entry may be written at the time `now`. Without `now`, the limits
-        are ignored.
+        The result is 0 if no entry may be written at the time `now`. Without `now`, the number is
+        returned regardless of the limits.
         """
         count = self._forgotten
         if not count or (now is not None and not self._may_tell(now)):

@@ -1,12 +1,12 @@
 """One robot's alarms, which are detected from its hub's samples, stored and announced.
 
 Layer 4. Each sample includes its alarm, so one comparison shows whether the alarm has changed. Only
-changes are processed. The object belongs to a robot, not to a session. If there is no session, all
-values are unknown, and the alarms persist.
+changes are processed. The object belongs to a robot, not to a session. Without a session, all
+values are unknown, but the alarms persist.
 
 While an alarm's expression `suppressed_when` is true, the alarm is suppressed by design. An
-expression with an unknown or stale value counts as false. In the first seconds of a session, it
-counts as true while its first values are awaited.
+expression with an unknown or stale value counts as false. In the first seconds of a session, an
+expression counts as true until all its values have arrived.
 """
 
 import logging
@@ -28,7 +28,7 @@ __all__ = ["CONNECTION", "AlarmMemory", "RobotAlarms"]
 LOOK_S: Final = 1.0
 """Interval between checks for stale values and scheduled changes, in seconds."""
 FIRST_VALUES_S: Final = 5.0
-"""How long an alarm waits for the first values of its `suppressed_when`, in seconds."""
+"""Time for which alarms wait for the first values of `suppressed_when` in a session, in seconds."""
 LOST_S: Final = 30.0
 """How long a monitored robot's connection must stay lost to cause an alarm, in seconds."""
 CONNECTION: Final = Signal(
@@ -48,7 +48,8 @@ CONNECTION: Final = Signal(
         ),
     ),
 )
-"""URC's own alarm for a monitored robot. Without this alarm, a silent robot would look healthy."""
+"""The alarm that URC raises if a monitored robot's connection is lost. Without this alarm, a silent
+robot would look healthy."""
 _UNKNOWN: Final = ("?", "")
 _CONNECTED: Final = ("live", "silent")
 
@@ -115,8 +116,8 @@ class RobotAlarms:
         self._hub: Hub | None = None
         self._names: Mapping[str, object] = NOTHING
         self._lost_s: dict[str, float] = {}
-        """Time at which each transport was lost, on `clock`; connection attempts do not change
-        this time."""
+        """Time on `clock` at which each transport was lost; later connection attempts do not change
+        it."""
         self._began_s = 0.0
         """Start time of the session on `clock`, in seconds."""
         self._timer: PeriodicTimer | None = None
@@ -165,12 +166,12 @@ class RobotAlarms:
     # The session
 
     def start(self) -> None:
-        """Start making scheduled changes; call this method on the event loop."""
+        """Start the regular checks for stale values and scheduled changes, on the event loop."""
         if self._timer is None and (self._limits or self.list.records):
             self._timer = PeriodicTimer(self._clock, LOOK_S, self._check)
 
     def stop(self) -> None:
-        """Stop making scheduled changes."""
+        """Stop the regular checks for stale values and scheduled changes."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -337,7 +338,7 @@ class RobotAlarms:
     # Inside
 
     def _finish(self) -> None:
-        """Store and announce the changes since the last call."""
+        """Store all changes since the last call, and pass them to the callbacks."""
         if self.list.revision == self._stored:
             return
         changed = [name for name, at in self.list.changed.items() if at > self._stored and name]

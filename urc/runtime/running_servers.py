@@ -27,7 +27,7 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A running dashboard, or one that ended without removing its file."""
+    """A dashboard as described by its file; it may have ended without removing the file."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""
@@ -68,7 +68,8 @@ def open_connection(server: RunningServer, timeout_s: float) -> HTTPConnection:
 class _Verified(HTTPSConnection):
     """A connection that trusts one certificate and expects one name in the server's certificate.
 
-    An operator's own certificate might not include the server's listening address.
+    The name is separate, because an operator's own certificate may not include the server's
+    address.
     """
 
     def __init__(

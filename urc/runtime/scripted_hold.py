@@ -1,6 +1,6 @@
 """Run a held command from a script for a limited time, under the normal motion rules.
 
-The script does not sample input but renews the lease with regular ticks. If the script hangs, is
+A script has no input to sample, so it renews the lease with regular ticks. If the script hangs, is
 killed or loses its connection, the lease expires, and the guard writes the stop.
 """
 
@@ -27,7 +27,8 @@ _LOOK_S: Final = 0.01
 _STOP_OUT_S: Final = 10.0
 """Maximum wait for the transport to accept the stop, in seconds."""
 _WORKED_OFF_S: Final = 0.5
-"""Time given to a broker or bridge to forward the stop before the connection closes, in seconds."""
+"""Time that a broker or bridge has to forward the stop before the connection is closed, in
+seconds."""
 _US: Final = Operator("send", "a program")
 
 
@@ -97,7 +98,7 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Send ticks for up to `for_s` seconds.
+    """Send ticks for `for_s` seconds, or until there is a reason to end early.
 
     Return whether the robot moved, and the reason for an early end.
     """

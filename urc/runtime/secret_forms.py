@@ -10,7 +10,8 @@ __all__ = ["HIDDEN", "SecretForms", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
-"""Minimum length of a secret to search for in encoded form; shorter secrets match too often."""
+"""Minimum length of a secret whose encoded forms are searched for; shorter forms match too
+often."""
 _LONGEST = 4096
 
 
@@ -56,7 +57,7 @@ def forms(secret: str) -> list[str]:
 
 
 def _based(secret: str) -> list[str]:
-    """Return the parts of the secret's base64 forms that do not depend on neighbouring bytes."""
+    """Return the parts of the secret's base64 forms that neighbouring bytes cannot change."""
     data = secret.encode("utf-8", "surrogatepass")
     found: list[str] = []
     for first in range(3):

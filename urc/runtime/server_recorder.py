@@ -4,8 +4,8 @@ Layer 4. Sign-ins and STOP call these methods, which are therefore thread-safe a
 raise an exception. Failed sign-ins and STOPs by unknown visitors are combined into one entry per
 second and address, with a count.
 
-Secrets never reach the log. The name in a failed sign-in is recorded only if a person has this
-name, because people sometimes type passphrases into the wrong field.
+Secrets are never written to the log. The name in a failed sign-in is recorded only if a person has
+this name, because people sometimes type passphrases into the wrong field.
 """
 
 import json
@@ -26,7 +26,7 @@ from urc.runtime.secret_forms import HIDDEN, SecretForms
 __all__ = ["CLOCK_JUMP_S", "NO_ACTOR", "Actor", "ServerRecorder", "terminal_actor"]
 
 CLOCK_JUMP_S: Final = 5.0
-"""Smallest recorded jump of the machine's clock, in seconds."""
+"""Minimum jump of the machine's clock that is recorded, in seconds."""
 _BURST: Final = 60
 """Maximum number of entries about unknown visitors in one burst."""
 _PER_S: Final = 0.1
@@ -131,7 +131,7 @@ class ServerRecorder:
         self._record("signed out", actor)
 
     def revoked(self, actor: Actor, what: str, **about: object) -> None:
-        """Record that a person other than the owner has ended a sign-in, token or right.
+        """Record that an administrator has ended another person's sign-in, token or right.
 
         Args:
             actor: the administrator.
@@ -230,7 +230,7 @@ class ServerRecorder:
         self._repeat(_Repeated("STOP", actor, robot, "", "pressed without a sign-in"))
 
     def check_clock(self) -> None:
-        """Record a jump of the machine's clock since the last call."""
+        """Record a jump if the machine's clock was set since the last call."""
         ahead_s = self._utc() - self._now()
         jump_s, self._ahead_s = ahead_s - self._ahead_s, ahead_s
         if abs(jump_s) >= CLOCK_JUMP_S:
@@ -241,7 +241,7 @@ class ServerRecorder:
             self._record("clock", NO_ACTOR, outcome=text, lasted_s=round(jump_s, 1))
 
     def flush(self, *, is_last: bool = False) -> None:
-        """Write the due counts of repeated events; at the end, write all counts."""
+        """Write all due counts of repeated events; if `is_last` is true, write every count."""
         with self._lock:
             now = None if is_last else self._now()
             forgotten = self._repeats.forgotten(now)

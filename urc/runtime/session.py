@@ -40,7 +40,7 @@ __all__ = ["CommandFailed", "Motion", "Session", "FifoEvent", "resolve_settings"
 
 
 class FifoEvent:
-    """An event that releases its waiters in FIFO order."""
+    """An event whose waiters continue in the order in which they began to wait."""
 
     def __init__(self, event: asyncio.Event) -> None:
         """Store the event, which must never be cleared."""
@@ -50,7 +50,7 @@ class FifoEvent:
 
     @property
     def is_open(self) -> bool:
-        """Whether a new caller may proceed without overtaking other callers."""
+        """Whether the event is set and no earlier caller is still waiting."""
         return self._event.is_set() and not self._waiting
 
     async def wait(self) -> None:
@@ -64,15 +64,15 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""The writer of motion frames: none, a guard in this process, or a guard process. Only a guard
-process can stop the robot if URC fails."""
+"""The writer of motion frames: none, a guard in this process, or a guard process. If URC fails,
+only a guard process can still stop the robot."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
 """Function that creates named tuples faster than their constructors do; each command creates
 several named tuples."""
 _GRACE_S = 2.0
-"""Tolerance added to the sum of a command's declared waits, in seconds."""
+"""Time that is added to the sum of a command's declared timeouts, in seconds."""
 
 
 def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:
@@ -140,7 +140,8 @@ class Session:
         """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links whose first attempt has not ended; commands wait for them in order.
+        """Links whose first connection attempt has not ended; commands wait for it in order of
+        arrival.
         """
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()

@@ -1,7 +1,7 @@
 """Conversion of an operator's settings from text to typed values.
 
-Every command that opens a robot uses this module. The module does not need a network or an event
-loop.
+Every `urc` command that connects to a robot uses this module. The module does not need a network or
+an event loop.
 """
 
 import math

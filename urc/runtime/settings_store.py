@@ -31,7 +31,7 @@ class StoredSettings(msgspec.Struct, frozen=True):
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)] = 1
     version: _Name = ""
-    """Chosen version of the installed package; "" for the newest version."""
+    """Package version that the operator has chosen; "" for the newest installed version."""
     interface: _Name = ""
     """Interface to show first; "" for the first interface in the document."""
     settings: dict[_Name, _Text] = {}
@@ -100,7 +100,7 @@ class SettingsStore:
 
 
 def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
-    """Return the robots whose settings become obsolete when packages are removed.
+    """Return the robots whose settings no package uses once packages are removed.
 
     Args:
         folder: folder with the settings files.
@@ -143,7 +143,7 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
 
 
 def pin(folder: Path, lock: Lock) -> None:
-    """Pin a robot to its current version before an installation; raise `UrcError` on failure.
+    """Store the robot's current package version as its chosen version, before an installation.
 
     Args:
         folder: folder with the settings files.

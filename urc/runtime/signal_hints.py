@@ -27,14 +27,14 @@ _WAITED_FOR: Final = {
     "xml": "for the end of the XML element",
     "regex": "for bytes that match the pattern",
 }
-"""Text after "waits" that names the missing part of a frame, by framing type."""
+"""Text after "waits" that names the bytes for which a decoder waits, keyed by framing type."""
 
 
 class _Asked(NamedTuple):
     """A request whose reply may match a frame."""
 
     how: str
-    """Line of the test that would send the request."""
+    """Key and value to write in the test so that it sends the request."""
     transport: str
     reply: Reply
 
@@ -139,7 +139,7 @@ class SignalHints:
             return False
 
     def _could_ask(self) -> Iterator[_Asked]:
-        """Yield the requests that the test could send."""
+        """Yield the driver's requests that the test does not send but could send."""
         used = self._trial.used
         for poll in self._trial.polls:
             if poll.reply is not None and ("poll", poll.name) not in used:

@@ -9,7 +9,7 @@ __all__ = ["sources_of"]
 
 
 def sources_of(driver: Driver) -> dict[str, tuple[str, ...]]:
-    """Return the transports of each signal, from the fields of all messages and replies."""
+    """Return the transports whose messages or replies set each signal, keyed by signal."""
     asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
     reads = [(message.transport, message.read) for message in driver.messages.values()]
     reads += [(each.transport, each.reply.read) for each in asked if each.reply]

@@ -1,4 +1,4 @@
-"""Open SQLite files that several servers may write to."""
+"""Functions that open SQLite files to which several servers may write."""
 
 import os
 import sqlite3
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["LOCKED_S", "open_for_writing", "opened_for_reading", "set_aside"]
 
 LOCKED_S: Final = 1.0
-"""How long to wait for another server's transaction, in seconds."""
+"""Maximum wait for the end of another server's transaction, in seconds."""
 
 _AGAIN_S: Final = 0.01
 

@@ -22,7 +22,8 @@ from urc.runtime.test_engine import TestEngine, encoded
 __all__ = ["check_bytes", "check_reply", "check_values", "first", "is_same"]
 
 _SINGLE: Final = 1e-7
-"""Relative precision of four-byte floating-point numbers."""
+"""Relative difference that counts as equal, because four-byte floating-point numbers are
+rounded."""
 _SHOWN: Final = 3
 """Maximum number of reported failures per test."""
 _SHOWN_BYTES: Final = 48
@@ -40,7 +41,7 @@ def first(failures: list[str]) -> list[str]:
 def check_values(
     trial: TestEngine, expect: Mapping[str, Expected], hints: SignalHints
 ) -> Iterator[str]:
-    """Yield a message for each signal with an unexpected state."""
+    """Yield a message for each signal whose value or alarm differs from the expectation."""
     for name, wanted in expect.items():
         state = (
             wanted
@@ -162,7 +163,7 @@ def _on_wire(sent: Iterable[Payload]) -> bytes:
 
 
 def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
-    """Return the expected bytes on the wire, with framing.
+    """Return the bytes that the test expects to be sent, including framing.
 
     Bytes are used unchanged; text is the payload of one frame.
     """
@@ -187,7 +188,7 @@ def is_same(found: object, expected: object) -> bool:
 
 
 def _difference(transport: str, wanted: bytes, found: bytes) -> str:
-    """Return both values in hex and text, around the first different byte."""
+    """Return expected and actual bytes in hex and as text, around the first difference."""
     at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), None)
     offset = min(len(wanted), len(found)) if at is None else at
     start = max(0, offset - _BEFORE_BYTES) if max(len(wanted), len(found)) > _SHOWN_BYTES else 0

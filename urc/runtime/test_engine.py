@@ -1,4 +1,4 @@
-"""A test bench for an engine, with a simulated clock and transports that always connect.
+"""An engine under test, with a simulated clock and transports that always connect.
 
 Layer 4. The module uses neither I/O nor asyncio. All of the engine's output is collected for the
 test.
@@ -38,9 +38,9 @@ __all__ = ["Exercised", "Kind", "TestEngine", "encoded"]
 
 Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
-"""Kind and name of a driver part that a test can use."""
+"""Kind and name of a command, poll or message that a test can use."""
 _TWO_PEOPLE: Final = ("author of the test", "operator")
-"""Confirmations by two people, so that tests can run every command."""
+"""Names of two people who confirm every command, so that tests can run any command."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types whose messages are objects; all other types transfer bytes."""
 _MOST_TICKS: Final = 20_000
@@ -201,7 +201,7 @@ class TestEngine:
         return Envelope(piece.verb, attributes, body)
 
     def fall_silent(self) -> None:
-        """Advance the time until silence ends the frame."""
+        """On each transport with fed data, advance the time until silence ends the frame."""
         for name in self.fed:
             due = self.engine.lines[name].receiver.decoder.deadline
             if due is not None:
@@ -257,7 +257,7 @@ class TestEngine:
                         self.failures.append(f"closed: {reason}")
 
     def forget(self) -> None:
-        """Start a new collection of set signals."""
+        """Forget which signals have been set so far."""
         self.fresh.clear()
 
 

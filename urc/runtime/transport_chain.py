@@ -14,7 +14,7 @@ __all__ = ["BuiltTransport", "make_lines", "make_transports"]
 
 
 class BuiltTransport(NamedTuple):
-    """A transport, and the values used to build it."""
+    """A transport, with the declaration, factory and setup from which it was built."""
 
     spec: TransportSpec
     factory: str

@@ -30,7 +30,7 @@ def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
 
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
-    """Return the document's widget folders that are unused, because built-in widgets hide them."""
+    """Return the widget folders of a document that built-in widgets of the same name hide."""
     registry = widget_folder_of(document)
     return registry.hidden() if isinstance(registry, WidgetRegistry) else []
 
@@ -61,7 +61,7 @@ class WidgetRegistry(WidgetFolder):
         self._brought = WidgetFolder(brought)
         self._brought.problems = self.problems
         self._hidden: set[str] = set()
-        """Requested names that belong to both a built-in and an installed widget."""
+        """Requested names of built-in widgets that hide an installed widget of the same name."""
 
     @property
     def files(self) -> tuple[str, ...]:

@@ -1,1 +1,1 @@
-"""Public fakes for testing URC, third-party transports and third-party widgets."""
+"""Public fakes and helpers for tests of URC, third-party transports and third-party widgets."""

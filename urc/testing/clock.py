@@ -8,14 +8,14 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Number of event loop turns within which all ready tasks run. The number exceeds the length of
-any chain of tasks in URC."""
+"""Number of event loop turns that is enough for all ready tasks to run. No chain of tasks in URC,
+each of which makes the next ready, is as long."""
 _QUIET_TURNS = 3
 """Number of consecutive turns without a ready task after which the event loop counts as idle."""
 
 
 async def settle() -> None:
-    """Run every ready task until all tasks wait."""
+    """Let the event loop run until every task is waiting."""
     # The loop's queue of ready callbacks; a loop without this queue gets all turns.
     ready = getattr(asyncio.get_running_loop(), "_ready", None)
     quiet = 0

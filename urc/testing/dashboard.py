@@ -69,7 +69,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:
-    """Return the default options from the widget's manifest, which the loader applies."""
+    """Return the default of each option in the widget's manifest, as the document loader does."""
     return {
         name: schema["default"]
         for name, schema in widget.options.items()
@@ -120,7 +120,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """A fake session, controlled by a test. The session counts calls to `open`."""
+    """A fake session; the test sets its state and replies. The session counts calls to `open`."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -134,7 +134,7 @@ class FakeRobot:
         self.pulls: list[tuple[str, Pull]] = []
         """Requests about sequences."""
         self.reconnects = 0
-        """Number of requests to reopen the connections immediately."""
+        """Number of calls of `reconnect` so far."""
         self.latched: list[str] = []
         """Reasons for all latched stops, in order."""
         self.frames = FakeFrames(profile.driver)
@@ -146,7 +146,7 @@ class FakeRobot:
         without values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
-        """Return a context in which the robot is connected."""
+        """Count the call, and return a context in which the robot is connected."""
         return self._open()
 
     @asynccontextmanager
@@ -177,11 +177,11 @@ class FakeRobot:
         return Replied(len(self.commands), name, values)
 
     def reconnect(self) -> None:
-        """Count a request to reopen the connections immediately."""
+        """Count the call instead of reopening connections."""
         self.reconnects += 1
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Record a request about a sequence."""
+        """Record the request to pause, step, resume or end a sequence."""
         self.pulls.append((sequence, what))
 
     def latch(self, reason: str) -> None:

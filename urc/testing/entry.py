@@ -1,4 +1,4 @@
-"""Access to a test's dashboard, with known keys and the cookies of browsers that have access.
+"""Access control for the dashboards of tests, with known keys and cookies.
 
 For tests only.
 """
@@ -20,9 +20,9 @@ STORE = AccessStore(Path(_FOLDER.name))
 CONTROL = AccessControl(STORE, key=KEY)
 
 ACCESS = Access(CONTROL, instance="test")
-"""Access to a dashboard that requires a sign-in."""
+"""Access control of a dashboard that requires a sign-in."""
 OPEN = Access(CONTROL, instance="test", anonymous="drive")
-"""Access to a dashboard that needs no sign-in; it also accepts the cookies of `ACCESS`."""
+"""Access control of a dashboard that needs no sign-in; it also accepts the cookies of `ACCESS`."""
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
 """Cookies of a browser that has sent the start key."""

@@ -1,4 +1,4 @@
-"""A test helper for framings, which splits the same data in different ways."""
+"""A test helper that passes the same data to a framing's decoder in differently sized pieces."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -21,12 +21,12 @@ def feed_three_ways(
     """Decode `data` in one piece, byte by byte, and with `trailing`; return the frames.
 
     Args:
-        decoder: function that returns a new decoder; called once for each of the three ways.
+        decoder: function that returns a new decoder; it is called three times.
         data: complete frames.
         trailing: bytes that begin an incomplete frame.
 
     Raises:
-        AssertionError: two of the three ways returned different frames.
+        AssertionError: the frames depend on how the data is divided.
     """
     whole = list(decoder().feed(data))
     by_byte: list[Frame] = []

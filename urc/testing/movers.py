@@ -17,12 +17,12 @@ __all__ = ["FakeFrames", "FakeMotionBackend", "FakeSession"]
 
 
 class FakeFrames:
-    """Frames of held commands as text, such as ``drive speed=0.5 turn=0`` and ``drive stop``."""
+    """An encoder whose frames are text, such as ``drive speed=0.5 turn=0`` and ``drive stop``."""
 
     def __init__(self, driver: Driver) -> None:
         self.driver = driver
         self.refusal = ""
-        """Reason for refusing frames; "" to accept all frames."""
+        """Message with which every motion frame is refused; "" accepts all frames."""
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Callback for the engine's motion events."""
         self.is_greeted = True
@@ -96,7 +96,7 @@ class FakeSession:
 
 
 class FakeMotionBackend:
-    """Real hold-to-run state machines with a fake transport, which accepts data if `is_up`."""
+    """Real hold-to-run state machines; their fake transport accepts data while `is_up` is true."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
         self.written: list[tuple[float, str]] = []
@@ -145,7 +145,7 @@ class FakeMotionBackend:
         return command in self._backend and self._backend[command].state != "idle"
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether the command is moving the robot or its stop has not been written yet."""
+        """Return whether the command may still move the robot; same as `is_stopping`."""
         return self.is_stopping(command)
 
     def is_open(self, command: str) -> bool:
@@ -171,7 +171,7 @@ class FakeMotionBackend:
         return [await self._stops.get()]
 
     def write_due(self) -> None:
-        """Write all due frames, which may have waited for the transport."""
+        """Write all frames that are due, including frames that waited for the transport."""
         now = self._clock.now()
         for command, hold_to_run in self._backend.items():
             while self.is_up and (data := hold_to_run.due(now, is_clear=True)) is not None:

@@ -52,7 +52,7 @@ def line_profile(
         every_s: period of the poll, in seconds; None for a robot without polls.
         timeouts: timeouts of the only transport, which is named ``wire``.
         backoff: delays between attempts to reconnect; None for the defaults.
-        transport: the transport's type, as in the transports table.
+        transport: type of the transport, such as ``tcp``.
         max_bytes: maximum size of a frame, in bytes.
     """
     wire = TransportSpec(

@@ -1,4 +1,4 @@
-"""Forms of replies and messages, built from YAML."""
+"""Helpers that build the form of a reply or message from YAML text."""
 
 from collections.abc import Collection
 
@@ -14,7 +14,7 @@ __all__ = ["read_spec", "reader_of"]
 
 
 def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8") -> ReadSpec:
-    """Return the form in the YAML `text`, which must match the schema.
+    """Parse the YAML `text`, which must match the schema, and return the form.
 
     Raises:
         ProblemsError: the form has errors.

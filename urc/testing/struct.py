@@ -1,4 +1,4 @@
-"""Forms of binary frames, built from YAML without a complete document."""
+"""Helpers that build the form of a binary frame from YAML text, without a whole document."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
 def struct_read(source: str) -> ReadSpec:
     """Return the form under ``struct:`` in the YAML `source`.
 
-    The source may also contain ``types:`` and ``enums:``.
+    Besides ``struct:``, the source may contain ``types:`` and ``enums:``.
 
     Raises:
         AssertionError: the form in `source` has problems.

@@ -27,9 +27,9 @@ class MemoryTransport:
         address: str = "memory",
     ) -> None:
         self.address = address
-        """Address as display text."""
+        """Address of the robot, as text for display."""
         self.sent: list[bytes] = []
-        """All pieces of data sent over all connections."""
+        """All data sent so far over any connection, in its original pieces."""
         self.opens = 0
         """Number of calls to `open`, including failed calls."""
         self.is_open = False
@@ -46,12 +46,12 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Send each of `chunks` separately from the robot's side."""
+        """Act as the robot: send each of `chunks` as a separate piece."""
         self._arriving.extend(chunks)
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Close the connection from the robot's side once all data fed so far has been received."""
+        """Act as the robot: close the connection after all data fed so far has been received."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 

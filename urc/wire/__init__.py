@@ -1,1 +1,1 @@
-"""The shapes of the messages between a server and its clients, without encoders."""
+"""The types of the messages between a server and its clients, without encoders."""

@@ -1,8 +1,7 @@
 """The shapes of client messages, identified by their tag ``t``.
 
 Layer 3½. Pure. `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
-limit the nesting depth: the decoder refuses values nested more deeply than a map of plain
-arguments.
+limit the nesting: the decoder refuses any value nested more deeply than a map of plain arguments.
 """
 
 from collections.abc import Mapping
@@ -47,7 +46,7 @@ _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as sent by the client."""
 Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-"""A request about the lease; ``reset`` resets a latched STOP."""
+"""Kind of a request about the lease; ``reset`` resets a latched STOP."""
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
@@ -81,7 +80,7 @@ class ImageSelection(
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """The answer to question `n`; the asking page sends False to withdraw the question."""
+    """A second person's answer to question `n`; the asking page sends False to withdraw it."""
 
     n: int
     yes: bool
@@ -90,7 +89,7 @@ class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields
 class ApprovalRequest(
     msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
 ):
-    """The operator's confirmation of one command with its arguments; the reply is a `token`."""
+    """The operator's confirmation of a command with these arguments; the reply has a `token`."""
 
     id: int
     command: str
@@ -136,7 +135,7 @@ class Drive(
 
     verb: Verb
     for_s: float = REQUEST_S
-    """Time for the holder's answer, in seconds."""
+    """Time that the holder has to answer, in seconds."""
     stops: int | None = None
     """Number of STOPs known to the page. A reset is refused if STOP has been pressed again since
     then; null means the current number."""
@@ -166,7 +165,7 @@ class Release(
 
 
 class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """A press of STOP, with a number as in `Release`."""
+    """A press of STOP; `number` has the meaning that it has in `Release`."""
 
     number: int = 0
 
@@ -180,7 +179,7 @@ class JoinRedundant(
 
 
 Driving = Drive | Tick | Release | Stop
-"""Messages about the controls."""
+"""Messages that drive the robot: lease requests, ticks, releases and STOP."""
 Doubled = Tick | Release | Stop
 """Messages that a page may also send over its redundant socket."""
 ClientMessage = (
@@ -197,7 +196,7 @@ ClientMessage = (
     | Release
     | Stop
 )
-"""Every message that a client sends over its main socket."""
+"""Every message that a client may send over its main socket."""
 
 RIGHTS: Final[Mapping[type, Role | None]] = {
     Ping: "watch",
@@ -213,6 +212,6 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     Release: "drive",
     Stop: None,
 }
-"""The lowest role that may send each message; None means that every page may send the message. A
+"""Lowest role that may send each message; None allows every page to send it. A
 command may require a higher role (see `urc.model.driver.Command`). Taking the controls by force
 requires ``maintain``."""

@@ -58,7 +58,7 @@ PATH: Final = "/api/v1/foxglove"
 """Path of the Foxglove server on the dashboard's port."""
 CAPABILITIES: Final = ("services",)
 ENCODING: Final = "json"
-"""Encoding of all messages of channels and services."""
+"""Encoding of the messages of all channels and services."""
 _SCHEMA_ENCODING: Final = "jsonschema"
 _MESSAGE_HEAD: Final = struct.Struct("<BIQ")
 _CALL_HEAD: Final = struct.Struct("<BIII")
@@ -67,7 +67,7 @@ _LONGEST_ENCODING: Final = 64
 """Maximum length of the name of a call's encoding, in bytes."""
 _LEVELS: Final = {"info": 0, "warning": 1, "error": 2}
 _LONGEST: Final = 500
-"""Maximum length of a reason, in characters."""
+"""Maximum length of the text that gives a reason, in characters."""
 _NOT_OFFERED: Final = frozenset(
     {
         *("advertise", "unadvertise", "getParameters", "setParameters", "fetchAsset"),
@@ -75,9 +75,9 @@ _NOT_OFFERED: Final = frozenset(
         *("subscribeConnectionGraph", "unsubscribeConnectionGraph", "playbackControlRequest"),
     }
 )
-"""Operations that require capabilities that the server does not have."""
+"""Operations of the protocol that this server does not offer."""
 Level = Literal["info", "warning", "error"]
-"""Level of a status."""
+"""Severity of a status message."""
 _Id = Annotated[int, msgspec.Meta(ge=0, lt=2**32)]
 
 
@@ -197,7 +197,7 @@ def _binary(data: bytes) -> ServiceCall:
 
 
 def encode_server_info(name: str, version: str, session: str) -> bytes:
-    """Return the first message; `session` identifies this start of the server."""
+    """Return the server's first message; `session` differs after each start of the server."""
     return _told(
         "serverInfo",
         name=name,

@@ -13,12 +13,12 @@ from typing import Final, NamedTuple
 __all__ = ["PICTURE", "PICTURE_HEADER", "PictureMessage", "read_picture"]
 
 PICTURE: Final = 1
-"""First byte of the message."""
+"""First byte of the message, which marks its kind."""
 PICTURE_HEADER: Final = struct.Struct(">BBHId")
 
 
 class PictureMessage(NamedTuple):
-    """The bytes of a signal."""
+    """The content of a binary message: a signal's bytes and their age."""
 
     signal_index: int
     """The signal's index in the `names` of `HelloMessage`."""

@@ -1,4 +1,4 @@
-"""The shapes of server messages, identified by their tag ``t``.
+"""The types of server messages, which are identified by their tag ``t``.
 
 Layer 3½. Pure. `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
 milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
@@ -58,7 +58,7 @@ CLOSE_FULL = 4503
 
 
 class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
-    """The base class of messages to a page."""
+    """The base class of all text messages to a page."""
 
 
 class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
@@ -95,7 +95,7 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
     names: tuple[str, ...]
     signals: list[SignalRow]
     roles: dict[str, Role] = {}
-    """Role that a visitor needs for each command."""
+    """Lowest role that may run each command, keyed by command."""
     controls: tuple[str, ...] = ()
     """Names of the held commands."""
 
@@ -202,7 +202,7 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     stops: int
-    """Number of STOPs since the server started."""
+    """Number of presses of STOP since the server started."""
     confirmed: bool
     """Whether all transports of the robot have accepted the stop."""
     drives: bool
@@ -222,7 +222,7 @@ class HeartbeatMessage(Outbound, tag="beat", frozen=True):
 
 
 class StoppedMessage(Outbound, tag="stopped", frozen=True):
-    """A report that a control stopped before its release; the control needs a new gesture."""
+    """A report that a control stopped before its release; it moves only after a new gesture."""
 
     command: str
     reason: str
@@ -242,7 +242,7 @@ class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
     n: int
     """The question's number."""
     id: int
-    """Number of the command on the asking page; 0 in messages to other pages."""
+    """Number that the asking page gave the command; 0 in messages to other pages."""
     who: str
     command: str
     text: str
@@ -252,7 +252,7 @@ class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
 
 
 class QuestionEndMessage(Outbound, tag="asked", frozen=True):
-    """The end of question `n`."""
+    """A report that question `n` is over: answered, withdrawn or expired."""
 
     n: int
 
@@ -287,18 +287,19 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     condition: str
     priority: str
     state: str
-    """``unacknowledged``, ``acknowledged``, ``returned``, ``shelved`` or ``suppressed``."""
+    """State of the alarm: ``unacknowledged``, ``acknowledged``, ``returned``, ``shelved`` or
+    ``suppressed``."""
     number: int
     """Number of the activation; these numbers give the first-out order."""
     group: int
-    """Number of the alarm burst."""
+    """Number of the alarm burst to which the alarm belongs."""
     raised: int
     """Number that the page repeats when it acknowledges the alarm."""
     began: int
     value: str = ""
     active: bool = False
     known: bool = False
-    """Whether the current value is known."""
+    """Whether the signal's current value is known."""
     times: int = 1
     returned: int = 0
     acknowledged: int = 0
@@ -318,7 +319,7 @@ class AlarmsMessage(Outbound, tag="alarms", frozen=True):
     """Server time in ms since 1970."""
     rows: list[AlarmRow]
     gone: tuple[str, ...] = ()
-    """Signals whose alarm is now normal."""
+    """Names of the signals whose alarms have become normal."""
     full: bool = False
     flood: bool = False
     """Whether more than 10 alarms began within 10 minutes."""

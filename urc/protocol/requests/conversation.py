@@ -490,7 +490,7 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events for a frame whose match result for a request is `offer`.
 
-        A provisional reply may also be a message. If `frame` is None, the frame has already been
+        A provisional reply may also be a message. Without `frame`, the reply has already been
         reported as a message.
         """
         exchange = pending.exchange

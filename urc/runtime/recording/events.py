@@ -21,7 +21,7 @@ _MOST: Final = 2**31 - 1
 
 
 def is_state(topic: str) -> bool:
-    """Return whether the last message of a topic describes a state: a signal or a transport."""
+    """Return whether the last message of a topic is a current state: of a signal or a transport."""
     return topic.startswith((SIGNALS, LINK))
 
 

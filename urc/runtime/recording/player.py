@@ -35,7 +35,7 @@ REFUSAL: Final = "this is a recording: commands are not sent to a robot"
 _REST_S: Final = 0.25
 """Pause before a repeated recording starts again, in seconds."""
 _AHEAD: Final = 256
-"""Number of messages to read in one step."""
+"""Number of messages that are read from the file at once."""
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +100,7 @@ class Player:
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback is running or will run as soon as a page is open."""
+        """Whether the playback runs, or will run once a page is open."""
         return self._wants_to_run
 
     @property
@@ -109,7 +109,7 @@ class Player:
         return self._speed
 
     def play(self) -> None:
-        """Start the playback; at the end, restart from the beginning."""
+        """Start the playback; if it is at the end, start from the beginning."""
         at_end = self.position_s >= self.length_s
         self._wants_to_run = True
         self._stand(0.0 if at_end else self.position_s, is_moved=at_end)
@@ -203,7 +203,7 @@ class Player:
                 await self._until(waiting[0].time_ns, number)
 
     def _due_ns(self) -> float:
-        """Return the recorded time up to which messages are due; infinity at the end."""
+        """Return the recorded time, in ns, up to which messages are due; infinity at the end."""
         position_s = self.position_s
         if position_s >= self.length_s:
             return math.inf
@@ -235,7 +235,7 @@ class Player:
             await self._changed.wait()
 
     def _forget(self, hub: Hub, known: Set[str]) -> None:
-        """Clear all values that the recording does not contain before the current position."""
+        """Clear the values of all signals that have no reading before the current position."""
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:

@@ -1,7 +1,7 @@
 """A reader for recordings, including incomplete files left by killed processes.
 
 Layer 4. The reader provides the recorded document, the time range, and the messages in order from
-any start time. Files of any length are processed in sections.
+any start time. Files are read section by section, so their length is not limited.
 """
 
 import json
@@ -41,7 +41,7 @@ class Recording(NamedTuple):
 
     file: Path
     document: str
-    """Document of the robot's profile at recording time, or ""."""
+    """Document of the robot's profile when the recording was made; "" if the file lacks it."""
     start_ns: int
     """Time of the first message, in nanoseconds since 1970."""
     end_ns: int
@@ -177,7 +177,7 @@ def _opened(file: Path) -> IO[bytes]:
 
 
 def _records(file: Path, stream: IO[bytes]) -> Iterator[object]:
-    """Yield the readable records of a file.
+    """Yield the records of a file up to the first unreadable record.
 
     Raises:
         UrcError: the file does not start like an MCAP file.

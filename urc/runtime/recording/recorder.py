@@ -35,18 +35,18 @@ from urc.runtime.widget_registry import widget_folder_of
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
 RecordingStep = Callable[[Literal["started", "ended"], str, str], None]
-"""Callback that receives the step of a recording, its file name, and the result as text."""
+"""Callback that receives ``started`` or ``ended``, the file's name, and the result as text."""
 _SUFFIX: Final = ".mcap"
 MOST_WAITING: Final = 50_000
-"""Maximum number of queued events."""
+"""Maximum number of events in the queue; further events are lost."""
 MOST_WAITING_BYTES: Final = 64 * 1024 * 1024
 _PIECE_BYTES: Final = 200
-"""Approximate size of a small event, in bytes."""
+"""Assumed size in memory of a small event, in bytes."""
 _TRIES: Final = 1000
 """Maximum number of names to try for a new file."""
 _GATHER_S: Final = 0.05
-"""How long events are gathered on the event loop, in seconds; waking the thread for each event
-would be slower."""
+"""Time for which the event loop collects events before it wakes the thread, in seconds; waking it
+for each event would be slower."""
 _CHUNK_BYTES: Final = 256 * 1024
 """Size of an MCAP chunk, in bytes; the library's default of 1 MiB would block the interpreter
 longer."""
@@ -92,7 +92,7 @@ class Recorder:
         self.is_begun = False
         """Whether the file has been created."""
         self.counts: Counter[str] = Counter()
-        """Number of messages written so far, by topic."""
+        """Number of messages written so far, keyed by topic."""
         self._is_folder = is_folder
         self._profile = profile
         self._document = document
@@ -329,7 +329,7 @@ class _Steps:
             self._on_step("started", self._recorder.file.name, "")
 
     def ended(self) -> None:
-        """Report that the recording has ended, or the reason why there is no file."""
+        """Report that the recording has ended, or why no file was created."""
         self.look()
         recorder = self._recorder
         if self._on_step is not None and (recorder.is_begun or recorder.fault):

@@ -56,7 +56,7 @@ DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
 _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
-"""Latest time that every MCAP program can read, in nanoseconds since 1970."""
+"""Latest time that all MCAP programs can read, in nanoseconds since 1970."""
 _BYTES: Final = {
     "direction": {"type": "string", "enum": ["sent", "received"]},
     "text": {"type": "string", "description": "data as text, if it is valid UTF-8"},
@@ -100,7 +100,7 @@ def _channel(topic: str, shape: MessageSchema) -> McapChannel:
 
 
 class RecordingEncoder:
-    """A stateful encoder for one recording; the encoded times never decrease."""
+    """The encoder of one recording's events; the times of its messages never decrease."""
 
     def __init__(self, driver: Driver, utc_ns: Callable[[float], int]) -> None:
         """Start a recording.
@@ -147,7 +147,7 @@ class RecordingEncoder:
         return COMMANDS + command, time_ns, as_json(arguments)
 
     def _ended(self, entry: AuditEntry, time_ns: int) -> list[tuple[str, int, bytes]]:
-        """Return the message that ends a motion, which would otherwise seem to continue."""
+        """Return the message that ends a motion; otherwise, the motion would seem to continue."""
         command = self._commands.get(entry.command)
         if entry.what != "stopped" or command is None or command.hold is None:
             return []

@@ -1,6 +1,6 @@
 """The files of a robot's widgets, such as a model, as attachments of a recording.
 
-Layer 4. With these files, another machine can replay the recording.
+Layer 4. Another machine needs these files to replay the recording.
 """
 
 import os
@@ -17,7 +17,7 @@ from urc.runtime.recording.shapes import FILES
 __all__ = ["MOST_FILE_BYTES", "attach_files", "unpack_files"]
 
 MOST_FILE_BYTES: Final = 16 << 20
-"""Maximum size of all files in a recording, in bytes."""
+"""Maximum total size of the widget files in one recording, in bytes."""
 
 
 def attach_files(writer: Any, profile: Profile) -> list[str]:
