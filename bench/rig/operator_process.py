@@ -142,7 +142,7 @@ class Page:
         return True
 
     def wait(self, until_ns: int) -> None:
-        """Handle received messages until the time `until_ns`."""
+        """Handle messages from the server until the time `until_ns`."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
             lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
@@ -229,7 +229,7 @@ class Page:
         self._say_twice(message)
 
     def take_controls(self) -> None:
-        """Wait for the lease, a heartbeat and a connected robot.
+        """Wait until the page has the lease and a heartbeat, and the robot is connected.
 
         Raise `TimeoutError` at the time limit.
         """

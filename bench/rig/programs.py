@@ -40,7 +40,7 @@ READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
 PATIENCE_S = 25.0
-"""Timeout in seconds for a page to take control and drive; the page's own timeout is shorter.
+"""Maximum time for a page to take control and drive, in seconds; the page's own timeout is shorter.
 """
 
 
@@ -55,7 +55,7 @@ class Program:
             inside: command prefix for a network namespace, from `Relay.inside`.
         """
         self.lines: list[str] = []
-        """All output lines of the program so far, including standard error."""
+        """All lines that the program has printed so far, including lines on standard error."""
         self.changed = threading.Condition()
         self._has_ended = False
         self._ordering = threading.Lock()

@@ -26,7 +26,7 @@ Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
 
 
 class PollState:
-    """The state of one poll."""
+    """The schedule of one poll: the time of its next request, and its missing replies."""
 
     def __init__(
         self, poll: Poll, ask: CompiledRequest, line: Conversation, known: SignalState
@@ -70,7 +70,7 @@ class PollState:
         return _submit(self._line, self._ask, self, self._names, now)
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Count missed replies and report refusals."""
+        """Count missing replies, up to the poll's `offline` limit, and report refusals."""
         if outcome.code == "timed-out" and self.poll.offline is not None:
             self._misses += 1
             if self._misses >= self.poll.offline.after:
@@ -141,7 +141,7 @@ class KeepaliveState:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the end of the keepalive request or command; its outcome is ignored."""
+        """Record that the keepalive request or command has ended, whatever its outcome."""
         self._is_asked = False
         return []
 
@@ -214,7 +214,7 @@ class PollSchedule:
             poll.stop()
 
     def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit the due requests one at a time and yield the events for each."""
+        """Submit each due poll and keepalive, and yield the resulting events before the next."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.submit_if_due(now)
@@ -224,7 +224,7 @@ class PollSchedule:
 
 
 def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
-    """Return the labels of requests that count as keepalives; None if all requests count."""
+    """Return the labels of requests that keep the connection open; None if all do."""
     if not keepalive.after:
         return None
     named = {*keepalive.after, keepalive.run}

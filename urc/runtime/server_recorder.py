@@ -116,7 +116,7 @@ class ServerRecorder:
         """Record a failed attempt to sign in or pair; identical attempts are counted.
 
         Args:
-            way: sign-in method of the attempt, such as ``passphrase``.
+            way: sign-in method that the visitor tried, such as ``passphrase``.
             place: network address.
             reason: reason to display, which must not contain any of the visitor's input.
             name: name of the person, device or program in the attempt; "" for an unknown name.
@@ -136,7 +136,7 @@ class ServerRecorder:
         Args:
             actor: the administrator.
             what: kind of right that was ended, such as ``sign-in`` or ``device``.
-            about: the right's name and other facts, without secrets.
+            about: further facts for the entry, such as the name of the right; never a secret.
         """
         self._record("revoked", actor, what, arguments=about)
 
@@ -206,7 +206,7 @@ class ServerRecorder:
         Args:
             actor: the person, device or program.
             robot: name of the robot.
-            step: the action: ``acknowledged``, ``shelved`` or ``unshelved``.
+            step: what the operator did: ``acknowledged``, ``shelved`` or ``unshelved``.
             signals: signals of the alarms.
             about: further facts, such as how long an alarm is shelved.
         """

@@ -288,7 +288,7 @@ class Session:
         return outcome
 
     async def settle(self) -> str:
-        """Wait until all sent data has arrived; call this method before closing the session.
+        """Wait until all sent data has arrived, so that closing the session loses none of it.
 
         Returns:
             A message about undelivered bytes, or "". The wait lasts a few seconds at most.
@@ -310,7 +310,7 @@ class Session:
         self._dispatcher.pull(sequence, what)
 
     def latch(self, reason: str) -> None:
-        """End all of the driver's sequences and refuse autonomous motion.
+        """End all running sequences and refuse autonomous motion after a press of STOP.
 
         Args:
             reason: reason to display; "" permits autonomous motion again.

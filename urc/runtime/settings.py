@@ -122,7 +122,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
     """Return a transport's options, with templates evaluated over ``settings``.
 
-    An option that consists only of an empty setting is omitted.
+    An option is omitted if its template contains only a setting, and the setting is empty.
 
     Raises:
         UrcError: a template uses a missing setting or fails.

@@ -133,7 +133,7 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return a clause about the last unexpected frame since `since`, or "" without such a frame.
+        """Return a clause about the last unexpected frame since `since`; "" if none arrived.
 
         Args:
             since: start time of the wait, in seconds.

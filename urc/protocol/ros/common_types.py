@@ -104,7 +104,7 @@ _ROS1: Final[Mapping[str, tuple[MessageField, ...]]] = {
         MessageField("time_from_start", "duration"),
     ),
 }
-"""Types whose fields differ in ROS 1."""
+"""Types whose ROS 1 definition has other fields than their ROS 2 definition."""
 
 
 @cache

@@ -33,12 +33,12 @@ MAX_TEXT: Final = 262_144
 MAX_TYPES: Final = 512
 """Maximum number of types in one definition text."""
 MAX_LAYOUTS: Final = 8192
-"""Maximum number of layouts for one message. Without this limit, nested types could grow
-exponentially."""
+"""Maximum number of layouts for one message. Without this limit, nested types could make the number
+of layouts grow exponentially."""
 MAX_DEPTH: Final = 24
 """Maximum depth of nested types."""
 MAX_FIXED: Final = 1_000_000
-"""Maximum length of a fixed array."""
+"""Maximum number of elements in an array of fixed length."""
 
 
 class BadDefinition(UrcError):
@@ -60,7 +60,7 @@ class MessageField(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """The fields of a type, in order, and its constants."""
+    """A message type: its name, its fields in order, and its constants."""
 
     name: str
     """Name in the short form ``pkg/Type``."""
@@ -82,9 +82,9 @@ SIZES: Final[Mapping[str, int]] = {
 }  # fmt: skip
 """Size in bytes, keyed by format code."""
 BYTE_CODES: Final = "B"
-"""Format code for numbers whose arrays are treated as bytes, as in images."""
+"""Format code of numbers whose arrays are read as bytes, such as the pixels of an image."""
 TIME_TYPES: Final = frozenset(("builtin_interfaces/Time", "time"))
-"""Types for a point in time; a message may contain the text ``now`` instead of the time."""
+"""Types of a point in time; a document may give the text ``now`` in place of a time."""
 
 
 class Primitive(NamedTuple):

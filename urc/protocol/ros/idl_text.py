@@ -44,7 +44,8 @@ def parse_idl(name: str, text: str) -> Definitions:
 
     Args:
         name: name of the main type, in any form.
-        text: text of all types, separated as in ``ros2msg`` text, with ``IDL:`` before each name.
+        text: definitions of all types, separated as in ``ros2msg`` text, with ``IDL:`` before each
+            name.
 
     Raises:
         BadDefinition: the text is invalid.
@@ -110,7 +111,7 @@ class _Parser:
         return word
 
     def _skip(self, *ends: str) -> list[str]:
-        """Return the tokens before the first token outside brackets that is in `ends`."""
+        """Skip to the first token outside brackets that is in `ends`; return the skipped tokens."""
         depth, start = 0, self._at
         while depth or self._peek() not in ends:
             word = self._take()
@@ -147,7 +148,7 @@ class _Parser:
             self._take()
 
     def _annotations(self) -> object:
-        """Skip annotations and return the value of ``@default``."""
+        """Skip annotations; return the value of ``@default``, if present."""
         default: object = None
         while self._peek() == "@":
             self._take()

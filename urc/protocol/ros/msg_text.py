@@ -29,12 +29,12 @@ _INTEGERS: Final = re.compile(r"u?int(8|16|32|64)|byte|char|octet")
 
 
 def split_types(name: str, text: str, mark: str) -> list[tuple[str, str]]:
-    """Return the name and the text of each type in `text`.
+    """Split `text` into types; return the name and the definition text of each type.
 
     Args:
         name: name of the first type.
         text: text of all types.
-        mark: word before the name of each later type, such as ``MSG:``.
+        mark: word that precedes the name of every type after the first, such as ``MSG:``.
 
     Raises:
         BadDefinition: the text is too long or contains too many types.
@@ -123,7 +123,7 @@ def _default(word: str, text: str, length: int | None, owner: str) -> object:
 
 
 def _value(word: str, text: str, owner: str) -> object:
-    """Return the value of a literal of primitive type `word`."""
+    """Convert a literal to the primitive type `word`, and return the value."""
     if word in ("string", "wstring"):
         quote = text[:1]
         end = text.find(quote, 1) if quote in ("'", '"') else -1

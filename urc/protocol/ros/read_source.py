@@ -3,10 +3,10 @@
 Theory of operation. The source is generated once for each combination of layout, byte order and
 wanted parts. Consecutive fields of fixed size become one *run*, which a single `struct.Struct`
 unpacks or skips. CDR aligns each number to its size, counted from the end of the four-byte header.
-The generator therefore tracks the offset modulo a power of two. After a string, the offset is
-unknown, and the next number is aligned at run time. Non-finite numbers become None, as in JSON from
-rosbridge. The data is untrusted. Every length is compared with the remaining bytes before use, and
-the number of elements is limited.
+The generator therefore tracks each field's offset modulo a power of two. After a string, the offset
+is unknown, and the next number is aligned at run time. Non-finite numbers become None, as in JSON
+from rosbridge. The data is untrusted. Every length is compared with the remaining bytes before use,
+and the number of elements is limited.
 
 Sources: OMG CDR (formal/02-06-51); DDS-XTypes 1.3, section 7.4 (encapsulation identifiers).
 Wide strings follow rosidl_typesupport_fastrtps_cpp: a count, then four bytes for each UTF-16 code
@@ -26,8 +26,8 @@ from urc.protocol.ros.wanted import EACH, Wanted
 __all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
 MAX_ELEMENTS: Final = 200_000
-"""Maximum number of strings and nested messages in the arrays of one message. An element takes a
-few bytes in a message, but a hundred or more in memory."""
+"""Maximum number of strings and nested messages in the arrays of one message. An element has a few
+bytes in a message, but takes a hundred bytes or more of memory."""
 MAX_NUMBERS: Final = 4_000_000
 """Maximum length of an array of numbers."""
 _HEADER: Final = 4
@@ -126,7 +126,7 @@ class _ReadGenerator:
         self._parts: list[str] = []
         """Format codes of the current run."""
         self._names: list[str] = []
-        """Variables of the current run."""
+        """Names of the variables that receive the values of the current run."""
         self._floats: list[str] = []
         self._size = 0
         """Size of the current run in bytes."""
@@ -171,7 +171,7 @@ class _ReadGenerator:
     # -- runs and alignment
 
     def _flush(self) -> None:
-        """End the current run."""
+        """Generate the code that reads or skips the current run, and begin a new run."""
         if self._names:
             form = "".join(self._parts)
             names = ", ".join(self._names) + ("," if len(self._names) == 1 else "")
@@ -249,7 +249,7 @@ class _ReadGenerator:
         return "{" + ", ".join(found) + "}" if found or wanted else ""
 
     def _counter(self) -> str:
-        """Read the count that precedes a string or a sequence."""
+        """Generate the code that reads the count before a string or a sequence."""
         name = self._number("I", True)
         self._flush()
         return name
@@ -339,7 +339,7 @@ class _ReadGenerator:
         self._emit(f"{name} = all_finite({taken})" if code in "fd" else f"{name} = {taken}")
 
     def _stride(self, element: Record, wanted: Wanted) -> int | None:
-        """Return the distance between consecutive array elements; None if it varies."""
+        """Return the bytes from one array element to the next; None if the number varies."""
         sizes = list(_sizes(element))
         if not sizes or any(one is None or (wanted and one[1] > 1) for one in sizes):
             return None
@@ -377,7 +377,7 @@ class _ReadGenerator:
         return name
 
     def _records(self, element: Layout, stride: int, count: str, wanted: Wanted, name: str) -> None:
-        """Read consecutive elements of constant size with one `struct` iterator."""
+        """Generate the code that reads an array of elements of constant size with one iterator."""
         with self._block(f"if {count} > (end - p) // {stride}:"):
             self._emit("bad('an array is longer than its message')")
         if wanted:

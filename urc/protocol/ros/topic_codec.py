@@ -2,9 +2,9 @@
 
 Pure. With the Foxglove protocol, the transport carries messages as bytes. The transport delivers
 the definition of a topic's type before the topic's messages, in an envelope with the verb
-`DEFINITION`. The codec then reads the parts of each message that the driver uses. The transport
-never decodes messages. For moving robots, the transport runs in the guard, which must not be
-delayed.
+`DEFINITION`. With this definition, the codec reads only those parts of each message that the driver
+uses. The transport never decodes messages. If the robot can be driven, the transport runs in the
+guard, which must not be delayed.
 
 When a message is sent, the codec adds the message's bytes to its envelope. The definition of a
 published type comes from `urc.protocol.ros.common_types`, or from a topic of the same type. If
@@ -34,8 +34,9 @@ DEFINITION: Final = "definition"
 """Verb of a definition; the envelope has a text body and the attributes `topic`, `type`, `encoding`
 and `notation`."""
 UNENCODED: Final = "unencoded"
-"""Verb of a returned call. The attributes are those of the call, plus `request` and `response`,
-each a list of type, encoding, notation and text."""
+"""Verb of a call that the transport has returned because it is not yet in binary form. The
+attributes are those of the call, plus `request` and `response`, each a list of type, encoding,
+notation and text."""
 MAX_COMPILED: Final = 256
 """Maximum number of compiled types on one connection. Without this limit, a hostile robot could
 announce an unlimited number of new types."""
@@ -48,7 +49,7 @@ class Received(NamedTuple):
     """The result of decoding a received envelope."""
 
     envelope: Envelope | None = None
-    """Envelope with plain data; None if there is nothing to deliver."""
+    """Envelope with plain data; None for a definition or a dropped message."""
     reply: Envelope | None = None
     """Envelope to send."""
     fault: str = ""
@@ -65,7 +66,7 @@ class _Schema(NamedTuple):
 
 
 class _Source:
-    """The readers for one type, each generated when its byte order first occurs."""
+    """The readers for one type, one for each byte order, generated when that order first occurs."""
 
     def __init__(self, layout: Record, wanted: Wanted, *, is_ros1: bool) -> None:
         self._layout = layout

@@ -1,7 +1,7 @@
 """The parts of a message that a driver reads.
 
-Pure. A message reader skips all other parts. `ALL` selects a whole value. A dictionary selects some
-of a message's fields or, with the key `EACH`, some parts of each element.
+Pure. A message reader skips the parts that are not wanted. `ALL` selects a whole value. A
+dictionary selects fields of a message or, under the key `EACH`, parts of each array element.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,7 +30,7 @@ _AROUND: Final = frozenset(
         "comparator",
     )
 )
-"""JMESPath nodes whose parts all apply to the same value."""
+"""Kinds of JMESPath nodes whose children are all evaluated on the same value."""
 
 
 def wanted_of(paths: Iterable[Path]) -> Wanted:

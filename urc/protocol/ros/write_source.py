@@ -4,7 +4,7 @@ Theory of operation. The source is generated once per layout. Consecutive number
 `struct.Struct` format. Alignment works as in `urc.protocol.ros.read_source`. A message is a mapping
 of fields, as in a document; missing fields take their default values or zero. The generated
 function is fast, but its errors give no reason. After an error, `Writer` searches the message for
-the reason.
+the value that caused it.
 """
 
 import base64
@@ -48,7 +48,7 @@ class Written(NamedTuple):
 
     data: bytes
     stamps: tuple[int, ...]
-    """Offsets of the times that the sender writes: seconds and nanoseconds, four bytes each."""
+    """Offsets at which the sender writes the time: seconds and nanoseconds, four bytes each."""
 
 
 class Writer:
@@ -103,7 +103,7 @@ def _wide(value: str) -> bytes:
 
 
 def _known(value: Any, names: frozenset[str]) -> Any:
-    """Return a mapping of fields; raise `TypeError` for any other value or an unknown field."""
+    """Return `value` if it is a mapping of known fields; otherwise, raise `TypeError`."""
     if not isinstance(value, Mapping) or not value.keys() <= names:
         raise TypeError("not a mapping of this message's fields")
     return value
@@ -220,7 +220,7 @@ class _WriteGenerator:
             self._write(inner, self._field(name, field, inner))
 
     def _field(self, owner: str, name: str, layout: Layout) -> str:
-        """Return the source expression for a field, including its default value."""
+        """Return the source expression for a field's value; a missing field has its default."""
         match layout:
             case Primitive(code=code, default=default):
                 if code in "fd":

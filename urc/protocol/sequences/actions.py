@@ -36,7 +36,7 @@ def build_program(
 def programs_of_lines(
     driver: Driver, builder: RequestCompiler, key: Literal["on_connect", "on_close"]
 ) -> dict[str, CompiledSequence]:
-    """Compile the declared login or close sequences of all transports."""
+    """Compile ``on_connect`` or ``on_close`` of all transports."""
     return {
         name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
         for name, spec in driver.transports.items()
@@ -214,7 +214,7 @@ def _prompted(step: sequence.PromptStep, builder: RequestCompiler) -> CompiledRe
 
 
 class _Nothing:
-    """A placeholder reader for a prompt, which is text outside frames. It reads nothing."""
+    """A reader that matches no frame, because a prompt is text outside frames."""
 
     def read(self, frame: Frame) -> None:
         return None

@@ -33,7 +33,7 @@ __all__ = [
 _MOST: Final = 256
 """Maximum number of commands waiting for verification."""
 _BOTH: Final = 2
-"""Required number of people under the two-person rule."""
+"""Number of people who must confirm a command under the two-person rule."""
 
 
 def why_not_allowed(
@@ -128,8 +128,8 @@ def exchange_of(
         sink: function that receives the outcome.
         now: current time, in seconds.
         known: state of the robot, used in conditions.
-        verifications: runs waiting for verification; if the command requires verification, its run
-            is added.
+        verifications: the commands that wait for verification; this command is added if it needs
+            verification.
 
     Raises:
         BadArgument: the frame cannot be encoded with these arguments.
@@ -152,7 +152,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return an argument value in the notation of a document's keys."""
+    """Return an argument value as text, in the form that it has as a key of a document."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -172,7 +172,7 @@ class Verifications:
         self._known = known
         self._waiting: list[_PendingVerification] = []
         self.has_news = False
-        """Whether new samples require another check."""
+        """Whether new samples have arrived, so that the waiting commands must be checked again."""
 
     @property
     def is_waiting(self) -> bool:
@@ -224,7 +224,7 @@ class Verifications:
 
 
 class UnverifiedRun:
-    """The execution of a command without verification."""
+    """The owner of a command's request, for a command that needs no verification."""
 
     __slots__ = ("_sink",)
 

@@ -14,8 +14,8 @@ other sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
 """A control request from the operator. On a paused sequence, ``step`` runs one outermost step and
-pauses again. Otherwise, ``step`` pauses the sequence before its next outermost step, which may be
-its first."""
+pauses again. On any other sequence, ``step`` causes a pause before the next outermost step, which
+may be the first."""
 
 
 class SequenceControl:
@@ -34,10 +34,10 @@ class SequenceControl:
         self.reason = ""
         """Reason why the last run failed; "" if it did not fail."""
         self.count = 0
-        """Number of changes to the public attributes."""
+        """Number of changes to the public attributes so far, from which readers detect a change."""
         self._halt: Literal["", "now", "next", "outer"] = ""
-        """Position of the next pause: before any step (``now``), before the next outermost step
-        (``outer``), after one more outermost step (``next``), or no pause ("")."""
+        """Next pause: before any step (``now``), before the next outermost step (``outer``), after
+        one more outermost step (``next``), or "" for none."""
 
     def pull(self, what: Pull) -> None:
         """Apply a control request from the operator."""

@@ -27,7 +27,7 @@ Unless = Callable[[], str]
 
 
 class SequenceHost(Protocol):
-    """The engine's interface for sequences."""
+    """The interface of the engine that sequences use."""
 
     lines: Mapping[str, Conversation]
     known: SignalState
@@ -114,7 +114,7 @@ class SequenceRunner:
 
     @property
     def can_go_on(self) -> bool:
-        """Whether `advance` can make progress."""
+        """Whether the run no longer waits, so that `advance` can continue it."""
         if self._logins and all(line.is_ready for line in self._logins):
             return not self.is_over
         return not self.is_over and (self._outcome is not None or not self.is_waiting)
@@ -209,7 +209,7 @@ class SequenceRunner:
             self._outcome = ExchangeOutcome(code, reason)
 
     def why_over(self) -> str:
-        """Return the reason why the run must send no more frames; "" if the run continues."""
+        """Return why the run must not send further frames; "" if it may continue."""
         return self._outcome.message if self._outcome is not None else ""
 
     # -- called by the engine
@@ -245,7 +245,7 @@ class SequenceRunner:
     # -- for the actions
 
     def names(self, now: float) -> Mapping[str, object]:
-        """Return the namespace for the steps' expressions."""
+        """Return the namespace for the steps' expressions: signals, settings and variables."""
         return self.host.known.view(now, self.variables)
 
     def push(self, actions: Iterator[Action]) -> None:
@@ -257,7 +257,7 @@ class SequenceRunner:
         self.is_waiting, self.due = True, due
 
     def wait(self) -> None:
-        """Wait for a call to `done`."""
+        """Let the sequence wait until `done` is called."""
         self.is_waiting = True
 
     def listen(
@@ -278,7 +278,7 @@ class SequenceRunner:
     def wait_for(
         self, condition: Template, due: float, otherwise: tuple[Action, ...] | None, text: str
     ) -> None:
-        """Wait until `condition` is true."""
+        """Let the sequence wait until `condition` is true."""
         self._awaited = condition
         self._otherwise, self._late_text = otherwise, text
         self.sleep(due)
