@@ -1,7 +1,7 @@
 """Processor time for a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
-back. URC reads a declaration such as an ordinary profile contains. The hand-written code is what a
+back. URC uses a declaration like that of an ordinary profile. The hand-written code is what a
 careful author would write without URC. This code uses one precompiled `struct.Struct` and the
 standard library's CRC, which is written in C.
 """

@@ -1,8 +1,8 @@
 """Processor time for sending 200 values to 50 pages: URC compared with a plain loop of sends.
 
-The measured processor time includes the server's work of reading the robot's data and encoding the
-values. The pages and the robot run in other processes. The loop sends the same number of bytes to
-the same number of pages, but does not handle values or WebSockets.
+The measured processor time of the server includes reading the robot's data and encoding the values.
+The pages and the robot run in other processes. The loop sends the same number of bytes to the same
+number of pages, but does not handle values or WebSockets.
 """
 
 import subprocess

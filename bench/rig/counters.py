@@ -170,7 +170,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 
 async def _follow(session: Session, controller: MotionController) -> None:
-    """Report every stop that the guard has sent to the motion controller, until cancelled."""
+    """Tell the motion controller about every stop that the guard has sent, until cancelled."""
     assert session.backend is not None
     while True:
         for command, reason in await session.backend.stops():

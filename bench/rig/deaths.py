@@ -29,7 +29,8 @@ HEALED_S = 0.4
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Longest time from the end of a process's wait for a processor to its report, in nanoseconds."""
+"""Longest time from the end of a wait for a processor until the wait is reported, in
+nanoseconds."""
 WITNESSES = 2
 """Number of idle programs that measure late wake-ups, as an estimate of the server's delays."""
 
@@ -181,7 +182,7 @@ class Rig:
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
-        """Send orders to the relay, such as to delay or drop packets."""
+        """Send orders to the relay, such as orders to delay or drop packets."""
         self._link().do(*orders)
 
     def drive(

@@ -12,7 +12,7 @@ ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
 """Time limit for replacing a killed guard, in ms; the new guard sends a stop first."""
 OPEN_MS = 100.0
-"""Time that the limit adds for the new guard's connection and for sending the stop, in ms."""
+"""Additional time limit for the new guard's connection and the transfer of the stop, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 

@@ -263,7 +263,7 @@ class Engine:
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink` exactly once.
 
-        If `unless` returns a reason when the command is due to be sent, the command fails instead.
+        If `unless` returns a reason at the time of sending, the command fails instead.
         """
         found = self._commands.get(command)
         if found is None:

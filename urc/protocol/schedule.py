@@ -141,7 +141,7 @@ class KeepaliveState:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record that the keepalive request or command has ended, whatever its outcome."""
+        """Record that the keepalive request or command has ended; ignore its outcome."""
         self._is_asked = False
         return []
 

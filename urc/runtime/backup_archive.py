@@ -58,7 +58,7 @@ _MANIFEST_BYTES: Final = 4096
 _BLOCK: Final = 1 << 20
 _END_BYTES: Final = 22
 _ENTRY_BYTES: Final = 512
-"""Average size that the entries of the archive's directory may have, in bytes."""
+"""Maximum average size of the entries in the archive's directory, in bytes."""
 _DAMAGE: Final = (
     zipfile.BadZipFile, zlib.error, struct.error, EOFError, ValueError, RuntimeError, OverflowError,
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """The causes of failed connections, each with advice for the operator.
 
 Layer 4. Pure. Transports pass on error messages of the operating system or of a library. The table
-recognises the usual messages, on behalf of all pages. Pages translate a cause by its name
+recognises the usual error messages for every page. Pages translate a cause by its name
 (`core/connection_causes.js`).
 """
 

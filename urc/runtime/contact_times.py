@@ -61,7 +61,7 @@ class ContactStore:
     """
 
     def __init__(self, file: Path | None = None) -> None:
-        """Read the file, which counts as empty if missing or damaged; None stores no times."""
+        """Read the file, which is empty if missing or damaged; with None, nothing is stored."""
         self._file = file
         self._times: dict[str, ContactTimes] = {}
         self._is_changed = False

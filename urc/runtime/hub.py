@@ -48,7 +48,7 @@ class SampleHistory:
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
         self._counts: dict[str, int] = {}
-        """Number of readings stored so far, also if since dropped, keyed by signal."""
+        """Number of readings stored so far, including readings dropped since, keyed by signal."""
 
     def __bool__(self) -> bool:
         return bool(self._kept)

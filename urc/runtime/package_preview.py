@@ -1,7 +1,7 @@
 """A preview of a package's permissions and risks, shown before an installation or update.
 
-Files, keys, agents, remote programs and hosts normally come from settings. A package may contain
-them as constants, but the person who installs it must be informed. The preview therefore lists
+Files, keys, agents, remote programs and hosts normally come from settings. A package may name them
+as constants, but the person who installs the package must be informed. The preview therefore lists
 constants separately from the permissions.
 """
 

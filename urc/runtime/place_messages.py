@@ -27,7 +27,7 @@ _UNITS: Final = {
     **dict.fromkeys(("yaw", "heading", "angle_min", "angle_increment"), "rad"),
     **dict.fromkeys(("latitude", "longitude"), "deg"),
 }
-"""Unit in which messages contain each input."""
+"""Unit of each input's values in messages."""
 _USUAL: Final = {"heading": "deg"}
 """Assumed unit of an input whose signal declares no unit; by default, the unit in messages."""
 _UPRIGHT: Final = {

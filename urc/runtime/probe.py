@@ -102,7 +102,7 @@ def _is_connected(status: LinkStatus) -> bool:
 
 
 def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -> bool:
-    """Return whether more time could not change a transport's test result.
+    """Return whether the test result of a transport can no longer change.
 
     Args:
         status: current state of the transport.

@@ -27,7 +27,7 @@ _WAITED_FOR: Final = {
     "xml": "for the end of the XML element",
     "regex": "for bytes that match the pattern",
 }
-"""Text after "waits" that names the bytes for which a decoder waits, keyed by framing type."""
+"""Text after "waits" that names what a frame still lacks, keyed by framing type."""
 
 
 class _Asked(NamedTuple):

@@ -8,8 +8,8 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Number of event loop turns that is enough for all ready tasks to run. No chain of tasks in URC,
-each of which makes the next ready, is as long."""
+"""Number of event loop turns that is enough for all ready tasks to run. Every chain of tasks in URC
+that make each other ready is shorter."""
 _QUIET_TURNS = 3
 """Number of consecutive turns without a ready task after which the event loop counts as idle."""
 

@@ -1,6 +1,7 @@
 """Field conversions, ``set`` and ``when`` for one frame.
 
-Pure. `ShapedReader` adds them to a form's reader, in both directions: reading and writing.
+Pure. `ShapedReader` adds conversions, ``set`` and ``when`` to a form's reader, for both reading and
+writing.
 """
 
 from collections.abc import Mapping
@@ -89,7 +90,7 @@ class ShapedReader:
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return the first unusable operand, or None if an operand is missing, or the error."""
+    """Return the first unusable operand; else None if an operand is missing, or the error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

@@ -1,6 +1,7 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. `HeadReader` adds these fields to the body's reader, for both reading and writing.
+Pure. `HeadReader` adds the status and the headers to the body's reader, for both reading and
+writing.
 """
 
 from collections.abc import Mapping

@@ -57,7 +57,7 @@ class Connection:
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)
         self.held = HoldReplies()
-        """Matching of replies to held commands, which bypass the queue."""
+        """Matcher of the replies to held commands; these commands bypass the queue."""
         self.is_behind = False
         """Whether received frames remain in the buffer until `process_frames` is called again."""
         self._askers: dict[object, object] = {}

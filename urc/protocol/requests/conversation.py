@@ -11,9 +11,8 @@ from the oldest to the newest. A request with a correlation accepts only its own
 requests without a correlation, only the oldest accepts the frame, because replies arrive in order.
 Real-time requests have a separate reply order. After its timeout, a request is *late* and stays in
 flight for another reply timeout. A late reply is dropped so that the next request does not accept
-it. Until the late reply arrives or times out, requests whose replies could be confused with it
-wait. After `MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and
-reopened.
+it. Requests whose replies could be confused with the late reply wait until it arrives or times out.
+After `MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -490,8 +489,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events for a frame whose match result for a request is `offer`.
 
-        A provisional reply may also be a message. Without `frame`, the reply has already been
-        reported as a message.
+        A provisional reply may also be a message. A missing `frame` means that the message has
+        already been reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []

@@ -113,7 +113,7 @@ class HoldReplies:
         return now < self._until_s
 
     def refusals(self, frame: Frame, now: float) -> list[HoldRejected]:
-        """Return all held commands whose refusal the frame may be."""
+        """Return the held commands to which the frame may be a refusal."""
         found = [
             HoldRejected(name, offer)
             for name, one in self._listening(now)

@@ -1,8 +1,8 @@
 """Additional effects of messages: values collected from several frames, and acknowledgements.
 
-Pure. Both effects are part of converting fields to samples, so each occurs exactly once per
-message. Incomplete collected values are discarded when the connection is lost. Acknowledgements
-wait in `Acknowledgements` until the conversation has reported the frame.
+Pure. Values are collected and messages acknowledged while fields are converted to samples, so
+exactly once per message. Incomplete collected values are discarded when the connection is lost.
+Acknowledgements wait in `Acknowledgements` until the conversation has reported the frame.
 """
 
 from collections.abc import Callable, Mapping

@@ -107,7 +107,7 @@ class MatchResult(NamedTuple):
     told: tuple[Matcher, Fields] | None = None
     """Matcher and fields of a provisional or error reply, for updating signals."""
     aside: Aside | None = None
-    """Kind of provisional reply that the frame is; None if it is not provisional."""
+    """Kind of provisional reply; None if the frame is not a provisional reply."""
     dropped: str = ""
     """Message about lines that were dropped from the reply; "" if no lines were dropped."""
 

@@ -120,7 +120,7 @@ class Player:
         self._stand(self.position_s)
 
     def seek(self, position_s: float) -> None:
-        """Move to a position in seconds, or to the start or end if it lies outside the recording."""
+        """Move to a position in seconds; outside the recording, move to its start or end."""
         self._stand(self._within(position_s), is_moved=True)
 
     def _within(self, position_s: float) -> float:
