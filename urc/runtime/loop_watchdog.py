@@ -18,7 +18,7 @@ LATE_S: Final = 0.1
 TOO_LATE_S: Final = 0.5
 """Delay, in seconds, after which motion is stopped even if the lease is still valid."""
 QUIET_S: Final = 10.0
-"""Delays that follow each other within this time form one series, in seconds. Only the first delay
+"""Maximum time between two delays that count as one series, in seconds. Only the first delay
 of a series is logged."""
 
 log = logging.getLogger(__name__)
