@@ -24,7 +24,7 @@ __all__ = ["TestReport", "exercise", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
-"""Maximum number of deadlines that a test waits for its declared failure."""
+"""Maximum number of deadlines that a test handles while it waits for its declared failure."""
 
 
 class TestReport(NamedTuple):
