@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return all commands, with `moves` set for each sequence that starts motion."""
+    """Return all commands, with `moves` true for each sequence that starts motion."""
     found = dict(commands)
 
     def does(step: object) -> bool:

@@ -1,6 +1,7 @@
 """Reads ``codes.md``, which explains the problem codes for `urc explain` and SARIF.
 
-Every page has the same four parts. An example is text or a fenced block of YAML.
+Every page has the same four parts: What, Why, Example and Use instead. An example is text or a
+fenced block of YAML.
 """
 
 from pathlib import Path
@@ -17,7 +18,7 @@ class CodePage(NamedTuple):
 
     code: str
     what: str
-    """The problem, in one sentence."""
+    """What is wrong, in one sentence."""
     why: str
     """The problem's effect or cause."""
     example: str
