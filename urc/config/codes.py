@@ -20,9 +20,9 @@ class CodePage(NamedTuple):
     what: str
     """What is wrong, in one sentence."""
     why: str
-    """The problem's effect or cause."""
+    """Why URC reports the problem: its effect or its cause."""
     example: str
-    """A document or excerpt that has the problem, or a description in words."""
+    """A document, or an excerpt of one, that has the problem; otherwise, a description in words."""
     instead: str
     """The corrected example, or instructions in words."""
 

@@ -25,12 +25,12 @@ def with_roles_of_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
 
 
 def link_role(problems: Problems, part: Node, command: Command) -> None:
-    """Report a sequence that declares a lower role than one of its commands needs.
+    """Report a sequence whose declared role is lower than the role that one of its commands needs.
 
     Args:
-        problems: receives the problem.
+        problems: collects the reported problem.
         part: the sequence's mapping.
-        command: the sequence with its raised role.
+        command: the sequence as a command, with the highest role of its commands.
     """
     declared = part.text("role", command.role)
     if declared != command.role:

@@ -1,8 +1,8 @@
 """The default interface: a grid with a widget for each signal and command.
 
 The result depends only on the driver and the available widgets. If a widget is missing or does not
-fit its signal, a simpler widget replaces it. Commands with several arguments get no widget, because
-the developer page has a form for every command.
+fit its signal, a simpler widget replaces it. Commands with several arguments may have no widget,
+because the developer page has a form for every command.
 """
 
 import math
@@ -56,15 +56,15 @@ _BIG: Final = frozenset(
         *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
     )
 )
-"""Widgets that span two rows and two columns."""
+"""Names of the widgets that span two rows and two columns."""
 _GROUNDS: Final = ("camera", "pano360", "map")
 """Widgets that can fill the background, in order of preference."""
 _ACROSS: Final = (0, 4, 1, 3, 2)
-"""Columns in front of a background, in the order in which displays fill them."""
+"""Columns in front of a background, by number, in the order in which displays fill them."""
 _MOST_OVER: Final = 14
 """Maximum number of widgets in front of a background."""
 _STEERED: Final = 2
-"""Rank of steering controls in the order of widgets; see `_rank`."""
+"""Rank of a steering control when widgets are sorted; see `_rank`."""
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
@@ -186,7 +186,7 @@ def _table(signals: list[Signal], registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _given(command: Command, driver: Driver, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the control for a command; None if no widget provides all required arguments."""
+    """Return the widget that sends a command; None if no widget provides all required arguments."""
     if command.hold is not None:
         held = _held(command, registry)
         return held if held is not None and _is_complete(held, command) else None
@@ -285,9 +285,10 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
 def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
-    Displays are at the top, largest first. Steering controls are at the bottom right, near the
-    thumb. Other controls fill the free cells. On a phone in landscape, steering controls are in
-    the first rows at the right and left edges; other widgets are between them and below.
+    Displays are at the top of the grid, with the largest display first. Steering controls are at
+    the bottom right, near the thumb. Other controls fill the free cells. On a phone in landscape,
+    steering controls are in the first rows at the right and left edges; other widgets are between
+    them and below.
     """
     ground = _ground(slots)
     if ground:
@@ -360,7 +361,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
 
 
 def _rank(use: WidgetUse) -> int:
-    """Return a widget's rank: 0 large display, 1 small display, 2 steering control, 3 other."""
+    """Return a widget's rank: 0 large display, 1 small display, 2 steering control, 3 others."""
     if use.widget in _BIG:
         return _STEERED if use.outputs and not use.inputs else 0
     return 3 if use.outputs else 1
@@ -369,7 +370,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return the row and column of the first free square in row `first` or below."""
+    """Return the row and column of the first free square, starting the search in row `first`."""
     places = range(columns - size + 1)
     row = first
     while True:

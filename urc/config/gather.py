@@ -1,8 +1,8 @@
 """The first passes over a document and the documents it refers to: compose, expand and shape.
 
 The compose pass merges a document with the documents under `extends` and `include`. The expand pass
-replaces `params` and `each`. The shape pass checks the result against the schema. Each pass is a
-function of one document.
+replaces `params` and `each`. The shape pass checks the result against the schema. Each pass handles
+one document at a time.
 
 URC reads the robot before the driver and the interfaces, because the robot refers to both.
 """
@@ -24,7 +24,7 @@ __all__ = ["LoadedSources", "gather"]
 
 
 class LoadedSources(NamedTuple):
-    """The parts and problems of a loaded profile."""
+    """The parts of a loaded document and its references, and the problems found so far."""
 
     sources: Sources | None
     """The parts of the profile; None after an error, and for a partial document."""
@@ -90,7 +90,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return the code, file, line and column, which identify a problem across passes."""
+    """Return the code, file, line and column, by which two passes recognise the same problem."""
     return problem.code, problem.file, problem.line, problem.column
 
 
@@ -125,7 +125,7 @@ def _check_placement(root: Node, problems: Problems) -> None:
             problems.error(
                 root,
                 "misplaced-key",
-                f"'{key}' is a key of the driver",
+                f"'{key}' is a key of drivers, not of robots",
                 at=key,
                 key=True,
                 hint="move the key to the driver's document, or write the whole driver here",
@@ -159,7 +159,7 @@ def _follow(reference: Node, kind: str, library: Library, given: Node | None = N
             reference,
             "partial-document",
             f"{prepared.file} is a partial {kind}",
-            hint="use a document that includes or extends it",
+            hint="use a document that includes or extends this document",
         )
         return None
     return Node(prepared, (), prepared.data)

@@ -26,7 +26,7 @@ class InterfaceFit(NamedTuple):
     widgets: Mapping[str, Widget] = NOTHING
     """All widgets of the interface, by name."""
     fault: str = ""
-    """One-line reason for the rejection; "" if the interface fits."""
+    """Reason why the interface does not fit, on one line; "" if the interface fits."""
 
 
 class _CombinedWidgets(WidgetFolder):
@@ -43,7 +43,7 @@ class _CombinedWidgets(WidgetFolder):
         return sorted({*self._mine, *self._behind.names()})
 
     def get(self, name: str) -> Widget | None:
-        """Return the widget with this name; None for an unknown name."""
+        """Return the widget `name`, from the profile or the folder; None for an unknown name."""
         return self._mine.get(name) or self._behind.get(name)
 
     def has(self, name: str) -> bool:

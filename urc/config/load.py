@@ -1,8 +1,8 @@
 """Runs the passes that convert YAML documents to the model and collects their problems.
 
 The order of the passes is: compose, expand, shape, parse, link, rules. Each pass reports all
-problems that it finds. A pass runs only if the earlier passes found no errors. Warnings do not stop
-a pass.
+problems that it finds. Each pass runs only if all earlier passes found no errors. Warnings do not
+stop a pass.
 """
 
 from collections.abc import Iterable
@@ -36,13 +36,13 @@ __all__ = ["CheckResult", "WidgetFolder", "check", "load_profile"]
 
 
 class CheckResult(NamedTuple):
-    """The profile and the problems of a checked document."""
+    """The result of checking a document: its problems, and what it declares."""
 
     profile: Profile | None
     """The profile of a robot or driver without errors; a driver gets the default interface."""
     problems: tuple[Problem, ...]
     kind: str
-    """Document kind: ``robot``, ``driver``, ``interface`` or ``widget``; "" after early errors."""
+    """Document kind: ``robot``, ``driver``, ``interface`` or ``widget``; "" if it is unknown."""
     files: tuple[str, ...] = ()
     """Paths of all requested files, including missing files; the checked document comes first."""
     pages: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class CheckResult(NamedTuple):
     widget: Widget | None = None
     """The widget of a valid manifest; None for other documents and invalid manifests."""
     is_cut_short: bool = False
-    """Whether an error prevented later passes, which might have found more problems."""
+    """Whether later passes, which might find more problems, did not run because of an error."""
 
 
 def load_profile(
@@ -93,7 +93,7 @@ def check(
         path: path of the document, as shown in problems.
         catalog: the available transports and framings.
         registry: the available widgets; by default the widgets that ship with URC.
-            Calls that share a registry read each manifest only once.
+            If several calls share a registry, each manifest is read only once.
     """
     path = fspath(path)
     sources, reported, kind, files = gather(path)

@@ -1,6 +1,6 @@
 """Message transports and the message forms that they allow.
 
-`MESSAGING` contains only built-in transports. Transports from packages allow every form.
+`MESSAGING` contains only built-in transports. A transport from a package allows every message form.
 """
 
 from typing import Final, NamedTuple

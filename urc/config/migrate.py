@@ -74,7 +74,7 @@ def _replaced(written: str, new: str) -> str:
 
 
 def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
-    """Yield the kind of content and the path of each part of a document."""
+    """Yield each part of a document that can contain old names, as its kind and its path."""
     kind = kind_of(document)
     data = document.data
     if kind == "robot" and isinstance(data, dict):

@@ -53,7 +53,7 @@ class Node(NamedTuple):
         return Node(self.document, (*self.path, key), self.data[key])
 
     def must(self, key: str) -> "Node":
-        """Return the child under `key`, which the schema requires."""
+        """Return the child under `key`; the schema ensures that the key exists."""
         return Node(self.document, (*self.path, key), self.data[key])
 
     def named(self, key: str) -> dict[str, "Node"]:
@@ -99,7 +99,7 @@ class Node(NamedTuple):
         return None if inner is None else int(inner.data)
 
     def scalar(self, key: str) -> Value:
-        """Return the scalar under `key`; None if the key is missing."""
+        """Return the text, number or boolean under `key`; None if the key is missing."""
         inner = self.get(key)
         value: Value = None if inner is None else inner.data
         return value
@@ -115,7 +115,7 @@ class Problems:
         return iter(self.problems)
 
     def error(self, part: Node, code: str, message: str, **place: Any) -> None:
-        """Add an error; `place` accepts ``at`` (an inner key) and `Document.problem` arguments."""
+        """Add an error; `place` is ``at`` (a key of `part`) or arguments of `Document.problem`."""
         self._add(part, code, message, "error", **place)
 
     def warn(self, part: Node, code: str, message: str, **place: Any) -> None:

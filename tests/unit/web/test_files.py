@@ -77,12 +77,12 @@ def test_a_file_beside_the_document_has_an_address_and_nothing_else_has(tmp_path
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
-        ("{ urdf: ../arm.urdf }", "is not a path inside this folder"),
-        ("{ urdf: /etc/passwd.urdf }", "is not a path inside this folder"),
-        ("{ urdf: a/../../arm.urdf }", "is not a path inside this folder"),
-        ("{ urdf: 'file:arm.urdf' }", "is not a path inside this folder"),
+        ("{ urdf: ../arm.urdf }", "is not a path inside this document's folder"),
+        ("{ urdf: /etc/passwd.urdf }", "is not a path inside this document's folder"),
+        ("{ urdf: a/../../arm.urdf }", "is not a path inside this document's folder"),
+        ("{ urdf: 'file:arm.urdf' }", "is not a path inside this document's folder"),
         ("{ urdf: robot.yaml }", "has a file type that is not served"),
-        ("{ urdf: link.urdf }", "is outside this folder"),
+        ("{ urdf: link.urdf }", "is outside this document's folder"),
         ("{ meshes: [gone.stl] }", "there is no file 'gone.stl'"),
     ],
 )

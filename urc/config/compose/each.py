@@ -1,4 +1,4 @@
-"""Expands `each`: one declaration for many similar items.
+"""Expands `each`, the key that turns one declaration into many similar items.
 
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
@@ -206,7 +206,7 @@ class _First:
 
 
 class _Rest:
-    """Ignores problems in all later copies of an item."""
+    """Ignores the problems in all copies after the first, which would be repetitions."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report nothing."""
@@ -255,7 +255,7 @@ def is_removal(item: object) -> bool:
 
 
 def item_at(data: Any, path: Path) -> Any:
-    """Return the data at an existing path."""
+    """Return the part of `data` at `path`, which must exist."""
     for part in path:
         data = data[part]
     return data
@@ -331,7 +331,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
-    """Report names that still contain braces, because the schemas accept such names."""
+    """Report each name that still contains braces; the schemas accept such names for `each`."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
@@ -339,7 +339,7 @@ def _check_names(document: Document, places: list[Path], problems: Problems) -> 
                 problems.error(
                     Node(document, (*path, name), item),
                     "bad-name",
-                    f"{name!r} is not a valid name here",
+                    f"{name!r} is not a valid name",
                     key=True,
                     hint="a name in braces needs an 'each' with this variable",
                 )

@@ -28,7 +28,7 @@ Names = Mapping[str, object]
 
 
 class PlaceholderReporter(Protocol):
-    """Reports names without a value."""
+    """Reports names in single braces that have no value."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report an unknown word that follows a known `name` and a dot."""
@@ -47,7 +47,7 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class ExpansionTooLarge(Exception):
-    """An expansion exceeds the size limits for a document."""
+    """The expansion of a document exceeds the limit on its nodes or characters."""
 
 
 class ExpansionBudget:
@@ -58,7 +58,7 @@ class ExpansionBudget:
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Count new nodes and characters; raise `ExpansionTooLarge` if a limit is exceeded."""
+        """Subtract new nodes and characters; raise `ExpansionTooLarge` if too few are left."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:
@@ -133,7 +133,7 @@ class _TemplateFiller:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, UnfilledText | None]:
-        """Return the text with names replaced, and the original text if a name was replaced."""
+        """Return the text with its names replaced, and the original text if it contained a name."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []

@@ -47,8 +47,8 @@ class Composed(NamedTuple):
 def compose(document: Document, library: Library) -> Composed:
     """Merge a document with the documents that it extends and includes.
 
-    The library reads the documents and collects the problems with references and contradictory
-    values. The shape pass reports all other problems in the sources and the result.
+    The library reads the documents, and collects the problems with references and with values that
+    contradict each other. The shape pass reports all other problems in the sources and the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -79,7 +79,7 @@ class _Composer:
         self._whole: dict[str, Document | None] = {}
 
     def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
-        """Return the document merged with its sources; a document without sources is unchanged.
+        """Return the document merged with its sources, or the document itself if it has no sources.
 
         `chain` lists the files from the first document to `document`.
         """
@@ -165,7 +165,7 @@ class _Composer:
         return _without(Tree(found.data, found.mark, found), without)
 
     def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
-        """Merge the included documents, if any, into one tree; report contradictory values."""
+        """Merge any included documents into one tree; report keys with two different values."""
         if not parts:
             return []
         clashes = _Clashes(settled)
@@ -186,7 +186,7 @@ class _Composer:
 
 
 class _Clashes:
-    """Collects contradictory values in two included documents."""
+    """Collects the keys that two included documents set to different values."""
 
     def __init__(self, settled: object) -> None:
         self._settled = settled

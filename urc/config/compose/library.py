@@ -28,7 +28,7 @@ _ARTICLES: Final = {"interface": "an interface"}
 
 
 class Library:
-    """Reads each document once and records its path."""
+    """Reads each document only once, and records the paths of all requested documents."""
 
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
@@ -63,7 +63,9 @@ class Library:
         if real not in self._documents:
             if len(self._documents) >= _FILES_MOST:
                 self.problems.error(
-                    reference, "too-many-files", f"more than {_FILES_MOST} documents are required"
+                    reference,
+                    "too-many-files",
+                    f"this document needs more than {_FILES_MOST} other documents",
                 )
                 return None
             self._documents[real] = self._open(reference, target)

@@ -23,7 +23,7 @@ _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
 
 
 class Tree(NamedTuple):
-    """Data and its position in a document."""
+    """A part of a document: its data, and the marks with its position."""
 
     value: object
     mark: Mark
@@ -32,7 +32,7 @@ class Tree(NamedTuple):
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
-"""A callback with the path, the replaced value and the replacement."""
+"""Function that is called with the path of each replaced value, the value and its replacement."""
 
 
 def _pinned(tree: Tree) -> Mark:
@@ -85,7 +85,7 @@ def count_nodes(value: object) -> int:
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
     """Return `base` with the values of `over` merged into it.
 
-    The base is not modified. `path` is the position of both trees in their documents. The callback
+    Neither tree is modified. `path` is the position of both trees in their documents. The callback
     `clash` receives each replaced value and its replacement.
     """
     if path == ("driver",) and isinstance(over.value, dict):
@@ -171,7 +171,7 @@ def _lists(
 
 
 def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
-    """Merge rules by name; the result starts with the new rules."""
+    """Merge rules by name; rules that exist only in `new` come first in the result."""
     left, items = dict(new), []
     for inner in children(base).values():
         name = item_name(inner.value)

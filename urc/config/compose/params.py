@@ -1,7 +1,7 @@
 """Replaces a driver's parameters, such as ``{params.id}``, in keys and texts.
 
-Each robot sets its driver's parameters, and URC replaces them while it loads the documents. The
-operator, in contrast, provides the values of settings.
+Each robot sets the values of its driver's parameters, and URC inserts them while it loads the
+documents. The operator, in contrast, provides the values of settings.
 """
 
 from collections.abc import Mapping
@@ -165,7 +165,7 @@ class _ParameterFiller:
                     self._problems.error(
                         Node(document, (key,), item),
                         "too-large",
-                        "the text is too long after its parameters are filled in",
+                        "the text is too long after its parameters are replaced",
                         key=True,
                     )
             value[key], marks[key] = tree.value, tree.mark

@@ -66,7 +66,7 @@ def check_option(
 
 
 class NameUses:
-    """The names that a driver uses; rules use them to report unused declarations."""
+    """The declared names that a driver uses, from which the rules find unused declarations."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()
@@ -83,7 +83,7 @@ class _Linker:
         self.uses = NameUses()
 
     def transport(self, part: Node, key: str, name: str) -> None:
-        """Check the transport name under `key`, which `part` may omit."""
+        """Check the transport name under `key`, which is optional if there is one transport."""
         if name in self.driver.transports:
             self.uses.transports.add(name)
             return
@@ -210,9 +210,9 @@ class _Linker:
     def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
         """Return the unknown name in the document's notation, and a hint."""
         if name == NONCE:
-            return "nonce", "a nonce is only available in 'send'"
+            return "nonce", "only 'send' can use a nonce"
         if name == COUNTERS:
-            return "seq", "a counter is only available in 'send'"
+            return "seq", "only 'send' can use a counter"
         if name in self.settings:
             return name, f"write settings.{name}"
         if name == "params":
@@ -277,7 +277,7 @@ def link_driver(
 
 
 def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report two polls, or a poll and a command, with the same name."""
+    """Report a poll that has the same name as another poll or as a command."""
     seen: set[str] = set(driver.commands)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         if poll.name in seen:
@@ -287,7 +287,7 @@ def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
                 "duplicate-name",
                 f"{other} also has the name {poll.name!r}",
                 at="name",
-                hint="give each its own name",
+                hint="give each of them its own name",
             )
         seen.add(poll.name)
 

@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Linker(Protocol):
-    """Functions of the link pass that this module needs."""
+    """The attributes and functions of the link pass that this module needs."""
 
     driver: Driver
     problems: Problems
@@ -82,7 +82,7 @@ def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -
         if kind not in ("integer", "number") or argument.choices:
             what = "has choices" if argument.choices else f"has the type {kind}"
             text = f"argument {name!r} {what}, so its value cannot change gradually"
-            hint = "limit only numeric arguments without choices"
+            hint = "limit only numeric arguments that have no choices"
             problems.error(inner, "wrong-type", text, key=True, hint=hint)
 
 
@@ -100,7 +100,7 @@ def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
             part,
             "wrong-command",
             f"{command.name!r} needs two people, so it must not run automatically",
-            hint="run a command without two_person",
+            hint="run a command whose 'confirm' has no two_person",
         )
 
 
@@ -111,7 +111,7 @@ def _needs_two(command: Command) -> bool:
 
 
 def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
-    """Check the command, transport and period of a poll."""
+    """Check the names in a poll, and that its command only reads values."""
     if poll.when is not None:
         linker.template(part.must("when"), poll.when, linker.driver.signals)
     if not poll.run:

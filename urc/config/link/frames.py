@@ -1,6 +1,6 @@
 """Checks whether the framing can carry constant frames.
 
-Frames with expressions can be checked only later, when URC builds them.
+URC checks frames with expressions later, when it builds them.
 """
 
 from collections.abc import Iterable

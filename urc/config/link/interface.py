@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
-    """Return each slot's widget before any interface changes it."""
+    """Return the driver's widget for each slot, to which interfaces may then apply changes."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
@@ -95,7 +95,7 @@ def _use(
             problems.error(
                 part,
                 "missing-key",
-                f"'use' is missing: no widget fills {part.name!r}",
+                f"'use' is missing, and the driver has no widget for the slot {part.name!r}",
                 key=True,
                 hint=registry.hint(""),
             )
@@ -235,7 +235,11 @@ def _kept(bound: Mapping[str, _T], ports: Mapping[str, WidgetPort]) -> dict[str,
 
 def _binding_hint(port: WidgetPort, driver: Driver) -> str:
     fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
-    return f"possible signals: {listed(fitting)}" if fitting else "no signal of the driver fits"
+    return (
+        f"possible signals: {listed(fitting)}"
+        if fitting
+        else "the driver has no signal that fits this input"
+    )
 
 
 def _output_hint(port: WidgetPort, driver: Driver) -> str:
@@ -289,7 +293,7 @@ def _wrong_unit(port: WidgetPort, signal: Signal) -> str:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
         return f"unit {port.unit!r} is expected, but the signal is {has}"
     if port.quantity and quantity_of(signal.unit) not in ("", port.quantity):
-        return f"a unit of {port.quantity} is expected, but the signal is in {signal.unit!r}"
+        return f"a unit of {port.quantity} is expected, but the signal has the unit {signal.unit!r}"
     return ""
 
 

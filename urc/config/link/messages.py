@@ -90,7 +90,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
             part,
             "wrong-form",
             f"{spec.type} carries messages, but {form or 'text'} has no address",
-            hint=f"on {spec.type} use: {verbs}; put the text inside, as text: …",
+            hint=f"on {spec.type}, use one of: {verbs}; put the text inside it, as text: …",
         )
     elif kind is None and form in _VERBS and spec.type not in MESSAGING:
         problems.error(
@@ -178,7 +178,7 @@ def _answers(part: Node) -> list[Node]:
 
 
 def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
-    """Report the use of response headers on a transport whose replies have no headers."""
+    """Report `head` on a transport whose replies have no headers."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,

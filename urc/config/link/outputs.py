@@ -21,11 +21,11 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Names of the shipped widgets that provide a value, by value type."""
+"""Names of shipped widgets that provide a value, separated by commas, by type of the value."""
 
 
 class Misfit(NamedTuple):
-    """The reason why a signal or an argument does not fit a widget's input or output."""
+    """The reason why a signal or argument does not fit an input or output, with a hint."""
 
     code: Literal["wrong-type", "wrong-unit"]
     text: str
@@ -198,7 +198,11 @@ def _remedy(
 def _giver(argument: Argument) -> str:
     """Return a hint with the names of widgets that provide a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
-    return f"use a widget that provides a value for '{argument.name}': {widgets}" if widgets else ""
+    return (
+        f"use a widget that provides a value for '{argument.name}', such as {widgets}"
+        if widgets
+        else ""
+    )
 
 
 def _check_nothing(
@@ -209,7 +213,7 @@ def _check_nothing(
     given: OutputBinding,
     problems: Problems,
 ) -> None:
-    """Report an output if none of its values has an effect."""
+    """Report an output if none of its values matches an argument of the command."""
     what = f"{port.name!r} of widget {widget.name!r} provides {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:

@@ -23,7 +23,7 @@ _LOCAL: Final = re.compile(r"/(?![/\\])")
 def link_together(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Check bindings and options that depend on each other.
+    """Check that the slot's bindings and options satisfy the relations that the manifest declares.
 
     `use` is the complete declaration of the slot. `part` is the part of the slot that this document
     declares.
@@ -138,7 +138,7 @@ def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[s
 
 
 def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Argument]:
-    """Yield the arguments that receive the values of an output."""
+    """Yield the command arguments that receive the values of an output."""
     command = driver.commands.get(use.outputs.get(port.name, ""))
     if command is not None:
         taken = targets(command, port, use.given.get(port.name, _NOTHING_GIVEN))
@@ -149,7 +149,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not smaller than the option that limits it."""
+    """Report an option whose value is not smaller than that of the option under `less_than`."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None
@@ -218,7 +218,7 @@ def _check_text(
 
 
 def _read(text: str, argument: Argument) -> bool | float | str | None:
-    """Convert text to an argument's value, as pages do; return None for invalid text."""
+    """Convert text to an argument's value in the same way as pages; None for invalid text."""
     if argument.type == "boolean":
         return {"true": True, "false": False}.get(text)
     if argument.type not in ("integer", "number"):

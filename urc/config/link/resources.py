@@ -53,8 +53,8 @@ _LAST_PORT: Final = 65535
 def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, str]:
     """Return a mapping from the file names in the options to their paths.
 
-    The options must already fit their schema. The widget's manifest marks the options that name
-    files.
+    The caller must already have checked the options against their schema. The widget's manifest
+    marks the options that name files.
     """
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
@@ -67,7 +67,9 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
         elif not place.is_file():
             problems.error(part, "no-such-file", f"there is no file {part.data!r}")
         elif not _is_below(place, home):
-            problems.error(part, "file-not-served", f"{part.data!r} is outside this folder")
+            problems.error(
+                part, "file-not-served", f"{part.data!r} is outside this document's folder"
+            )
         elif place.stat().st_size > MOST_BYTES:
             text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
             problems.error(part, "file-not-served", text)
@@ -80,7 +82,7 @@ def find_picture(document: str) -> str:
     """Return the path of the robot's picture; "" without a picture.
 
     The picture has the document's name, and is in the document's folder or its subfolder
-    ``pictures``. A missing picture is not an error, so a document can be copied without its
+    ``pictures``. A missing picture is not an error, so that a document can be copied without its
     picture.
     """
     place = FilePath(document).absolute()
@@ -115,7 +117,7 @@ def file_fault(name: str) -> str:
     """Return the reason why a widget's file cannot have this name; "" for an allowed name."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
-        return "is not a path inside this folder"
+        return "is not a path inside this document's folder"
     if path.suffix.lower() not in FILE_TYPES:
         return f"has a file type that is not served; allowed types are {', '.join(FILE_TYPES)}"
     return ""
@@ -150,7 +152,7 @@ def _page_fault(url: str) -> str:
         return f"is longer than {LONGEST_URL} characters"
     authority = parts["authority"] or ""
     if "@" in authority:
-        return "contains a user name or password that every viewer of the page could read"
+        return "contains a user name or password, which everyone who opens the page could read"
     if authority.startswith("["):
         return "has an IPv6 address, which a page's security policy cannot contain; use a host name"
     host = _HOST.fullmatch(authority)

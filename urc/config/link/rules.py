@@ -118,7 +118,7 @@ def link_rules(
 
 
 def _given(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
-    """Check a rule's trigger; return the field names in the trigger's frame."""
+    """Check the frame, command or poll that triggers a rule; return the fields of that frame."""
     match = rule.match
     if isinstance(match, ReadSpec):
         fields = set(match.fields)
@@ -209,7 +209,7 @@ def _link_reaction(
 
 
 def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
-    """Report each signal that both a rule and the emulated robot's world set."""
+    """Report each signal that a rule sets although the emulated robot's world also sets it."""
     for name, inner in part.named("set").items():
         if name in told:
             text = f"the world also sets the signal {name!r}"

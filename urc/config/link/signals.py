@@ -37,7 +37,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
                 "two-sources",
                 f"{name!r} is computed here, but also set by {set_by_frames[name]}",
                 key=True,
-                hint="rename one of the two",
+                hint="use another name for the computed signal or for the field",
             )
         cycle = cycle_from(name, lambda one: _needed(one, driver.signals))
         if cycle:

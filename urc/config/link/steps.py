@@ -63,7 +63,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
 
 
 class _Walk:
-    """Checks one sequence; earlier steps define names for later steps."""
+    """Checks the steps of one sequence in order; earlier steps define names for later steps."""
 
     def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
         self._linker = linker
@@ -157,7 +157,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that a transport's login defines; none for the login's own steps."""
+        """Return the names that a transport's login defines; none for steps of the login."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -179,7 +179,7 @@ class _Walk:
             self._linker.transport(part, key, name)
 
     def _must_last(self, part: Node, transport: str) -> None:
-        """Report steps that wait for a frame on a transport without a permanent connection."""
+        """Report a step that waits for a frame although each request opens a connection."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":
             self._linker.problems.error(

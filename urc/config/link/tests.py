@@ -148,7 +148,7 @@ def _state(name: str, part: Node, driver: Driver, problems: Problems) -> Expecte
         text = f"signal {name!r} has no limits"
         problems.error(part, "misplaced-key", text, at="alarm", hint="give the signal 'limits'")
     if "value" in part.data and part.text("age") == "never":
-        text = "a signal that was never set has no value"
+        text = "a signal that was never set has no value to compare"
         problems.error(part, "misplaced-key", text, at="value", key=True)
     inner = part.get("value")
     value = _expected(name, inner if inner else part, driver, problems, is_part=inner is None)
@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the expected value at `part`; None for null or an invalid value, or with `is_part`."""
+    """Return the expected value at `part`; None if it is null or invalid, or with `is_part`."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)
@@ -200,7 +200,7 @@ def _fitting(part: Node, signal: Signal, kind: str, problems: Problems) -> Value
             part,
             "wrong-type",
             text,
-            hint="compare another signal that is computed from this signal",
+            hint="declare a signal that is computed from this signal, and compare its value",
         )
         return None
     try:

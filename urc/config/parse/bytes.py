@@ -25,7 +25,7 @@ _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"
 
 
 def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
-    """Return the bytes at `part`; empty without a `part`, None after a reported problem."""
+    """Return the bytes at `part`: b"" if `part` is None, and None if a problem was reported."""
     if part is None:
         return b""
     if isinstance(part.data, list):
@@ -71,7 +71,7 @@ def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes 
         problems.error(
             part,
             "literal-backslash",
-            f"these are the {len(text)} characters {text}, not a control character",
+            f"this text consists of the {len(text)} characters {text}, not of a control character",
             offset=backslash.start(),
             length=len(backslash[0]),
             hint=f'write {spelt}, or "{text}" in double quotes',

@@ -41,7 +41,7 @@ class DeclaredTrailer(NamedTuple):
 
 
 class DeclaredChecksum(NamedTuple):
-    """A declared checksum with an unresolved position."""
+    """A declared checksum, whose position the framing has yet to resolve."""
 
     part: Node
     algorithm: CrcSpec | FoldSpec | str
@@ -57,7 +57,7 @@ class DeclaredChecksum(NamedTuple):
     closes: bool
     before: bytes
     trailer: "DeclaredTrailer | None" = None
-    """Position of a checksum that follows text; None for a fixed position."""
+    """Position of a checksum that follows variable-length text; None for a fixed position."""
 
     @property
     def size(self) -> int:

@@ -20,8 +20,8 @@ _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Conversion:
     """Return the conversion that the keys of `part` declare, without its states.
 
-    `kind` is the type of the converted value. Conversions to strings and booleans involve no
-    arithmetic.
+    `kind` is the type of the converted value. If it is a string or a boolean, keys such as `scale`
+    are reported.
     """
     if kind not in ("integer", "number"):
         for key in _OF_NUMBERS:
@@ -98,7 +98,7 @@ def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
-            hint="remove 'scale', or set it to the value of one raw step",
+            hint="remove 'scale', or set it to the change in value for each raw step",
         )
     if scale is None and offset is None:
         return ()

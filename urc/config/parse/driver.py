@@ -114,7 +114,7 @@ class _Lines:
         return part.text(key, self.only)
 
     def context(self, name: str) -> FormContext:
-        """Return the form context for the transport `name`, which may be unknown."""
+        """Return the form context of the transport `name`; defaults for an unknown name."""
         spec = self._transports.get(name)
         encoding = spec.encoding if spec else FormContext().encoding
         return self._context._replace(encoding=encoding, framing=spec.framing if spec else None)
@@ -208,7 +208,7 @@ def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
             "bad-name",
             f"an argument cannot have the name {part.name!r}",
             key=True,
-            hint=f"in templates, this name means {what}",
+            hint=f"in templates, this name already means {what}",
         )
     if of != "string" and "allow_control" in part.data:
         problems.error(

@@ -120,7 +120,7 @@ def _table(
 
 
 def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Problems) -> None:
-    """Report a byte that replaces an escaped byte but must be escaped itself."""
+    """Report a byte in the replacements that would itself have to be escaped."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
         text = f"{wrong:02X} replaces an escaped byte, but must be escaped itself"

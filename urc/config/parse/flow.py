@@ -159,14 +159,14 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` in a held command, because the next value follows anyway."""
+    """Report `resend` and `extend` in a held command, whose next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold', because the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
 
 
 def _check_stop(command: Command, part: Node, problems: Problems) -> None:
-    """Report keys that would block or delay a stop command."""
+    """Report keys that would prevent or delay a stop command."""
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
     refuse(part, hindering, "has no effect with 'stop', because nothing may delay a stop", problems)
