@@ -41,13 +41,13 @@ class KeyRename(NamedTuple):
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` in the affected mappings; an empty tuple means all mappings.
+    """The rename affects only mappings whose `type` is in this tuple; () means all mappings.
 
     Mappings without `type` are always affected.
     """
 
     def applies(self, mapping: Mapping[str, Any]) -> bool:
-        """Return whether the rename applies to a mapping."""
+        """Return whether `mapping` contains the old key and is affected by the rename."""
         if self.old not in mapping:
             return False
         kind = mapping.get("type")

@@ -46,7 +46,7 @@ def to_sarif(
 
     Args:
         problems: all problems.
-        version: the version of URC.
+        version: URC's version, for the log's `tool`.
         summaries: one-sentence summaries, by problem code.
     """
     codes = list(dict.fromkeys(problem.code for problem in problems))

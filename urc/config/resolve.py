@@ -1,6 +1,6 @@
 """Converts a profile into a single document that shows the origin of every key.
 
-The result is a valid document with the same meaning.
+The result is a valid document that describes the same robot without other documents.
 """
 
 import json
@@ -92,7 +92,7 @@ def _sections(sources: Sources, registry: WidgetFolder) -> Iterator[tuple[str, o
 
 
 def _layout(part: Node) -> Mapping[str, Node]:
-    """Return the interface's keys that are allowed in a robot's document."""
+    """Return the keys of an interface that are also allowed inside a robot's document."""
     keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
@@ -116,7 +116,7 @@ def _tree(part: Node) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
-    """Return the slot's keys that remain valid for another widget, without the options."""
+    """Return a slot's declaration for another widget: only its bindings, without the options."""
     widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
@@ -182,7 +182,7 @@ def _data(node: object) -> object:
 
 
 def _place(node: object) -> str:
-    """Return a comment with the origin of a key."""
+    """Return a comment with the file and line of a key; "" for an unknown origin."""
     if not isinstance(node, Node):
         return ""
     mark = node.document.at(node.path)

@@ -44,7 +44,7 @@ def shipped_check() -> "QuickCheck":
 
 
 def fits(reference: str, value: object) -> bool:
-    """Return True only if a value certainly matches the schema at ``file#/pointer``.
+    """Return True if a value certainly matches the schema at ``file#/pointer``; False if in doubt.
 
     The passes before the shape pass call this function before they use a key. These passes ignore
     values that do not match, and the shape pass reports the error.
@@ -62,7 +62,7 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class _UncertainError(Exception):
-    """This module does not support a keyword in the schema."""
+    """The schema contains a keyword that the fast check does not support."""
 
 
 class QuickCheck:
@@ -128,7 +128,7 @@ def _compile(quick: QuickCheck, schema: Any, file: str) -> _Check:
 
 
 def _lazy(quick: QuickCheck, schema: Any, file: str) -> _Check:
-    """Return a check that is compiled on first use."""
+    """Return a check for `schema` that compiles itself when it is first called."""
     compiled: list[_Check] = []
 
     def check(data: Any) -> bool:

@@ -24,7 +24,7 @@ class Sources:
         self.root = root
         self.kind = kind
         self.driver = root
-        """Mapping with transports, signals, messages, commands and polls."""
+        """Mapping with the keys of the driver, such as ``transports`` and ``commands``."""
         self.settings: dict[str, Node] = {}
         self.slots: dict[str, list[Node]] = {}
         """Widget declarations by slot; later declarations override earlier declarations."""

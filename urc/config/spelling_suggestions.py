@@ -8,7 +8,7 @@ __all__ = ["closest", "did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Number of words by which a list may exceed its maximum before the list is shortened."""
+"""Number of words by which a list may exceed its maximum without being shortened."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
@@ -42,7 +42,7 @@ def closest(word: str, names: Iterable[str]) -> list[str]:
 
 
 def listed(names: Iterable[str], most: int | None = _MOST) -> str:
-    """Return the names separated by commas; shorten much longer lists to `most` names."""
+    """Return the names, separated by commas; shorten a list with many more than `most`."""
     every = list(names)
     if most is None or len(every) <= most + _SPARE:
         return ", ".join(every)

@@ -84,7 +84,7 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
 
 
 def element_of(part: Node, kind: str, problems: Problems) -> str:
-    """Return the type under ``items`` for an array, or the type `kind` itself."""
+    """Return the element type of an array, or `kind` itself for another type."""
     if kind == "array":
         return part.text("items", "number")
     for key in ("items", "size"):

@@ -1,8 +1,8 @@
 """Expression filters that create bytes, hash bytes, or convert bytes to text.
 
 Private to `urc.filters.table`. Text is encoded as UTF-8 before it is hashed. Each filter accepts
-any value from a document. It returns a result, or raises TypeError or ValueError with a
-human-readable message.
+any value from a document. If a filter cannot handle a value, it raises TypeError or ValueError with
+a message for users.
 """
 
 import binascii
@@ -114,7 +114,7 @@ BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
     "hexbytes": _hexbytes,
     "utf8": _data,
 }
-"""Filters that return bytes; they have no arguments."""
+"""Filters that return bytes and have no arguments, by name."""
 TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "b64encode": (_b64encode, 0),
     "hmac_sha256": (_hmac_sha256, 1),
@@ -123,4 +123,4 @@ TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),
 }
-"""Function and argument count of each filter that returns text."""
+"""Filters that return text, by name: function and number of arguments."""

@@ -136,5 +136,4 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
-value."""
+"""Filters for lists and text, by name: function, and minimum and maximum number of arguments."""

@@ -19,7 +19,7 @@ def _number(value: object) -> float:
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
-    """Return a filter that applies `function`; `where` names the valid range in error messages."""
+    """Return a filter that applies `function`; error messages end with `where`, the valid range."""
 
     def filtered(*values: object) -> float:
         numbers = [_number(value) for value in values]

@@ -1,8 +1,8 @@
 """Filters that parse the content of one field, such as tables, digits and packed numbers.
 
 Private to `urc.filters.table`. Each filter accepts any value from a document, runs in linear time,
-and returns at most `MAX_PARTS` values. A filter returns a result, or raises TypeError or ValueError
-with a human-readable message.
+and returns at most `MAX_PARTS` values. If a filter cannot handle a value, it raises TypeError or
+ValueError with a message for users.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -83,7 +83,7 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Split text into numbers of `width` digits each, with the most significant digit first."""
+    """Split text into groups of `width` digits, and convert each group to a number."""
     text, size = _text(value), _whole(width, "the width", 1, 16)
     radix = _whole(base, "the base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """The data has too few bytes for the number."""
+    """The data ends before the end of the number."""
 
 
 @cache  # there are few type names

@@ -1,8 +1,8 @@
 """Expression operators and filters: every function that compiled templates call.
 
-Private to `urc.expressions`. Every function accepts any value from a document. It returns a result,
-or raises TypeError, ValueError or ArithmeticError with a human-readable message. No function
-produces a large result from small operands.
+Private to `urc.expressions`. Every function accepts any value from a document. A function that
+cannot handle a value raises TypeError, ValueError or ArithmeticError with a message for users. No
+function produces a large result from small operands.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -210,7 +210,7 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter: its function and its argument count, excluding the filtered value."""
+    """A filter: its function, and the minimum and maximum number of its arguments."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
@@ -279,12 +279,12 @@ _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
 _TESTS = (_is_defined, _is_none, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
-"""The only names that compiled templates can access."""
+"""Functions by name; compiled templates can access no other names."""
 SCOPE |= {"_slice": lists.sliced, "_match": lists.is_match, "_search": lists.is_search}
 SCOPE |= {function.__name__: function for function in (*_OPERATORS, *_TESTS)}
 SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
 
 
 def filter_names() -> str:
-    """Return the filter names for error messages, excluding filters that return bytes."""
+    """Return the names of the filters for text, separated by commas, for error messages."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

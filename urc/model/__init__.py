@@ -1,1 +1,1 @@
-"""Immutable data classes for the content of a document."""
+"""Immutable classes for the content of documents, after URC has parsed and checked it."""

@@ -36,12 +36,12 @@ FRAME_NAMES: Final = frozenset(("_size", "_left"))
 whole frame in bytes. `_left` is the number of bytes from the start of the item to the end of the
 frame."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
-"""Names that expressions inside a named type can use in addition to the type's items."""
+"""Names from outside a named type that the expressions in its items can use."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
 class Extent(NamedTuple):
-    """The size of bytes or text in bytes, or the number of elements of an array."""
+    """The size of an item in bytes, or the number of elements of an array."""
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0
@@ -53,7 +53,7 @@ class Extent(NamedTuple):
 
 
 class Item(NamedTuple):
-    """One part of a binary frame."""
+    """One item of a binary frame, such as a number, a text or a struct."""
 
     kind: Literal[
         "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
@@ -76,7 +76,7 @@ class Item(NamedTuple):
     matches."""
     scale: float = 1
     offset: float = 0
-    """Offset of the value: value = raw · scale + offset."""
+    """Number to add after scaling: value = raw · scale + offset."""
     enum: tuple[tuple[int, str], ...] = ()
     """Pairs of a raw number and its word; a number without a word stays a number."""
     valid: tuple[float, float] | None = None
@@ -95,7 +95,7 @@ class Item(NamedTuple):
     is_lsb_first: bool = False
     """Whether the first item of ``bits`` contains the least significant bits."""
     items: tuple["Item", ...] = ()
-    """Items of a ``struct``, or the parts of ``bits``."""
+    """Items inside a ``struct``, or the bit fields of ``bits``."""
     switch: "Switch | None" = None
 
     @property
@@ -105,7 +105,7 @@ class Item(NamedTuple):
 
 
 class Switch(NamedTuple):
-    """A choice between items, selected by an expression using earlier items."""
+    """A choice between lists of items, made by an expression over earlier items."""
 
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
@@ -212,7 +212,7 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the formula that uses each size or count item, keyed by the item's name.
+    """Return the formula of each size or count that an item states, keyed by that item's name.
 
     URC computes sizes and counts from the data to send.
     """

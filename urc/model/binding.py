@@ -11,7 +11,7 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
-    """Map the name of each command argument to the name of an output value.
+    """Return the name of the output value for each command argument that receives a value.
 
     An explicit binding takes precedence. Without a binding, a value is passed to the argument of
     the same name. A single output value is passed to the command's only free argument, even if the

@@ -46,7 +46,7 @@ class Timeouts(NamedTuple):
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Idle time after which the connection is closed, in seconds; None means never."""
+    """Maximum time without received data before the connection is closed, in seconds; None: no limit."""
     on_connect_s: float | None = None
     """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the
     timeouts of the individual steps apply."""
@@ -58,7 +58,7 @@ class Backoff(NamedTuple):
     initial_s: float = 0.25
     max_s: float = 5.0
     jitter: float = 0.2
-    """Random fraction of each delay, 0 to 1."""
+    """Fraction of each delay that is random, 0 to 1."""
 
 
 class TransportSpec(NamedTuple):
@@ -97,7 +97,7 @@ class TransportSpec(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Further error replies to any request; each declares a form for decoding."""
+    """Error replies to any request, in forms other than a pattern."""
     hint: str = ""
     """Next step for the operator while the transport cannot connect; "" means the default step for
     the cause."""
@@ -115,9 +115,9 @@ class Reply(NamedTuple):
     arguments, and the request's counters (``seq.NAME``). Without a condition, replies must arrive
     in the order of the requests."""
     stages: tuple[Stage, ...] = ()
-    """Further replies that complete the request."""
+    """Replies that must follow the first reply before the request is complete."""
     faults: tuple[ErrorReply, ...] = ()
-    """Error replies in addition to `errors`; each declares a form for decoding."""
+    """Error replies in forms other than a pattern, in addition to `errors`."""
     framing: FramingSpec | None = None
     """Framing of the reply; None means the connection's framing."""
     asides: ProvisionalReplies = ProvisionalReplies()
@@ -138,7 +138,7 @@ class Reply(NamedTuple):
 
     @property
     def names(self) -> set[str]:
-        """Names that steps after the request can use: each field as ``_field``."""
+        """Names of the reply's fields for later steps, such as ``_field`` for ``field``."""
         reads = (self.read, *(stage.read for stage in self.stages))
         return {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
 
@@ -183,7 +183,7 @@ STOPPED: Final = "STOP was pressed meanwhile: send it again"
 class Command(NamedTuple):
     """A named action.
 
-    A command without a reply is complete when the transport has accepted its bytes.
+    A command without a reply is complete when the transport has accepted the command's bytes.
     """
 
     name: str
@@ -225,7 +225,7 @@ class Command(NamedTuple):
     is the first transport of the steps."""
 
     def moves_with(self, arguments: Mapping[str, object]) -> bool:
-        """Return whether `arguments` start motion; True if `moves_if` cannot be evaluated."""
+        """Return whether a call with `arguments` starts motion; True if `moves_if` fails."""
         if self.moves_if is None or not self.moves:
             return self.moves
         defaults = {name: one.default for name, one in self.arguments.items()}
@@ -245,7 +245,7 @@ class Poll(NamedTuple):
     send: WriteSpec
     reply: Reply | None = None
     phase_s: float = 0.0
-    """Delay between connecting and the first request, in seconds."""
+    """Delay from the opening of the connection to the first request, in seconds."""
     run: str = ""
     """Command that supplies the poll's `send` and `reply`; "" means that the poll declares both."""
     arguments: Mapping[str, Reading] = NOTHING

@@ -96,18 +96,18 @@ class Stage(NamedTuple):
 
 
 MOST_STOPS: Final = 11
-"""Maximum number of transmissions of a stop on a lossy transport."""
+"""Maximum number of times that one stop is sent on a transport that may lose frames."""
 
 
 class Hold(NamedTuple):
     """A command that moves the robot only while the operator holds the control."""
 
     repeat_s: float
-    """Period of the setpoints, in seconds."""
+    """Interval between two setpoints while the control is held, in seconds."""
     release: Mapping[str, Reading] = NOTHING
     """Arguments that stop the motion; omitted arguments have their default values."""
     lease_s: float = 0.25
-    """How long the motion lease lasts unless the operator renews it, 0.1 to 1.0 s."""
+    """Duration of the motion lease if the operator does not renew it, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
     """The robot's watchdog timeout, in seconds: motion continues for this time after the last
     setpoint. ``inf`` means that the robot has no watchdog; None means that the watchdog is unknown.
@@ -142,7 +142,7 @@ class Retry(NamedTuple):
 
 
 class Requirement(NamedTuple):
-    """A precondition for sending a command."""
+    """An interlock: a condition for sending a command."""
 
     condition: Template
     """Condition on fresh signals, settings and the command's arguments."""
@@ -159,7 +159,7 @@ class Verify(NamedTuple):
 
 
 class Offline(NamedTuple):
-    """Polling of a robot, or part of a robot, that is not replying."""
+    """Slower polling of a robot, or a device of the robot, that no longer replies."""
 
     after: int
     """Number of consecutive missed replies before the robot is offline."""

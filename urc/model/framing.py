@@ -41,15 +41,15 @@ class ByteRange(NamedTuple):
 
 
 class Salt(NamedTuple):
-    """Secret bytes after the range in the checksum input."""
+    """Secret bytes that follow the covered range when the checksum is computed."""
 
     constant: bytes = b""
     offset: int = 0
-    """Frame offset of the number that selects an entry in `table`."""
+    """Position in the frame, in bytes, of the number that selects an entry in `table`."""
     size: int = 1
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
-    """Secret bytes, keyed by the selecting number in the frame."""
+    """Secret bytes for each number that the frame may contain at `offset`."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
     """Handling of frames whose number is not in `table`: report and drop (``fault``), drop
     silently (``skip``), or accept unchecked (``pass``)."""
@@ -78,7 +78,7 @@ class ChecksumSpec(NamedTuple):
     closes: bool = False
     """Whether a mismatch closes the connection instead of dropping the frame."""
     before: bytes = b""
-    """Secret bytes before the range in the checksum input."""
+    """Secret bytes that precede the covered range when the checksum is computed."""
 
     @property
     def size(self) -> int:
@@ -101,7 +101,7 @@ class TrailerSpec(NamedTuple):
     each: bytes = b""
     """Line separator of a frame with one checksum per line."""
     skip: int = 0
-    """Number of leading lines without a checksum."""
+    """Number of lines without a checksum at the start of the frame."""
 
 
 class LengthSpec(NamedTuple):
@@ -122,11 +122,10 @@ class LengthSpec(NamedTuple):
     until: bytes = b""
     """Terminator of a length field with at most `size` digits; b"" means no terminator."""
     flag_at: int = -1
-    """Offset of the flag byte that marks a valid length field; -1 means that the length field is
-    always valid."""
+    """Offset of the byte with the flag bits; -1 means that every frame has a length field."""
     flag_mask: int = 0
-    """Mask of the flag byte. The length field is valid if any masked bit of the flag byte is set.
-    If the length field is invalid, the frame is `adjust` bytes long."""
+    """Mask of the flag bits. A frame has a length field only if at least one of these bits is set.
+    A frame without a length field is `adjust` bytes long."""
 
     @property
     def is_loose(self) -> bool:

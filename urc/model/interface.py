@@ -18,7 +18,7 @@ class OutputBinding(NamedTuple):
     """The mapping of a widget output's values to command arguments."""
 
     names: Mapping[str, str] = NOTHING
-    """Name of the output value for each command argument, only where the names differ."""
+    """Name of the output value for each command argument with another name than its value."""
     fixed: Mapping[str, Value] = NOTHING
     """Constant values of command arguments, keyed by argument."""
 
@@ -41,7 +41,7 @@ class WidgetUse(NamedTuple):
     lists: Mapping[str, tuple[str, ...]] = NOTHING
     """Lists of driver signals, keyed by the widget's multiple inputs."""
     files: Mapping[str, str] = NOTHING
-    """Paths of the files named in options, keyed by the file name in the option."""
+    """Paths of the files that the options name, keyed by the file name in the option."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING
     """Validated URLs of third-party pages, keyed by option."""
 
@@ -71,7 +71,7 @@ class Tab(NamedTuple):
     """
 
     name: str = ""
-    """Name of the page; "" means an interface without tabs."""
+    """Name of the tab; "" for the only page of an interface without tabs."""
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
     left_handed: Mapping[str, Layout] = NOTHING
@@ -102,7 +102,7 @@ class Interface(NamedTuple):
 
     @property
     def pages(self) -> tuple[Tab, ...]:
-        """All pages of the interface; never empty."""
+        """The tabs of the interface, or its only page."""
         only = Tab("", self.title, self.layouts, self.left_handed, self.is_mirrored)
         return tuple(self.tabs.values()) or (only,)
 

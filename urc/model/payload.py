@@ -59,9 +59,9 @@ class Count(NamedTuple):
     """The counters of a connection before and after a frame."""
 
     before: dict[str, int]
-    """Last number before the frame, for each used counter."""
+    """Last number of each counter that the frame uses, before the frame."""
     after: dict[str, int]
-    """Last number after the frame, for each counter."""
+    """Last number of each counter, after the frame."""
 
 
 class Numbered(NamedTuple):
@@ -145,7 +145,7 @@ class ReadSpec(NamedTuple):
     """Rules for decoding a frame into fields."""
 
     form: str
-    """Name of a form for reading, such as ``regex``."""
+    """Name of the form in which the frame is read, such as ``regex``."""
     options: Mapping[str, object] = NOTHING
     fields: tuple[str, ...] = ()
     """Names of all possible fields in frame order, followed by the names in `sets`."""
@@ -177,16 +177,16 @@ class WriteSpec(NamedTuple):
     """Rules for encoding arguments into a frame."""
 
     form: str
-    """Name of a form for writing, such as ``text``. The form ``frames`` contains the specifications
-    of several frames."""
+    """Name of the form in which the frame is written, such as ``text``. The form ``frames``
+    contains the specifications of several frames."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
-    """Top-level names that the templates use."""
+    """Names that the templates use; of a name such as ``settings.host``, only the first part."""
     settings: frozenset[str] = frozenset()
     """Names of the settings that the templates use as ``settings.NAME``."""
 
 
 def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:
-    """Return the frames of a group, or only `send` for a single frame."""
+    """Return the frames of a command that sends several frames together, or only `send`."""
     frames = send.options.get("frames")
     return frames if send.form == "frames" and isinstance(frames, tuple) else (send,)

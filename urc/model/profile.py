@@ -53,7 +53,7 @@ class Setting(NamedTuple):
     def is_missing(self, value: Value) -> bool:
         """Return whether `value` is missing, so that the robot cannot connect.
 
-        If the document declares an empty default, an empty value is valid.
+        If the setting's default is empty text, empty text counts as a value.
         """
         return self.is_required and (value is None or (value == "" and self.default != ""))
 
@@ -80,7 +80,7 @@ class ExpectedState(NamedTuple):
 
 
 Expected = Value | tuple[Value, ...] | ExpectedState
-"""Expected value of a signal, or expected elements of an array."""
+"""Expected value of a signal, expected elements of an array, or expected state of a signal."""
 
 
 class DialogueStep(NamedTuple):
@@ -100,11 +100,11 @@ class DialogueStep(NamedTuple):
     wait_s: float | None = None
     """Duration of a pause on the test's clock, in seconds."""
     connects: str = ""
-    """Name of the transport to connect."""
+    """Name of the transport whose connection opens in this step."""
     closes: str = ""
-    """Name of the transport that the robot disconnects."""
+    """Name of the transport whose connection the robot closes."""
     leaves: bool = False
-    """Whether the operator disconnects, which closes all connections in an orderly way."""
+    """Whether the operator leaves the robot, so that all connections close in an orderly way."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
     """URC's expected output since the previous check, keyed by transport; () means no output."""
     expect: Mapping[str, Expected] = NOTHING
@@ -137,7 +137,7 @@ class DocumentTest(NamedTuple):
     """Expected output, keyed by transport: the exact payload without framing, or all bytes on the
     wire."""
     fails: str | None = None
-    """Expected failure message; None means that the test expects success."""
+    """Text that the failure message must contain; None means that the test expects success."""
     file: str = ""
     """Path of the document file."""
     column: int = 1
@@ -178,8 +178,8 @@ class SimulatorRule(NamedTuple):
 
     transport: str
     match: Pattern | ReadSpec | None = None
-    """Text pattern or form for the received frames; None means that the rule does not match frames
-    by content."""
+    """Pattern or form that a received frame must match; None means that `request` or `every_s`
+    triggers the rule."""
     request: str = ""
     """Name of a command or poll; the rule matches its requests."""
     every_s: float | None = None
@@ -192,7 +192,7 @@ class SimulatorRule(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """One robot, ready to connect when its settings are complete."""
+    """One robot, as declared in its documents; it can connect once its settings are complete."""
 
     name: str
     title: str
@@ -223,7 +223,7 @@ class Profile(NamedTuple):
     """Path of the robot's picture; "" if there is no picture."""
 
     def uses(self) -> Iterator[WidgetUse]:
-        """Yield every use of a widget in the slots of the profile and its interfaces."""
+        """Yield each slot's widget, first from the driver and then from the interfaces."""
         yield from self.slots.values()
         for interface in self.interfaces.values():
             yield from interface.widgets.values()

@@ -34,7 +34,7 @@ __all__ = [
 MAX_STEPS = 200
 """Maximum number of steps in one sequence, including all branches."""
 MAX_STEPS_DONE = 10_000
-"""Maximum number of steps in one run, counting every round of every ``repeat``."""
+"""Maximum number of steps in one run, counting every repetition of every ``repeat``."""
 MAX_STEP_S = 600.0
 """Maximum wait in one step, in seconds."""
 
@@ -97,16 +97,16 @@ class RepeatStep(NamedTuple):
 
     body: "tuple[Step, ...]"
     times: int
-    """Maximum number of rounds."""
+    """Maximum number of repetitions."""
     until: Template | None = None
-    """Condition that ends the loop, evaluated after each round; None means that all rounds run."""
+    """Condition that ends the loop, checked after each repetition; None means no early end."""
     otherwise: "tuple[Step, ...] | None" = None
-    """Steps to run if `until` is false after the last round; None means that the sequence fails."""
+    """Steps to run if `until` is false after the last repetition; None: the sequence fails."""
     text: str = ""
 
 
 class RunStep(NamedTuple):
-    """Run a command or another sequence and wait for completion."""
+    """Run a command or another sequence, and wait until it is complete."""
 
     command: str
     arguments: Mapping[str, Template | Value] = NOTHING

@@ -24,7 +24,7 @@ JsonPath = tuple[str | int, ...]
 
 
 class XmlStep(NamedTuple):
-    """One element on the path to a field."""
+    """One step of the path to a field: an element of the XML document."""
 
     tag: str
     """Local name of the element, without namespace."""

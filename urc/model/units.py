@@ -129,7 +129,7 @@ def conversion(have: str, want: str) -> Scale | None:
 
 
 def are_apart(one: str, other: str) -> bool:
-    """Return whether equal numbers in the two units definitely represent different values.
+    """Return whether the same number certainly means different values in the two units.
 
     If a unit is missing, the result is False.
     """

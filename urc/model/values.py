@@ -1,8 +1,8 @@
 """Signals (named, typed values of a robot) and their samples.
 
 All values in `urc.model` are named tuples. Named tuples are immutable and typed, like frozen
-dataclasses. Compared to a dataclass, a named tuple takes a tenth of the time to define and a third
-of the time to construct. The definition time affects every start of the command line; the
+dataclasses. Python defines a named tuple class in a tenth of the time of a dataclass, and
+constructs an instance in a third. The definition time affects every start of the command line; the
 construction time affects every sample.
 """
 
@@ -42,7 +42,7 @@ Value = bool | int | float | str | None
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
 """Value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
-"""Axis convention of a value; "" means not declared."""
+"""Axis convention of a value; "" means that the driver declares none."""
 Alarm = Literal["", "lolo", "low", "high", "hihi", "minor", "major"]
 """Alarm limit that a value has crossed, or severity of an alarm state, both named as in EPICS; ""
 means no alarm."""
@@ -89,7 +89,7 @@ class AlarmLimits(NamedTuple):
 
     @property
     def is_timed(self) -> bool:
-        """Whether an alarm can begin or end without a new value."""
+        """Whether an alarm can begin or end after a delay, without a new value."""
         return self.for_s > 0 or self.off_delay_s > 0
 
     def attributes_of(self, condition: str) -> AlarmAttributes:
@@ -133,7 +133,7 @@ PLAIN = Conversion()
 
 
 class Signal(NamedTuple):
-    """A declared value of a robot."""
+    """A named, typed value of a robot, as declared in the driver."""
 
     name: str
     type: SignalType = "number"
@@ -141,7 +141,7 @@ class Signal(NamedTuple):
     unit: str = ""
     """Unit symbol, similar to UCUM: ``%``, ``m/s``, ``rad``, ``degC``."""
     min: float | None = None
-    """Minimum valid value; a smaller value is a violation and is discarded."""
+    """Minimum valid value; URC discards a smaller value and counts it as a fault."""
     max: float | None = None
     precision: int | None = None
     """Number of digits after the decimal point."""

@@ -58,15 +58,14 @@ class Widget(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of the widget's options."""
     at_least_one_of: tuple[str, ...] = ()
-    """Group of inputs, outputs and options; at least one is required. An empty group requires
-    nothing."""
+    """Inputs, outputs and options of which at least one is required; () means no such rule."""
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
-    """Minimum number of columns and rows in the slot."""
+    """Minimum number of columns and rows that the widget needs in its slot."""
     footprint: Footprint = "instrument"
     is_dead_man: bool = False
-    """Whether the widget is a dead-man control; while released, no motion commands are sent."""
+    """Whether the widget is a dead-man control, whose release disables all held commands."""
     summary: str = ""
     licence: str = ""
     """SPDX licence identifier of the widget, from the manifest."""

@@ -38,7 +38,7 @@ INPUTS: Final[Mapping[str, tuple[str, ...]]] = {
     "swimmer": ("forward", "turn"),
     "quadrotor": ("flies", "forward", "sideways", "climb", "turn", "cut"),
 }
-"""Inputs for `drive`, by body type."""
+"""Names of the inputs under `drive`, by body type."""
 
 BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "track": ("differential", "tracks"),
@@ -117,7 +117,7 @@ class PlanSpec(NamedTuple):
 
 
 class BodySpec(NamedTuple):
-    """The kinematics of the robot's body."""
+    """The type, size and motion limits of the emulated robot's body."""
 
     type: BodyType = "differential"
     radius: float = 0.18
@@ -142,9 +142,9 @@ class BodySpec(NamedTuple):
     joints: int = 8
     legs: int = 0
     amplitude: float = 0.7
-    """Amplitude of the swimming motion at full drive, in rad."""
+    """Amplitude of each joint's swing at full drive, in rad."""
     frequency: float = 1.0
-    """Frequency of the swimming motion at full drive, in Hz."""
+    """Frequency of each joint's swing at full drive, in Hz."""
     climb: float = 0.8
     """Maximum climb rate, in m/s."""
     hover: float = 0.8
@@ -202,11 +202,11 @@ class BatterySpec(NamedTuple):
     idle: float = 0.3
     """Current at standstill, in A."""
     drive: float = 2.0
-    """Additional current at full drive, in A."""
+    """Current at full drive, in addition to `idle`, in A."""
 
 
 class Failsafe(NamedTuple):
-    """The robot's reaction to missing commands."""
+    """The emulated robot's reaction when it no longer receives certain commands."""
 
     after_s: float
     without: tuple[str, ...]

@@ -117,7 +117,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         problems.error(
             part,
             "not-idempotent",
-            "the robot may perform the command twice when a reply is lost",
+            "if a reply is lost, the robot may perform the command twice",
             at="retries",
             hint="write idempotent: true if the command can safely run twice, or remove 'retries'",
         )
@@ -230,7 +230,7 @@ def parse_sequence(
     """Return a sequence as a command.
 
     `part` is a list of steps, or a mapping with the key ``steps``. `only` is the name of the
-    driver's only transport, or "".
+    driver's only transport; "" if the driver has several.
     """
     inner = part.must("steps") if isinstance(part.data, dict) else part
     steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), problems)
@@ -385,7 +385,7 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice in the notation of document keys."""
+    """Return an argument's choice as the text that a document's key would have."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -401,7 +401,7 @@ def _retries(part: Node | None, problems: Problems) -> tuple[int, Retry]:
         problems.error(
             part,
             "wrong-order",
-            "the first delay is longer than the longest delay",
+            "'initial' is longer than 'max'",
             at="initial",
             hint="'initial' is the first delay, and 'max' is the longest delay",
         )

@@ -47,7 +47,7 @@ class FormContext(NamedTuple):
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
     """Numbers and words of the driver's enums, by name."""
     catalog: Registries | None = None
-    """Available framings, for a frame that declares its own framing."""
+    """Registered types, which the parser needs for a frame that declares its own framing."""
     framing: FramingSpec | None = None
     """Framing of the transport; None for a frame that declares its own framing."""
 
@@ -59,7 +59,7 @@ class ReadForm(Protocol):
         """Return the declaration at `part`; None if a problem was reported."""
 
     def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-        """Return the position of `field`, as arguments of `Problems.error`."""
+        """Return the node and the arguments of `Problems.error` that locate `field`."""
 
 
 class WriteForm(Protocol):

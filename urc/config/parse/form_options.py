@@ -30,7 +30,13 @@ def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
     for name, inner in heads.items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
-            problems.error(inner, "duplicate-name", text, key=True, hint="rename one of them")
+            problems.error(
+                inner,
+                "duplicate-name",
+                text,
+                key=True,
+                hint="rename the field or the name under 'head'",
+            )
     when, subscribe = part.get("when"), part.get("subscribe")
     topic = problems.template(subscribe.must("topic")) if subscribe else None
     if topic is not None and ("+" in topic.source or "#" in topic.source):

@@ -22,7 +22,7 @@ __all__ = ["MARKED", "checksums_of", "parse_layout"]
 MARKED: Final = ("fixed", "length", "brackets")
 """Framing types with start, length or end bytes."""
 _SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
-"""Framing types that may encode bytes as digits."""
+"""Framing types that allow `decode`, with which frames consist of hex or base64 digits."""
 
 
 class _BareLayout(NamedTuple):
@@ -67,7 +67,7 @@ def parse_layout(part: Node, encoding: str, problems: Problems, longest: int) ->
 
 
 def _digits(part: Node, problems: Problems) -> Digits:
-    """Return the digit encoding of the framing at `part`."""
+    """Return the encoding under `decode`, in which digits represent the bytes of a frame."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
         text = "'escape' has no effect with 'decode', because digits need no escaping"
@@ -95,7 +95,7 @@ def _check_trail(part: Node, written: DeclaredChecksum, count: int, problems: Pr
 def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
     trailer = written.trailer
     if trailer is None:
-        raise AssertionError("a checksum in a fixed place is not a trailer")
+        raise AssertionError("a checksum at a fixed position has no trailer")
     over = written.over
     if not isinstance(over, ByteRange):
         over = ByteRange(len(start) if over == "payload" and not trailer.each else 0)
@@ -259,7 +259,7 @@ def _check_window(
             return
         if -over.start > least:
             text = (
-                f"the window starts {-over.start} bytes before the end, but a frame may have only"
+                f"the window starts {-over.start} bytes before the end, but a frame may only have"
                 f" {least}"
             )
             problems.warn(part, "outside-frame", text, at=where)
@@ -364,6 +364,6 @@ def _check_loose(part: Node, problems: Problems) -> None:
     if inner is not None:
         for one in inner.items() if isinstance(inner.data, list) else [inner]:
             if "over" not in one.data or one.must("over").data == "payload":
-                text = "the start of the payload is not fixed"
-                hint = "write 'over: frame', or give two positions"
+                text = "the payload has no fixed start, so the checksum cannot cover it"
+                hint = "write 'over: frame', or a window with 'from' and 'to'"
                 problems.error(one, "misplaced-key", text, hint=hint)

@@ -155,7 +155,7 @@ def _switch(part: Node, encoding: str, problems: Problems, catalog: Registries) 
             continue
         for key in ("timeout", "strip_ansi"):
             if key in inner.data:
-                text = f"'{key}' must be a key of the 'switch' itself"
+                text = f"'{key}' must be a key of the 'switch' framing, not of a case"
                 problems.error(inner, "misplaced-key", text, at=key, key=True)
         spec = parse_framing(inner, encoding, problems, catalog)._replace(
             timeout_s=None, strips_ansi=False
@@ -204,7 +204,7 @@ def _check_case(
                 part,
                 "unreachable-case",
                 f"frames that start with {first.hex(' ')} match the earlier case {other.hex(' ')}",
-                hint="put the longer case first",
+                hint="move the case with the longer 'first' above the other case",
             )
             return
     start = getattr(spec.options.get("layout"), "start", b"")
@@ -220,7 +220,7 @@ _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
 def _check_pattern(part: Node, problems: Problems) -> None:
-    """Report mistakes in a framing's pattern, such as an undefined end of the frame."""
+    """Report mistakes in a framing's pattern, such as an end of variable length."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
     if far is not None:
@@ -251,7 +251,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
         problems.error(
             part,
             "open-end",
-            "the pattern has an open end, so URC cannot tell where a frame ends",
+            "the pattern ends with a part of variable length, so the end of a frame is unclear",
             hint=f"add the end of a frame, such as '{text}\\r\\n'",
         )
 

@@ -214,5 +214,5 @@ def _check_rectangle(slot: Slot, part: Node, rows: list[list[_Cell]], problems: 
         f" {slot.column + 1} to row {bottom} column {right}, but {', '.join(told)}{more}",
         offset=offset,
         length=len(text),
-        hint="rename the separate cells, or fill the gap",
+        hint="give the separate cells another name, or fill the gap between them",
     )

@@ -31,8 +31,8 @@ def parse_limits(
     Args:
         part: the signal.
         kind: type of the signal, or of an array's elements.
-        bounds: smallest and largest valid value.
-        states: pairs of raw text and displayed word.
+        bounds: the signal's ``min`` and ``max``.
+        states: the signal's states, as pairs of the text from the robot and the displayed word.
         problems: collector of problems.
     """
     inner = part.get("limits")
@@ -43,7 +43,13 @@ def parse_limits(
         return AlarmLimits()
     if not {*NUMERIC_LIMITS, "states"} & inner.data.keys():
         hint = f"add one of {', '.join(NUMERIC_LIMITS)}, or 'states' for a boolean or text"
-        problems.error(inner, "missing-key", "no value can cause an alarm", key=True, hint=hint)
+        problems.error(
+            inner,
+            "missing-key",
+            "'limits' has no limit and no state, so no value can cause an alarm",
+            key=True,
+            hint=hint,
+        )
         return AlarmLimits()
     values = _numbers(inner, kind, bounds, problems)
     words = _words(inner, kind, states, problems)
@@ -61,7 +67,7 @@ def parse_limits(
 
 
 def _numbers(part: Node, kind: str, bounds: _Bounds, problems: Problems) -> dict[str, float | None]:
-    """Return the limits by name; None for missing limits."""
+    """Return the limits by name; the value of a missing limit is None."""
     values: dict[str, float | None] = {name: _limit(part, name) for name in NUMERIC_LIMITS}
     given = [(name, value) for name, value in values.items() if value is not None]
     if kind not in _NUMBERS:

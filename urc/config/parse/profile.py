@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Value types of non-text settings, by setting type."""
+"""Types of the values of settings that are not text, by type of setting."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:
@@ -75,7 +75,7 @@ def parse_tags(part: Node, problems: Problems) -> tuple[str, ...]:
                 inner,
                 "duplicate-name",
                 f"the tag {inner.data!r} is listed twice",
-                hint="remove one of the two",
+                hint="remove one of the two tags",
             )
         tags[inner.data] = None
     return tuple(tags)

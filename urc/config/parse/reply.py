@@ -35,7 +35,7 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
     own, context = parse_own_framing(part, problems, context)
     stages = part.listed("stages")
     for inner in stages:
-        refuse(inner, _OF_THE_WHOLE, "must be a key of the whole reply", problems)
+        refuse(inner, _OF_THE_WHOLE, "must be a key of 'reply', not of a stage", problems)
     if stages:
         beside = (
             *READ_FORMS,
@@ -48,7 +48,7 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
             "resend",
             "extend",
         )
-        refuse(part, beside, "must be a key of one of the stages", problems)
+        refuse(part, beside, "must be a key of a stage, not of 'reply'", problems)
     first, *others = [parse_stage(inner, problems, context) for inner in stages or [part]]
     errors, faults = parse_errors(part, problems, context) if stages else ((), ())
     match = part.get("match")
@@ -67,7 +67,8 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 def implied_reply(send: WriteSpec) -> Reply | None:
     """Return the implied reply to a request if its protocol always replies; otherwise None.
 
-    Without the implied reply, a refused request would count as complete as soon as it is sent.
+    The reply is needed to detect a refusal: without it, a request would be complete as soon as it
+    is sent.
     """
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
@@ -110,7 +111,7 @@ def _asides(part: Node, problems: Problems, context: FormContext) -> Provisional
                 "wrong-order",
                 "'within' is shorter than the timeout of the reply",
                 at="within",
-                hint="'timeout' limits the wait for each reply, 'within' the wait for all replies",
+                hint="'timeout' limits the wait for each frame, and 'within' limits the total wait",
             )
     resend = part.get("resend")
     if resend is not None and isinstance(resend.data, dict):

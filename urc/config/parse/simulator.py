@@ -41,9 +41,9 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("fov", "tilt"),
 }
-"""Fields that documents give in degrees, by part of the world."""
+"""Model fields whose values are in degrees in documents, by part of the world."""
 _KEYS: Final = {"first": "from", "last": "to"}
-"""Keys of a laser in documents, by model field."""
+"""Keys in documents for the model fields of a laser that have other names."""
 _LONGEST_S: Final = 3600.0
 
 Spec = TypeVar("Spec", bound=Any)
@@ -52,7 +52,7 @@ Spec = TypeVar("Spec", bound=Any)
 def parse_world(part: Node, problems: Problems) -> WorldSpec:
     """Return the world at `part`, with unresolved names."""
     if "body" not in part.data:
-        text = "this world lacks 'body'"
+        text = "this world has no 'body'"
         hint = "write body: { type: differential }, or another type"
         problems.error(part, "missing-key", text, key=True, hint=hint)
         return WorldSpec()

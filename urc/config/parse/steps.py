@@ -32,7 +32,7 @@ _NO_PATTERN: Final = "^$"
 
 
 class StepContext(NamedTuple):
-    """Properties of a sequence that the step parsers need."""
+    """The facts about a sequence that the parsers of its steps need."""
 
     transport: str
     """Default transport of the steps; "" if each step must name its transport."""
@@ -95,7 +95,7 @@ def _step(part: Node, context: StepContext, problems: Problems) -> sequence.Step
         refuse(
             part,
             ("to", "from"),
-            "is only for sequences, because these steps have only one transport",
+            "is allowed only in sequences; these steps use the transport that declares them",
             problems,
         )
     return _one(verb, part, context, problems)
@@ -188,7 +188,7 @@ def _repeat(
             "missing-key",
             "'times' is missing: the number of repetitions has no limit",
             key=True,
-            hint="write times: 10, and until: CONDITION to end earlier",
+            hint="write times: 10, and add until: CONDITION if the loop may end earlier",
         )
     until = part.get("until")
     if until is None:
@@ -233,7 +233,9 @@ def _if(
             hint="write else: [{ fail: … }] to end here",
         )
     if "then" not in part.data and "else" not in part.data:
-        problems.error(part, "missing-key", "'then' is missing: this step does nothing", key=True)
+        problems.error(
+            part, "missing-key", "'then' is missing, so this step does nothing", key=True
+        )
     return None if condition is None else sequence.IfStep(condition, then, otherwise or ())
 
 

@@ -17,16 +17,16 @@ _IN_STEPS: Final = ("polls", "ready")
 _VERBS: Final = (
     "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
 )  # fmt: skip
-"""Kinds of messages in a test."""
+"""Keys for the kinds of messages in a test."""
 _ADDRESS: Final = (
     "topic", "type", "service", "action", "method", "path", "url", "query", "headers", "qos",
     "retain", "ok", "status", "reason",
 )  # fmt: skip
-"""Keys for a message's address and status."""
+"""Keys of a message that are not part of its body: its address, options and status."""
 _BODIES: Final = ("json", "text", "hex")
 """Keys for a message's body."""
 _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
-"""Mutually exclusive keys of a step."""
+"""Keys for the action of a step; a step may have only one of them."""
 
 
 def parse_test(part: Node, problems: Problems) -> DocumentTest:
@@ -101,7 +101,7 @@ def _step(part: Node, problems: Problems) -> DialogueStep:
 
 
 def _place(part: Node) -> tuple[int, int, str]:
-    """Return the line, the column and the source line of `part`."""
+    """Return the line number, the column number and the text of the line of `part`."""
     mark, home = part.document.at(part.path), part.document.source_of(part.path)
     line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
     return line, column, home.lines[line - 1]

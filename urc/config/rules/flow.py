@@ -59,14 +59,14 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
             part.must("keepalive").must("every"),
             "slow-keepalive",
             f"the watchdog of the robot expires first, after {shown_duration(watchdog_s)}",
-            hint="use half of this time, to tolerate the loss of one frame",
+            hint="send the keepalive at least twice in this time, so that one frame may be lost",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
         problems.warn(
             part.must("on_close"),
             "long-on-close",
-            f"these steps may wait {shown_duration(waits_s)}, but the limit is"
+            f"these steps may wait for {shown_duration(waits_s)}, but the limit is"
             f" {shown_duration(_GOOD_BYE_S)} in total",
             key=True,
         )
@@ -106,7 +106,7 @@ def _least_bytes(poll: Poll) -> int:
 def _check_stages(
     part: Node, reply: Reply, transport: str, driver: Driver, problems: Problems
 ) -> None:
-    """Warn about a long second stage that delays its transport's polls."""
+    """Warn about a command whose wait for a later reply stage delays its transport's polls."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
         return
     periods = [poll.every_s for poll in driver.polls if poll.transport == transport]

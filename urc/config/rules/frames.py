@@ -22,7 +22,7 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""Sample values for a field; a pattern may reject some of them."""
+"""Sample values of a field for example frames; a pattern may reject some values."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
@@ -163,7 +163,7 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return a phrase with an example if `first` matches every frame of `second`, else None."""
+    """Return text with an example if `first` matches every frame of `second`; otherwise, None."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:
@@ -347,7 +347,7 @@ def _check_words(part: Node, problems: Problems) -> None:
 
 
 def _words(data: Any) -> Counter[str]:
-    """Count the occurrences of each word in the texts of a part."""
+    """Return how often each word occurs in the texts of a part."""
     return Counter(word for text in _texts(data) for word in _WORD.findall(text))
 
 

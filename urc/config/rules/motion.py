@@ -1,8 +1,8 @@
 """Rules for held commands: watchdog, lease, repetition and transport load.
 
 If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
-therefore declare the watchdog. A lease or period that is at least as long as the watchdog time is
-an error, because the watchdog would stop the robot first.
+therefore declare the robot's watchdog. A lease or period that is at least as long as the watchdog
+time is an error, because the watchdog would stop the robot first.
 """
 
 import math
@@ -120,8 +120,7 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
             "repeat-too-slow",
             f"the command is repeated every {shown_duration(hold.repeat_s)}, but the robot stops"
             f" itself after {shown_duration(watchdog_s)}: the motion would stutter",
-            hint="repeat the command three times within this time, to tolerate the loss of one"
-            " value",
+            hint="repeat the command three times within this time, so that one value may be lost",
         )
 
 
@@ -196,7 +195,7 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest period in ms after scaling all periods equally to fit the serial line."""
+    """Return the shortest period in ms after all periods have grown by the factor `excess`."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 
@@ -215,7 +214,7 @@ def _notices(spec: TransportSpec, driver: Driver) -> bool:
 def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
     """Return the minimum size of a frame with its framing, in bytes.
 
-    A variable part counts as one byte. Byte stuffing does not count.
+    Each part of variable length counts as one byte. Byte stuffing does not count.
     """
     frames = each_of(send)
     return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)

@@ -15,7 +15,7 @@ from urc.model.interface import Interface
 __all__ = ["check_profile"]
 
 _ENDINGS: Final = (".yaml", ".yml")
-"""File suffixes of documents; text from other sources has no file name."""
+"""File suffixes of documents; a document that was not read from a file has none of them."""
 
 
 def check_profile(
@@ -168,7 +168,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
 
 
 def _place(part: Node, near: Node) -> str:
-    """Return the line of `part`, with the file name if `near` is in another file."""
+    """Return the line number of `part` as text, with the file name if `near` is in another file."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
     line = f"line {mark.span.line if mark else 1}"

@@ -1,6 +1,6 @@
 """Rules for a transport's traffic, such as late motion and poll rates.
 
-All rules check declared values, never defaults.
+The rules check only values that the document declares, never defaults.
 """
 
 from collections.abc import Mapping
@@ -121,7 +121,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
                 "hold-rate-limited",
                 f"the command is repeated every {shown_duration(repeat_s)}, but {what} allows it"
                 f" only every {shown_duration(limit_s)}",
-                hint="make 'repeat' at least as long as this time",
+                hint="make 'repeat' at least as long as the time that 'rate_limit' allows",
             )
 
 
@@ -148,5 +148,5 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Pr
                 "slow-keepalive",
                 f"the connection {what} after {shown_duration(limit_s)}, but the robot is polled"
                 f" every {shown_duration(min(periods))}",
-                hint="allow at least two periods, to tolerate the loss of one reply",
+                hint="make the time at least two poll periods long, so that one reply may be lost",
             )

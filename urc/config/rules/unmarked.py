@@ -1,4 +1,4 @@
-"""Finds unmarked motion commands, and autonomous motion without a stop command or a confirmation.
+"""Finds undeclared motion, and autonomous motion without a stop command or a confirmation.
 
 A command may suggest motion by its name, by its arguments' units and names, or by its message type.
 Only whole words match: ``moves_left`` does not match ``move``.
@@ -53,7 +53,7 @@ _HINT_OF_STEPS: Final = (
 
 
 def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn about each command or sequence that suggests motion but is not marked."""
+    """Warn about each command or sequence that suggests motion but does not declare it."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
             command = driver.commands[name]
@@ -64,8 +64,8 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner,
                     "unmarked-motion",
-                    f"{name!r} seems to move the robot ({why}) and is not marked: STOP does not"
-                    " block this command",
+                    f"{name!r} seems to move the robot ({why}) but does not declare motion:"
+                    " STOP does not block this command",
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
                 )

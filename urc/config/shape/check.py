@@ -42,8 +42,8 @@ def check_shape(document: Document) -> list[Problem]:
 def check_source(document: Document) -> list[Problem]:
     """Check one source of a merged document for problems that the merge would hide.
 
-    The merge may remove unknown keys and source-only keys. Missing keys are not reported, because
-    another source may add them. The shape pass also checks the merged document.
+    The merge may remove unknown keys, and removes keys such as ``extends``. Missing keys are not
+    reported, because another source may add them. The shape pass also checks the merged document.
     """
     if not kind_of(document):
         return [_without_kind(document)]
@@ -64,7 +64,7 @@ def check_source(document: Document) -> list[Problem]:
 
 
 _OWN_KEYS: Final = ("urc", "extends", "include", "partial")
-"""Keys that a merge never copies into another document."""
+"""Keys that a merge never takes over from an extended or included document."""
 
 
 @cache
@@ -150,7 +150,7 @@ def _without_kind(document: Document) -> Problem:
         ("kind",),
         "unknown-kind",
         f"there is no document kind {kind!r}",
-        hint="use the word 'robot'"
+        hint="write 'kind: robot'"
         if kind in ("profile", "robot-profile", "robots")
         else did_you_mean(str(kind), KINDS, "kinds"),
     )

@@ -85,7 +85,7 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output has 'command'",
 }
-"""Hints, by misplaced key and by a valid key in the same mapping."""
+"""Hints for misplaced keys, by the misplaced key and a key that the mapping may have."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
@@ -199,7 +199,7 @@ def _unit_above(document: Document, path: Path) -> str:
 
 
 def inner_key_hint(document: Document, path: Path, known: Mapping[str, Any]) -> str:
-    """Return a hint for entries that belong inside the preceding key; "" for other values.
+    """Return a hint for entries that should be indented below the preceding key, or "".
 
     Args:
         document: the document.
@@ -291,7 +291,7 @@ def _plain_name(text: str) -> str:
 
 
 def _is_of_entries(value: Sequence[object]) -> bool:
-    """Return whether each item of a list is a mapping with one key."""
+    """Return whether a list looks like the entries of a mapping: each item has exactly one key."""
     return bool(value) and all(isinstance(one, dict) and len(one) == 1 for one in value)
 
 
@@ -310,7 +310,7 @@ def _duration(number: float, unit: str) -> str:
 
 
 def _written(document: Document, path: Path) -> str:
-    """Return the source text of a scalar."""
+    """Return the text of a scalar as written in the document; "" for several lines."""
     mark = document.at(path)
     if mark is None or mark.span.line != mark.span.end_line:
         return ""

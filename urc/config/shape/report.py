@@ -35,7 +35,7 @@ class _Error(NamedTuple):
 
     keyword: str
     limit: Any
-    """Value of the keyword in the schema."""
+    """Value that the schema assigns to `keyword`, such as a minimum."""
     value: Any
     """Invalid value in the document."""
     schema: Mapping[str, Any]
@@ -60,9 +60,9 @@ _EXPECTED: Final = {
 def report(
     document: Document, schema: Mapping[str, Any], read: _Read, path: Path = (), value: Any = None
 ) -> list[Problem]:
-    """Return the problems in a document, with the deepest paths first.
+    """Return the problems in the part at `path`; problems with the deepest paths come first.
 
-    The schema describes the part at `path`. `read` returns the schema with a given file name.
+    `schema` describes this part. `read` returns the schema with a given file name.
     """
     registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # alias of attrs, unknown to mypy
         retrieve=lambda uri: Resource.from_contents(read(uri), DRAFT202012)
@@ -256,7 +256,7 @@ def _other_one(document: Document, path: Path, error: _Error) -> Problem:
 
 
 def _in_names(tell: _Report) -> _Report:
-    """Wrap a report function so that errors in key names are reported separately."""
+    """Return a function that reports invalid key names itself and passes other errors to `tell`."""
 
     def choose(document: Document, path: Path, error: _Error) -> list[Problem]:
         return (_wrong_name if error.is_name else tell)(document, path, error)

@@ -13,12 +13,12 @@ Piece = bytes | Template
 
 
 class Placed(NamedTuple):
-    """One piece of a frame with its path under the form's key."""
+    """Constant bytes or an expression, with the path of its text under the form's key."""
 
     piece: Piece
     path: tuple[int, ...] = ()
     offset: int = 0
-    """Offset of the expression in its text, in characters."""
+    """Offset of the expression in the text at `path`, in characters."""
 
 
 def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:

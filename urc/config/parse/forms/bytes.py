@@ -13,7 +13,7 @@ __all__ = ["parse_write", "templates"]
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the bytes of the list at `part`."""
+    """Return the constant bytes and the expressions in the list at `part`."""
     pieces: list[Placed] = []
     for place, inner in enumerate(part.items()):
         if isinstance(inner.data, str) and "{{" in inner.data:

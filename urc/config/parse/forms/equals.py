@@ -22,5 +22,5 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the position of the text, because the form has no fields."""
+    """Return the position of the constant text: the form has no fields."""
     return part, {}

@@ -24,7 +24,7 @@ _ODD = re.compile(r"(?<![0-9A-Fa-f])(?:[0-9A-Fa-f]{2})*[0-9A-Fa-f](?![0-9A-Fa-f]
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the bytes at `part`."""
+    """Return the constant bytes and the expressions in the text at `part`."""
     pieces: list[Placed] = []
     try:
         for offset, literal, expression in split_template(part.data):

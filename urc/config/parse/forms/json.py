@@ -1,7 +1,7 @@
 """The ``json`` form: fields of a JSON document, addressed by JMESPath expressions.
 
-Plain paths such as ``a.b[0].c`` become tuples for the engine. All other paths need the JMESPath
-library.
+The parser converts plain paths such as ``a.b[0].c`` to tuples, which the engine evaluates itself.
+All other paths need the JMESPath library.
 """
 
 import re

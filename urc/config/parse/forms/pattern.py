@@ -15,11 +15,11 @@ _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 _FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
-"""Characters that must not directly follow a field, by kind of field."""
+"""Characters that would count as part of a field if they followed it directly, by field kind."""
 
 
 class _PatternFault(Exception):
-    """A mistake in a pattern, with its position."""
+    """A mistake in a pattern, with the mistake's position and a hint."""
 
     def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
         super().__init__(message)

@@ -10,7 +10,7 @@ __all__ = ["parse_read", "place_of"]
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec:
-    """Return the field at `part`."""
+    """Return the declaration of the only field, which `part` names."""
     return ReadSpec("raw", {"field": part.data}, (part.data,))
 
 

@@ -12,7 +12,7 @@ _MORE = "..."
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return the separator and the names of the parts."""
+    """Return the declaration at `part`: the separator, and the name of each part."""
     names: list[str] = []
     has_more = is_good = True
     tail = ""

@@ -65,7 +65,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 def _check_size(
     part: Node, items: tuple[Item, ...], framing: FramingSpec | None, problems: Problems
 ) -> None:
-    """Report items that are too large or too small for the transport's frames."""
+    """Report a struct whose size does not fit the frames of the transport's framing."""
     if framing is None:
         return
     layout = framing.options.get("layout")

@@ -12,7 +12,7 @@ __all__ = ["parse_write", "templates"]
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the template at `part`."""
+    """Return the declaration of the frame with the compiled template at `part`."""
     template = problems.template(part)
     if template is None:
         return None

@@ -1,1 +1,1 @@
-"""Layouts of binary frames."""
+"""Parsers for the items of binary frames."""

@@ -91,7 +91,7 @@ class ItemParser:
                 self.problems.error(
                     part.items()[place + 1],
                     "after-rest",
-                    "the previous item takes the rest of the frame",
+                    "the previous item extends to the end of the frame",
                     hint="give the previous item a size, or move that item to the end",
                 )
 
@@ -296,7 +296,11 @@ class ItemParser:
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
             text = f"{key!r} is not a value of {subject.id!r}"
-            hint = f"words: {', '.join(words)}" if words else "the item has no words"
+            hint = (
+                f"words: {', '.join(words)}"
+                if words
+                else "the item has no 'enum', so its values have no words"
+            )
             self.problems.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]
@@ -306,7 +310,7 @@ class ItemParser:
             check_fits(part, subject.number, key, self.problems, key=True)
 
     def _check_sent(self, part: Node, item: Item) -> None:
-        """Report an item of a sent struct without a value or with an unknown size."""
+        """Report an item of a sent struct that has no value, or a size from `_left` or `_size`."""
         if self.purpose == "send" and asks_for_the_end(item):
             self.problems.error(
                 part,
@@ -365,7 +369,7 @@ def asks_for_the_end(item: Item) -> bool:
 
 
 def weight_of(item: Item | None) -> int:
-    """Return the number of items in an item after its expansion, including the item itself."""
+    """Return how many items an item counts as: itself, and all items inside it."""
     if item is None:
         return 0
     return 1 + sum(weight_of(one) for items in _inner(item) for one in items)

@@ -13,7 +13,7 @@ __all__ = ["LeafParser", "kind_of", "parse_content"]
 
 
 def kind_of(number: Number) -> Literal["number", "coded"]:
-    """Return the item kind of a number."""
+    """Return the kind of the item for a number: ``number`` or ``coded``."""
     return "coded" if number.is_coded else "number"
 
 

@@ -48,7 +48,7 @@ _NUMBER_WORD: Final = re.compile(
 
 
 def _our_type(found: re.Match[str]) -> str:
-    """Return the type for another language's type name, little-endian by default."""
+    """Return URC's type for a type name of another language, by default little-endian."""
     if found["word"]:
         return {"byte": "u8", "char": "i8", "float": "f32le", "double": "f64le"}[found["word"]]
     name = ("u" if found["sign"] else "i") + found["bits"]
@@ -152,7 +152,7 @@ def parse_enums(part: Node, problems: Problems) -> dict[str, Enum]:
 
 
 def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], problems: Problems) -> Enum:
-    """Return an item's enum, which is an inline enum or an enum of the driver."""
+    """Return the words under ``enum``: a table of words, or the name of an enum of the driver."""
     inner = part.get("enum")
     if inner is None:
         return ()

@@ -16,7 +16,7 @@ class Scope:
 
     def __init__(self, problems: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
-        """Items by name; None for a name whose item is not in this struct."""
+        """Items by name; None for a known name that has no item in this struct."""
         self.uses: list[tuple[Node, Template]] = []
         """Expressions that use arguments or settings, with their nodes."""
         self._problems = problems
@@ -102,12 +102,12 @@ class Scope:
                 " received frames have neither"
             )
         if name == "settings":
-            return "compare a frame with a setting in 'when', next to the struct"
+            return "to compare a frame with a setting, use 'when' next to the struct"
         return did_you_mean(name, [*self.known, *FRAME_NAMES], "names")
 
 
 def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
-    """Yield the item values in a type that use names from outside the type."""
+    """Yield each `value` in a type's items that uses settings or counters."""
     for item in items:
         if item.value is not None and item.value.names & OUTER_NAMES:
             one = item.value
