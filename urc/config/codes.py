@@ -18,7 +18,7 @@ class CodePage(NamedTuple):
 
     code: str
     what: str
-    """What is wrong, in one sentence."""
+    """The problem, in one sentence."""
     why: str
     """Why URC reports the problem: its effect or its cause."""
     example: str

@@ -159,7 +159,7 @@ def _follow(reference: Node, kind: str, library: Library, given: Node | None = N
             reference,
             "partial-document",
             f"{prepared.file} is a partial {kind}",
-            hint="use a document that includes or extends this document",
+            hint="use a document that includes or extends the partial document",
         )
         return None
     return Node(prepared, (), prepared.data)

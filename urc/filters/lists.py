@@ -1,8 +1,8 @@
 """Expression filters and operators for lists and text.
 
-Private to `urc.filters.table`. Each function accepts any value from a document. It returns a
-result, or raises TypeError or ValueError with a human-readable message. The size of the input
-limits the size of the result.
+Private to `urc.filters.table`. Each function accepts any value from a document. If a function
+cannot handle a value, it raises TypeError or ValueError with a message for users. The size of the
+input limits the size of the result.
 """
 
 import re

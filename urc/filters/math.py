@@ -50,5 +50,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
-value."""
+"""Filters for angles, roots and rounding, by name: function, and minimum and maximum number of
+arguments."""

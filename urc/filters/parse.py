@@ -174,5 +174,5 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Each filter's function, with its minimum and maximum argument counts, excluding the filtered
-value."""
+"""Filters for the content of one field, by name: function, and minimum and maximum number of
+arguments."""

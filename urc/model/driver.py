@@ -46,7 +46,7 @@ class Timeouts(NamedTuple):
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Maximum time without received data before the connection is closed, in seconds; None: no limit."""
+    """Time without received data after which the connection is closed, in seconds; None: never."""
     on_connect_s: float | None = None
     """Timeout for all steps of ``on_connect`` together, in seconds; None means that only the
     timeouts of the individual steps apply."""

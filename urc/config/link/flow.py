@@ -33,7 +33,7 @@ class Linker(Protocol):
     problems: Problems
 
     def transport(self, part: Node, key: str, name: str) -> None:
-        """Check the transport name under `key`, which `part` may omit."""
+        """Check the transport name under `key`, which is optional if there is one transport."""
 
     def fields(self, part: Node, read: ReadSpec) -> None:
         """Check that each field is a signal or starts with ``_``."""

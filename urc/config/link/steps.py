@@ -36,7 +36,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
                 "duplicate-name",
                 f"a command also has the name {name!r}",
                 key=True,
-                hint="give each its own name",
+                hint="give each of them its own name",
             )
             continue
         command = linker.driver.commands[name]

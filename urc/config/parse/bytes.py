@@ -25,7 +25,7 @@ _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"
 
 
 def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
-    """Return the bytes at `part`: b"" if `part` is None, and None if a problem was reported."""
+    """Return the bytes at `part`, or b"" without a `part`; None after a reported problem."""
     if part is None:
         return b""
     if isinstance(part.data, list):

@@ -67,7 +67,7 @@ def parse_limits(
 
 
 def _numbers(part: Node, kind: str, bounds: _Bounds, problems: Problems) -> dict[str, float | None]:
-    """Return the limits by name; the value of a missing limit is None."""
+    """Return all limits by name, with None as the value of a missing limit."""
     values: dict[str, float | None] = {name: _limit(part, name) for name in NUMERIC_LIMITS}
     given = [(name, value) for name, value in values.items() if value is not None]
     if kind not in _NUMBERS:

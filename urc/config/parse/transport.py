@@ -124,7 +124,7 @@ def _backoff(part: Node | None, problems: Problems) -> Backoff:
         problems.error(
             part,
             "wrong-order",
-            "the first delay is longer than the longest delay",
+            "'initial' is longer than 'max'",
             at="initial",
             hint="'initial' is the first delay, and 'max' is the longest delay",
         )

@@ -83,7 +83,7 @@ def _check_names(part: Node, widget: Widget, problems: Problems) -> None:
             problems.error(
                 inner,
                 "unknown-input",
-                f"this widget has no input, output or option {inner.data!r}",
+                f"this key cannot refer to {inner.data!r}",
                 hint=did_you_mean(inner.data, known, "names"),
             )
 

@@ -121,7 +121,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
                 "hold-rate-limited",
                 f"the command is repeated every {shown_duration(repeat_s)}, but {what} allows it"
                 f" only every {shown_duration(limit_s)}",
-                hint="make 'repeat' at least as long as the time that 'rate_limit' allows",
+                hint="make 'repeat' at least as long as the interval that 'rate_limit' allows",
             )
 
 

@@ -158,7 +158,7 @@ def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
     """Return a problem for an invalid key name; `path` is the path of the mapping."""
     if not isinstance(error.value, str):
         return [_other_one(document, path, error)]
-    message = f"{_cut(error.value)} is not a valid name here"
+    message = f"{_cut(error.value)} is not a valid name"
     if error.keyword == "maxLength":
         message += f": the name has more than {error.limit} characters"
     return [

@@ -33,7 +33,7 @@ def compiled_tree(part: Node, problems: Problems) -> Any:
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:
-                text = "the name of a JSON key cannot contain a template"
+                text = "a JSON key cannot contain a template"
                 problems.error(inner, "bad-template", text, key=True)
         return {name: compiled_tree(inner, problems) for name, inner in part.entries().items()}
     if isinstance(part.data, list):

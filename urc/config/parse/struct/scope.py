@@ -48,7 +48,9 @@ class Scope:
         if name in self.known:
             at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
             text = f"another item has the name {name!r}"
-            self._problems.error(part, "duplicate-name", text, at=at, hint="give each its own name")
+            self._problems.error(
+                part, "duplicate-name", text, at=at, hint="give each of them its own name"
+            )
         self.known[name] = item
 
     def check_name(self, part: Node, name: str) -> None:
