@@ -202,7 +202,7 @@ class Command(NamedTuple):
     """Whether repeating the command has the same effect as sending it once."""
     retries: int = 0
     """Maximum number of retries after a timeout of an idempotent command, or at the robot's
-    request. The value 0 means `RESENDS` if the robot may request retransmissions."""
+    request. If the robot may request retransmissions, 0 means `RESENDS`."""
     retry: Retry = Retry()
     """Delays before the retries."""
     hold: Hold | None = None

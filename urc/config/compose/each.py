@@ -46,7 +46,7 @@ class Expander:
         self.problems = problems
         self.budget = budget
         self.path: Path = ()
-        """Path of the current item."""
+        """Path of the item that is being expanded."""
 
     def collection(self, tree: Tree, path: Path) -> Tree:
         """Return a mapping or list with every `each` in its items expanded."""

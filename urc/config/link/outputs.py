@@ -81,7 +81,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
                 inner,
                 "given-twice",
                 f"{source!r} sets {inner.data!r}, but {names[inner.data]!r} already sets it",
-                hint="each argument accepts one value",
+                hint="an argument accepts only one value",
             )
         names[inner.data] = source
     fixed = part.named("set")
@@ -92,7 +92,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
                 "given-twice",
                 f"{name!r} is set here, but {names[name]!r} of {port.name!r} also sets it",
                 key=True,
-                hint="each argument accepts one value",
+                hint="an argument accepts only one value",
             )
     return OutputBinding(names, {name: inner.data for name, inner in fixed.items()})
 

@@ -259,8 +259,8 @@ def _check_window(
             return
         if -over.start > least:
             text = (
-                f"the window starts {-over.start} bytes before the end, but a frame may only have"
-                f" {least}"
+                f"the window starts {-over.start} bytes before the end, but the shortest frame"
+                f" has only {least}"
             )
             problems.warn(part, "outside-frame", text, at=where)
         return

@@ -227,7 +227,7 @@ def parse_simulator(
 
 
 def _check_names(part: Node, rules: list[SimulatorRule], problems: Problems) -> None:
-    """Report rules with equal names, because derived documents refer to rules by name."""
+    """Report two rules with the same name, because extending documents refer to rules by name."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:

@@ -102,7 +102,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: P
 
 
 def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn about an unfilled slot in a robot's own grid.
+    """Warn about a slot without a widget in a grid of the robot's own document.
 
     Interfaces in separate documents are not checked, because they may serve several drivers with
     different slots.

@@ -28,7 +28,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every expression in the list."""
+    """Return every expression in the list, with its position."""
     return templates_at(part, spec)
 
 

@@ -42,7 +42,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every expression in the text."""
+    """Return every expression in the text, with its position."""
     return templates_at(part, spec)
 
 
