@@ -44,7 +44,7 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widgets for several signals: widget name, signal name suffixes by input, required inputs."""
+"""Widgets for several signals: name, endings of the signals' names by input, required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
 """Maximum number of columns in a default grid, by screen."""

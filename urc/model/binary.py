@@ -154,7 +154,7 @@ def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
     """Yield the names of all fields, including nested fields, in frame order.
 
     Args:
-        items: items at one nesting level.
+        items: the items of a frame or of a struct, in order.
         sent: whether to omit fields whose values URC computes for a sent frame.
     """
     for item in scope_of(items):

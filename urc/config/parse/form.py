@@ -47,7 +47,7 @@ class FormContext(NamedTuple):
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
     """Numbers and words of the driver's enums, by name."""
     catalog: Registries | None = None
-    """Registered types, which the parser needs for a frame that declares its own framing."""
+    """Registered transports and framings, for a frame that declares its own framing."""
     framing: FramingSpec | None = None
     """Framing of the transport; None for a frame that declares its own framing."""
 

@@ -122,6 +122,6 @@ def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
 
 
 def _argument(part: Node, name: str) -> Template:
-    """Return an expression that reads an argument."""
+    """Return an expression that reads the argument `name`."""
     source = part.data if isinstance(part.data, str) else name
     return Template(source, f"ns[{name!r}]", frozenset((name,)), frozenset())
