@@ -43,7 +43,7 @@ _DEGREES: Final = {
 }
 """Model fields whose values are in degrees in documents, by part of the world."""
 _KEYS: Final = {"first": "from", "last": "to"}
-"""Keys in documents for the model fields of a laser that have other names."""
+"""Keys of a laser in documents, for the model fields that have other names."""
 _LONGEST_S: Final = 3600.0
 
 Spec = TypeVar("Spec", bound=Any)
