@@ -116,7 +116,7 @@ def _tree(part: Node) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
-    """Return a slot's declaration for another widget: only its bindings, without the options."""
+    """Return a slot's declaration for another widget, without options and unsuitable bindings."""
     widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]

@@ -286,5 +286,5 @@ SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items
 
 
 def filter_names() -> str:
-    """Return the names of the filters for text, separated by commas, for error messages."""
+    """Return the names of all filters that do not return bytes, for error messages."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

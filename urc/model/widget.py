@@ -65,7 +65,7 @@ class Widget(NamedTuple):
     """Minimum number of columns and rows that the widget needs in its slot."""
     footprint: Footprint = "instrument"
     is_dead_man: bool = False
-    """Whether the widget is a dead-man control, whose release disables all held commands."""
+    """Whether the widget is a dead-man control, whose release blocks all motion commands."""
     summary: str = ""
     licence: str = ""
     """SPDX licence identifier of the widget, from the manifest."""

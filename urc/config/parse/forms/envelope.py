@@ -66,7 +66,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
-    """Return the node and the form of the body, before its conversion to the stamped type."""
+    """Return the declaration of the body as written, without the conversion to the stamped type."""
     tree = spec.options.get("tree")
     if not part.data.get("stamped") or not isinstance(tree, dict):
         return spec

@@ -31,7 +31,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the position of the path that selects the field."""
+    """Return the position of the field's name."""
     return part.must(field), {"key": True}
 
 
