@@ -282,7 +282,7 @@ def _listen(host: str, port: int, flag: str) -> socket.socket:
     except OSError as error:
         listener.close()
         reason = error.strerror or str(error)
-        hint = f"; choose another with {flag}" if port else ""
+        hint = f"; choose another port with {flag}" if port else ""
         raise UrcError(f"cannot listen on {host} port {port}: {reason}{hint}") from error
     listener.setblocking(False)
     return listener
