@@ -98,7 +98,7 @@ def test_a_port_in_use_is_named_with_its_option(tmp_path: Path) -> None:
         done = run("serve", PUPPET, "--simulate", "--port", "0", "--foxglove", port)
     assert done.returncode == 1
     assert f"port {port}: " in done.stderr
-    assert done.stderr.strip().endswith("choose another with --foxglove")
+    assert done.stderr.strip().endswith("choose another port with --foxglove")
 
 
 def test_a_recording_is_played_to_a_viewer(urc_process: Start, tmp_path: Path) -> None:
