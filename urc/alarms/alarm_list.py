@@ -48,7 +48,7 @@ class AlarmActor(NamedTuple):
 
 
 class AlarmList:
-    """All non-normal alarms of one robot."""
+    """The alarms of one robot that are outside the normal state."""
 
     def __init__(
         self, limits: Mapping[str, AlarmLimits], records: Iterable[AlarmRecord] = ()
@@ -63,7 +63,7 @@ class AlarmList:
         self.records: dict[str, AlarmRecord] = {
             one.signal: one._replace(is_known=False) for one in records
         }
-        """Non-normal alarms, by signal."""
+        """Alarms outside the normal state, keyed by signal."""
         self.revision = 0
         """Number of changes to the alarms and to the flood so far."""
         self.changed: dict[str, int] = {}
@@ -79,7 +79,7 @@ class AlarmList:
         )
         self._activations: dict[str, deque[float]] = {}
         self._settling: dict[str, float] = {}
-        """End time of each chattering alarm whose value is normal, by signal."""
+        """Time at which each chattering alarm with a normal value will end, keyed by signal."""
 
     @property
     def is_flooded(self) -> bool:
@@ -179,7 +179,7 @@ class AlarmList:
         self._record(self._put(returned), "returned", now)
 
     def forget(self, signals: Iterable[str], now: float) -> None:
-        """Mark lost or stale values as unknown; their alarms stay in the list."""
+        """Mark lost or stale values of `signals` as unknown, but keep their alarms."""
         for signal in signals:
             record = self.records.get(signal)
             if record is not None and record.is_active and record.is_known:
@@ -293,7 +293,7 @@ class AlarmList:
     # Time
 
     def tick(self, now: float) -> None:
-        """Apply all changes that are due at `now`."""
+        """End each shelving, chattering alarm and flood whose end time has passed."""
         for record in [*self.records.values()]:
             if 0 < record.shelved_until <= now:
                 self._unshelve(record, None, now)

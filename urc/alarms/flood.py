@@ -1,8 +1,9 @@
 """Floods and bursts of alarms, as in ISA-18.2.
 
 Layer 3. Pure. A flood begins when more than 10 alarms occur in 10 minutes, because one operator can
-handle at most 10. A flood ends when fewer than 5 alarms occur in 10 minutes. A burst is a sequence
-of alarms with short gaps. The first alarm in a burst is often the cause of the other alarms.
+handle at most 10. A flood ends when fewer than 5 alarms occur in 10 minutes. In a burst, each alarm
+begins at most 5 s after the previous alarm. The first alarm in a burst is often the cause of the
+other alarms.
 """
 
 from collections import deque
@@ -20,7 +21,7 @@ BURST_GAP_S: Final = 5.0
 
 
 class FloodDetector:
-    """The rate of one robot's alarms."""
+    """Detects the floods and bursts of one robot's alarms."""
 
     def __init__(self, group: int = 0) -> None:
         """Begin with no alarms; `group` is the number of the last burst before a restart."""
@@ -28,7 +29,7 @@ class FloodDetector:
         self.group = group
         """Number of the current burst."""
         self._times: deque[float] = deque(maxlen=FLOOD_BEGINS + 1)
-        """Times of the newest alarms; the oldest time decides whether a flood begins."""
+        """Times of the newest alarms; a flood begins if the oldest is at most `FLOOD_S` old."""
 
     def count(self, now: float) -> None:
         """Count one alarm."""

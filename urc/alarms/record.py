@@ -29,8 +29,8 @@ AlarmEventKind = Literal[
     "raised", "changed", "returned", "acknowledged", "shelved", "unshelved", "suppressed",
     "unsuppressed", "unknown", "removed", "flood began", "flood ended",
 ]  # fmt: skip
-"""Kind of an event. ``changed``: less severe than before. ``unknown``: the value became unknown.
-``removed``: the robot's document no longer declares the alarm."""
+"""Kind of an alarm event. ``changed``: less severe than before. ``unknown``: the value became
+unknown. ``removed``: the robot's document no longer declares the alarm."""
 _MILD: Final = ("low", "high", "minor")
 _SAME_SIDE: Final = {("lolo", "low"), ("hihi", "high")}
 _LONGEST_VALUE: Final = 100
@@ -51,7 +51,7 @@ class AlarmRecord(NamedTuple):
     raised: int
     """Number of the last event that requires acknowledgement; see `AlarmList.acknowledge`."""
     value: str = ""
-    """Value at the last change, as text."""
+    """Value of the signal at the alarm's last change, as text."""
     is_active: bool = True
     is_known: bool = True
     """Whether the current value is known; an alarm with an unknown value stays in the list."""
@@ -85,7 +85,7 @@ class AlarmRecord(NamedTuple):
 
 
 class AlarmEvent(NamedTuple):
-    """One event in the history."""
+    """One event in a robot's alarm history."""
 
     at: float
     signal: str

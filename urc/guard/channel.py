@@ -15,7 +15,7 @@ __all__ = ["Channel", "ChannelListener", "GuardedLineSpec"]
 
 
 class GuardedLineSpec(NamedTuple):
-    """The description of one guarded transport of a robot."""
+    """One guarded transport: how a guard creates it, and its object in this process."""
 
     make: messages.MakeTransport
     transport: Transport
@@ -24,11 +24,11 @@ class GuardedLineSpec(NamedTuple):
 
 
 class ChannelListener(Protocol):
-    """The user of a channel: `urc.guard.guard_client.GuardClient`."""
+    """Receiver of the guard's messages, implemented by `urc.guard.guard_client.GuardClient`."""
 
     @property
     def may_move(self) -> bool:
-        """Whether the robot may be moving because of a control."""
+        """Whether a control may be moving the robot."""
 
     def briefing(self) -> Iterable[messages.ToGuard]:
         """Return the messages that initialise a new guard, in sending order.
@@ -73,7 +73,7 @@ class Channel(Protocol):
         """Discard a slot's unsent message."""
 
     async def ready(self) -> None:
-        """Wait until a guard is ready."""
+        """Wait until a guard has been started and initialised."""
 
     def now(self) -> float:
         """Return the guard's time, in seconds."""

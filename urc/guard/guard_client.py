@@ -31,7 +31,7 @@ __all__ = ["GuardClient", "HeldSpec"]
 
 _MOST_STOPS: Final = 256
 _TELLING_S: Final = 0.5
-"""Maximum delay for a message to the guard, in seconds."""
+"""Maximum delay of a message between the guard and this client, in seconds."""
 _UNCOUNTED: Final = Count({}, {})
 
 
@@ -40,8 +40,7 @@ class HeldSpec(NamedTuple):
 
     line: str
     terms: HoldTerms
-    """Initial terms without a stop frame, used for a stop before the control is armed for the first
-    time."""
+    """Terms without a stop frame, for a stop before the control is first armed."""
 
 
 @dataclass(slots=True)
@@ -167,7 +166,7 @@ class GuardClient:
         self.channel.post(messages.ReleaseControl(command))
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
-        """Stop commands immediately, even if idle; `stops` maps each command to its stop frame."""
+        """Stop commands immediately, even idle ones; `stops` maps commands to stop frames."""
         told: list[tuple[str, str, HoldTerms]] = []
         for command, frame in stops.items():
             control = self._control(command)
@@ -205,7 +204,7 @@ class GuardClient:
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
     def owes_stop(self, command: str) -> bool:
-        """Return whether `command` may be moving the robot: no stop was reported as written."""
+        """Return whether `command` may be moving the robot: no written stop was reported."""
         control = self._controls.get(command)
         return control is not None and control.may_move
 
@@ -216,7 +215,7 @@ class GuardClient:
     async def stops(self) -> Sequence[tuple[str, StopReport]]:
         """Wait for reports of written or lost stops; return each command with its report.
 
-        Cancelling the wait loses no report.
+        If the wait is cancelled, no report is lost.
         """
         while not self._stops:
             self._stopped.clear()

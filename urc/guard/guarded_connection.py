@@ -4,8 +4,8 @@ Theory of operation. One task at a time opens the transport, reads until the con
 closes the transport. The engine requests the opening and closing of the connection. The guard sends
 received data to the engine within the engine's flow-control credit. If the connection is lost while
 the robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead.
-The guard itself reopens the connection (a *rescue*) and writes the stop first. The open connection
-is then kept for the engine's next attempt.
+The guard itself reopens the connection (a *rescue*) and writes the stop first. The guard then keeps
+the open connection for the engine's next attempt to connect.
 """
 
 import asyncio
@@ -35,9 +35,9 @@ from urc.transports.connect_race import HURRY, ConnectRace
 __all__ = ["WINDOW_BYTES", "GuardedConnection"]
 
 WINDOW_BYTES: Final = 65536
-"""Maximum number of bytes sent to the engine before an acknowledgement."""
+"""Maximum number of bytes sent to the engine that the engine has not acknowledged yet."""
 _GRACE_S: Final = 1.0
-"""Grace period for a transport that exceeds its timeout, in seconds."""
+"""Time for which a transport may exceed its timeout before the attempt is cancelled, in seconds."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
 """Time limit for a rescue, in seconds. After a failed rescue, only the engine tries to connect."""
@@ -133,7 +133,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the engine's newest sent frame with counters."""
         self._round = 0
-        """Number of times that engine frames were refused, because a counter value was used."""
+        """Number of `SendStale` messages sent on this connection, each a refusal of frames."""
 
     # -- requests from the engine
 
@@ -177,7 +177,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return the data to send for the next queued frame; None if the frame is outdated."""
+        """Return the data of the next queued frame; None if its counter values are already used."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -218,7 +218,7 @@ class GuardedConnection:
             self._switch(self._rescue())
 
     async def finish(self, within_s: float) -> None:
-        """Stop all motion, wait up to `within_s` for the stops, and close the connection."""
+        """Stop all motion, wait at most `within_s` seconds for the stops, then close."""
         self.scheduler.stop_all()
         self.scheduler.write_due()
         until_s = self._clock.now() + within_s
@@ -331,7 +331,7 @@ class GuardedConnection:
             await asyncio.sleep(0)  # a busy line must not delay the stops
 
     def _arrived(self, data: bytes) -> bool:
-        """Pass data to the engine unless earlier data is waiting; return whether it was passed."""
+        """Pass data to the engine if the engine can accept it now; return whether it was passed."""
         if not self._is_reading or self._credit <= 0 or not self._is_handed:
             return False
         self._pass_on(data)

@@ -14,7 +14,7 @@ _LOOK_S: Final = ASKED_EVERY_S
 
 
 class LivenessWatch:
-    """The liveness watch of one transport, across all its connections."""
+    """Watches whether the remote program of one transport freezes during motion."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class LivenessWatch:
             clock: the time source.
             silent_s: maximum silence of an unprobed robot, in seconds; None for no limit.
             is_moving: function that returns whether a control is moving the robot.
-            failed: callback that receives the reason when the program is frozen.
+            failed: callback for a frozen program; it receives the reason.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
         self._clock = clock
@@ -46,7 +46,7 @@ class LivenessWatch:
 
     @property
     def is_able(self) -> bool:
-        """Whether the liveness of this transport can be judged."""
+        """Whether a freeze can be detected: by probes, or because a maximum silence is set."""
         return self._transport is not None or self._silent_s is not None
 
     def begin(self) -> None:

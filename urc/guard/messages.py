@@ -82,11 +82,11 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     line: str
     turn: int
     number: int
-    """Number of the frame on this connection."""
+    """Number of the frame, counted separately for each connection."""
     data: Payload
     count: Count | None = None
-    """Counter values of the frame, or None. The frame is sent only if each value directly follows
-    the last sent value."""
+    """Counter values of the frame; None for a frame without counters. The frame is sent only if
+    each value directly follows the last sent value."""
     round: int = 0
     """Number of `SendStale` messages that the engine has received on this connection. The guard
     drops the frame if the guard has sent a different number of these messages."""
@@ -108,7 +108,7 @@ class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
 
 
 class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
-    """Accept ticks of a control."""
+    """Arm a control: accept its ticks from now on."""
 
     line: str
     control: str
@@ -120,7 +120,7 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
 
     control: str
     number: int
-    """Number of this control's tick."""
+    """Number of the tick, counted separately for each control."""
     data: Payload
     at_s: float
     """Time of the sample on this machine's monotonic clock, in seconds. A delayed tick keeps its
@@ -200,7 +200,7 @@ class SendRefused(msgspec.Struct, array_like=True, frozen=True, tag=25):
     number: int
     message: str
     is_closed: bool
-    """Whether the connection is closed."""
+    """Whether the frame was refused because the connection is closed."""
 
 
 class LineLost(msgspec.Struct, array_like=True, frozen=True, tag=26):
@@ -224,7 +224,7 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
     control: str
     reason: Reason
     number: int
-    """Number of the newest tick when the control was stopped."""
+    """Number of the control's newest tick before the stop."""
 
 
 class StopDue(msgspec.Struct, array_like=True, frozen=True, tag=32):
@@ -237,11 +237,11 @@ class Heartbeat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """Periodic proof that the guard is alive."""
 
     late_s: float
-    """Delay of the guard's own timer, in seconds."""
+    """Delay with which the guard's timer sent this heartbeat, in seconds."""
 
 
 class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
-    """Frames with counters have been sent."""
+    """The guard has sent frames with counters."""
 
     line: str
     turn: int

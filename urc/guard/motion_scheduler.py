@@ -59,7 +59,7 @@ class MotionScheduler:
                 and `SupportsForget`.
             clock: the time source.
             stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
-            is_strict: whether motion waits until all earlier bytes are sent.
+            is_strict: whether a motion frame waits until all earlier bytes are sent.
             told: callback for each written stop; it receives the control, the reason and the number
                 of the newest tick.
             failed: callback that receives the reason when the connection stalls or refuses data.
@@ -81,7 +81,7 @@ class MotionScheduler:
         self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
-        """Effect of the newest tick on the counters, keyed by control."""
+        """Counter values that the newest tick uses, keyed by control; None without counters."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
@@ -89,8 +89,8 @@ class MotionScheduler:
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._stopped_at: dict[str, int] = {}
-        """Number of the newest tick at each control's stop, keyed by control; the stop may still
-        be in the queue."""
+        """Number of the newest tick before each control's last stop, keyed by control; the stop may
+        still be in the queue."""
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
         """Whether a written stop may not have arrived at the robot."""
@@ -181,7 +181,7 @@ class MotionScheduler:
         return hold_to_run
 
     def check_arrivals(self) -> None:
-        """Record the acknowledged frames; the caller checks that the connection works."""
+        """Record that all frames have arrived if no bytes are unsent on a working connection."""
         if self._unsent is not None and self.queue.is_idle and not self._unsent():
             self._all_arrived()
 
@@ -307,21 +307,21 @@ class MotionScheduler:
             self._look_s = _LOOK_S
 
     def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
-        """Return the next frame to write and its effect on the counters."""
+        """Return the next frame to write and the counter values that it uses."""
         if not is_stop:
             return data, self._counts.get(control)
         stops = self._holds[control].terms.stops
         return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
-        """Return a stop frame at the head of the queue."""
+        """Return the next stop frame in the queue, with the next counter values."""
         data, count = self._turn(control, data, is_stop=True)
         self._sent_counters.left(count)
         self._tell_soon()
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
-        """Return a motion frame at the head of the queue; None if its counter values are used."""
+        """Return the next motion frame in the queue; None if its counter values are used."""
         fits = self._sent_counters.fits(count)
         if fits:
             self._sent_counters.left(count)

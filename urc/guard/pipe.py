@@ -21,7 +21,7 @@ _HEAD = 4
 _put_head, _head_of = struct.Struct("<I").pack_into, struct.Struct("<I").unpack_from
 _READ_BYTES = 65536
 _AT_ONCE = 64
-"""Number of messages handled before other tasks of the event loop run."""
+"""Maximum number of messages handled before other tasks of the event loop run."""
 UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
 """Exceptions that `post` raises for a message that cannot be encoded."""
 
@@ -45,7 +45,7 @@ class Pipe:
             line: the connected socket.
             encoder: encoder of posted messages.
             decoder: decoder of received messages.
-            take: callback for each message.
+            take: callback for each received message.
             settle: callback after each batch of messages.
             gone: callback that is called once, when the other side has closed the pipe.
         """

@@ -35,8 +35,8 @@ _MOST_KEPT_LOOKS: Final = 15
 _START_LOOKS: Final = 100
 """Maximum number of checks before the first heartbeat; high, because Python may start slowly."""
 _STEADY_S: Final = 0.5
-"""Age at which a guard counts as successfully started, in seconds. A guard that has opened
-a connection also counts as successfully started."""
+"""Time for which a guard must run to count as successfully started, in seconds. A guard that has
+opened a connection also counts as successfully started."""
 _AT_ONCE: Final = 3
 """Number of short-lived guards that are replaced immediately. The replacement of further
 short-lived guards is delayed by `_AGAIN_S` seconds."""
@@ -118,7 +118,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start and initialise the guard in its turn; requires a running event loop."""
+        """Start the guard when its turn comes, and initialise it; requires a running event loop."""
         self._turns = start_turns()
         self._turns.take(self, self._launch)
 
@@ -268,4 +268,4 @@ class PipeChannel:
 
 
 def _nothing() -> None:
-    """Do nothing after a batch of messages."""
+    """Do nothing, because the engine handles each message separately."""

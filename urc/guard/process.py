@@ -130,7 +130,7 @@ class ProcessState(NamedTuple):
     stopped process.
     """
     ran_s: float = 0.0
-    """Processor time of the first thread, in seconds."""
+    """Processor time that the first thread has used, in seconds."""
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:

@@ -1,6 +1,6 @@
 """The engine's proxy for a transport in the guard; the proxy has the members of `Transport`.
 
-The turn is the connection's number; messages from an earlier turn are ignored.
+A turn is the number of a connection; messages with the number of an earlier connection are ignored.
 """
 
 import asyncio
@@ -37,13 +37,13 @@ Stands = Callable[[str, Mapping[str, int], bool], None]
 
 @dataclass(slots=True)
 class _Sent:
-    """Data that, according to the guard's reports, has not been passed to the transport yet."""
+    """Data that the guard has not yet reported as passed to the transport."""
 
     number: int
     size: int
     data: Payload
     taken: asyncio.Future[None] | None
-    """Future of the caller that waits for this data, or None."""
+    """Future of the caller that waits until the data is passed on; None if no caller waits."""
     counted: CountedFrame | None
     left: Callable[[Payload], None] | None
     """Callback that receives the data handed to the transport, or None."""
@@ -149,7 +149,7 @@ class GuardedTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Wait for space, then send `data`; raise `TransportError` on a broken connection."""
+        """Wait for space, then send `data`; raise `TransportError` if the connection breaks."""
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -157,7 +157,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close immediately and raise no exceptions; a second call does nothing."""
+        """Close the connection immediately, without exceptions; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()
@@ -202,7 +202,7 @@ class GuardedTransport:
 
     @property
     def is_clogged(self) -> bool:
-        """Whether the pending data has reached the limit."""
+        """Whether the number of pending bytes has reached the limit."""
         return self._under_way_bytes > _CLOGGED_BYTES
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:

@@ -77,7 +77,7 @@ class RealTimePriority:
         return refusal
 
     def retry(self) -> None:
-        """Request the priority again after the pause; call this method regularly."""
+        """Request the priority again after the pause; the guard calls this method regularly."""
         if self._again_s is not None and time.monotonic() >= self._again_s:
             self._again_s = None
             _ask()

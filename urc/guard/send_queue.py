@@ -26,7 +26,7 @@ class TimerHandle(Protocol):
 
 
 class LaneClock(Protocol):
-    """A source of time, like `urc.runtime.clock.Clock`."""
+    """A monotonic clock with timers, such as `urc.runtime.clock.Clock`."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -39,7 +39,7 @@ class LaneClock(Protocol):
 
 
 class Sender(Protocol):
-    """The part of a transport that the queue uses."""
+    """The only method of a transport that the queue uses."""
 
     async def send(self, data: Payload) -> None:
         """Hand `data` over."""
@@ -82,7 +82,7 @@ class SendQueue(Generic[_Tag]):
         return not self._waiting
 
     async def until_idle(self) -> None:
-        """Return after all frames were handed to the transport."""
+        """Wait until all frames have been handed to the transport."""
         await self._is_free.wait()
 
     def push(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
@@ -144,7 +144,7 @@ class SendQueue(Generic[_Tag]):
 
 
 def why_broken(bug: Exception) -> str:
-    """Log an unexpected error from a transport; return an error message for people."""
+    """Log an unexpected error from a transport; return an error message for the operator."""
     log.error("a transport failed in an unexpected way", exc_info=bug)
     return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"
 

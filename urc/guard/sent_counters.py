@@ -1,8 +1,9 @@
 """The counter values sent on one connection.
 
-The guard evaluates no templates. Each rendered frame includes its effect on the counters. A frame
-is sent only if its counter values are the next in order. The values on the wire therefore increase
-without gaps, regardless of the order in which frames are rendered or arrive.
+The guard evaluates no templates. Each rendered frame is therefore accompanied by the counter values
+before and after it. A frame is sent only if its counter values are the next in order. The values on
+the wire therefore increase without gaps, regardless of the order in which frames are rendered or
+arrive.
 """
 
 from collections.abc import Sequence
@@ -34,13 +35,13 @@ class SentCounters:
         return all(stand.get(name) == before.get(name) for name in count.after)
 
     def left(self, count: Count | None) -> None:
-        """Record a sent frame."""
+        """Record the counter values of a sent frame."""
         if count is not None and count.after:
             self.stand = {**self.stand, **count.after}
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop frame with the next counter values, or the last frame if no frame fits.
+        """Return the stop frame that has the next counter values; if none has, the last one.
 
         A stop with a wrong counter value is better than no stop.
         """

@@ -1,4 +1,4 @@
-"""The guard's server: transports by name and message handlers."""
+"""The guard's server, which handles the engine's messages for all transports of one robot."""
 
 import asyncio
 from collections.abc import Callable

@@ -39,7 +39,7 @@ class StartTurns:
         self._launch_next()
 
     def hurry(self, guard: object) -> None:
-        """Launch a waiting guard now, without a turn; do nothing for any other guard."""
+        """Launch a waiting guard now, before its turn; do nothing for any other guard."""
         launch = self._waiting.pop(guard, None)
         if launch is not None:
             loop = asyncio.get_running_loop()
@@ -65,7 +65,7 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, StartTurns] = WeakKeyDictio
 def start_turns() -> StartTurns:
     """Return the start turns of the running event loop.
 
-    There is one turn for each processor except one: at least one turn, and at most four. The
+    The number of turns is the number of processors minus one, but at least 1 and at most 4. The
     remaining processor serves the driven robots.
     """
     loop = asyncio.get_running_loop()

@@ -31,11 +31,11 @@ class Freshness:
     """The heartbeats sent to one page and the page's newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
-        """Create a check that has issued no heartbeats.
+        """Start before the first heartbeat.
 
         Args:
-            first: number of the first heartbeat. An unpredictable number invalidates inputs that
-                were recorded before a restart.
+            first: number of the first heartbeat. If the number is unpredictable, inputs that were
+                recorded before a restart are refused.
         """
         self._issued: deque[float] = deque(maxlen=_KEPT)
         """Send times of the newest heartbeats, which have consecutive numbers."""
@@ -81,7 +81,7 @@ class Freshness:
 
 
 class DuplicateElimination:
-    """A filter for messages that a page sends twice, over two independent lossy connections.
+    """Drops the second copy of each message that a page sends over two lossy connections.
 
     Only the first copy of a message takes effect. A page's numbers only increase, and each
     connection preserves their order. A message with a lower or equal number is therefore either a

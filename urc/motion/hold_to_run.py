@@ -4,8 +4,8 @@ Theory of operation. A `HoldToRun` is idle, moving or stopping. The control move
 while *ticks of sampled input* arrive. Each tick renews a short lease and replaces any unsent value.
 Only the newest value is sent; values are never queued. The stop frame is sent before all other data
 when the lease expires, the control is released, or a stop is requested. The stop frame is already
-rendered when the control is armed. After the stop, nothing is sent, because repeated stop frames
-would override other sources of motion.
+rendered when the control is armed. After the stop and its repeats, nothing is sent, because further
+stop frames would override other sources of motion.
 
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
 are refused. The operator must release the control and press it again to rearm it.
@@ -34,7 +34,7 @@ LONGEST_LEASE_S: Final = 1.0
 STOP_EVERY_S: Final = 0.05
 """Interval between repeated stops on lossy connections, in seconds."""
 STOP_FOR_S: Final = 0.5
-"""Time for which stops are repeated, in seconds."""
+"""Time for which a stop is repeated on a lossy connection, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 StopReport = Reason | Literal["lost"]
@@ -53,9 +53,9 @@ class HoldTerms(NamedTuple):
     period_s: float
     """Minimum average time between two writes, in seconds."""
     lease_s: float = LEASE_S
-    """How long motion continues after the last tick, 0.1 to 1.0 seconds."""
+    """Time for which motion continues after the last tick, from 0.1 to 1.0 seconds."""
     is_lossy: bool = False
-    """Whether the transport may lose frames, such as datagrams; if so, the stop is repeated."""
+    """Whether the transport may lose frames, as UDP does; if so, the stop is repeated."""
     stops: tuple[Numbered, ...] = ()
     """Variants of the stop frame for different counter values; empty for a stop without counters.
     """
@@ -113,7 +113,7 @@ class HoldToRun:
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
-        """Replace the terms but keep a pending stop. A new period resets the rate limiter.
+        """Replace the terms, but keep a pending stop. A new period resets the rate limiter.
 
         Raises:
             ValueError: the lease or the period is out of range.
@@ -134,7 +134,7 @@ class HoldToRun:
         input value cannot be sent.
 
         Returns:
-            Whether the tick was accepted. If not, the control must be rearmed.
+            Whether the tick was accepted. After a refusal, the control must be armed again.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)  # a tick after the lease belongs to no motion

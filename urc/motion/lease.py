@@ -2,9 +2,9 @@
 
 Theory of operation. At most one operator holds the lease. Every change of holder and every STOP
 sends a stop to the robot and increments the lease's epoch. Inputs with an older epoch are refused,
-so motion cannot continue by mistake. A holder who sends no input for `SILENT_S` seconds loses the
-lease. STOP does not require a lease, and it latches: the robot does not move until an operator
-resets the latch. A reset never starts motion.
+so no motion continues under an earlier lease. A holder who sends no input for `SILENT_S` seconds
+loses the lease. STOP does not require a lease, and it latches: the robot does not move until an
+operator resets the latch. A reset never starts motion.
 """
 
 from typing import Final, NamedTuple
@@ -23,7 +23,7 @@ LONGEST_REQUEST_S: Final = 60.0
 
 
 class Operator(NamedTuple):
-    """A person at a dashboard page."""
+    """A person, device or program that watches or drives a robot."""
 
     id: str
     """Identifier, unique among the connected operators."""
@@ -46,7 +46,7 @@ class Operator(NamedTuple):
 
 
 class LeaseState(NamedTuple):
-    """The public state of a lease.
+    """The state of one robot's lease, as shown to every operator.
 
     After a restart of the server, only the latch and the counters are restored.
     """
@@ -54,7 +54,7 @@ class LeaseState(NamedTuple):
     epoch: int = 0
     holder: Operator | None = None
     asked_by: Operator | None = None
-    """Operator who has requested the lease, or None."""
+    """Operator who has requested the lease; None without a request."""
     asked_until: float = 0.0
     latched_by: str = ""
     """Name of the operator who pressed STOP; "" if no stop is latched."""
@@ -96,7 +96,7 @@ class Lease:
         return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
 
     def refusal(self, client: str, epoch: int) -> str:
-        """Return the reason for refusing motion requested by `client`, or ""."""
+        """Return why motion requested by `client` is refused; "" if the motion is permitted."""
         state = self.state
         if state.latched_by:
             return self.latched
@@ -109,7 +109,7 @@ class Lease:
         return ""
 
     def interlock(self, client: Operator, stops: int | None = None) -> str:
-        """Return the reason for refusing autonomous motion, or "".
+        """Return why autonomous motion is refused; "" if the motion is permitted.
 
         Autonomous motion does not need a lease, because no control is held. A latched stop or
         another operator's lease prevents autonomous motion.
@@ -140,7 +140,7 @@ class Lease:
         self._touched_at = now
 
     def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
-        """Grant the free lease to `client`."""
+        """Grant the lease to `client` if no other operator holds the lease."""
         state = self.state
         if not includes(client.role, "drive"):
             return LeaseRefused("watchers cannot drive")
@@ -205,7 +205,7 @@ class Lease:
         """Reset the latch, so that operators can drive the robot again.
 
         A reset neither starts motion nor undoes a newer STOP. `stops` is the number of STOPs known
-        to `client`. None means the current number.
+        to `client`; None stands for the current number.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("watchers can stop the robot, but cannot reset it")

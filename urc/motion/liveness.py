@@ -19,7 +19,7 @@ _ON_THE_WAY_S: Final = 0.03
 
 
 class Liveness:
-    """The liveness of one connection."""
+    """Judges whether the program at the other end of one connection is frozen."""
 
     __slots__ = ("_asked_s", "_heard_s", "_silent_s")
 
@@ -46,7 +46,7 @@ class Liveness:
         return min(self._heard_s + self._silent_s, asked_s + answer_s)
 
     def note_arrival(self, now: float) -> None:
-        """Record the arrival of bytes."""
+        """Record that bytes have arrived, which proves that the program works."""
         self._heard_s = now
         self._asked_s = None
 

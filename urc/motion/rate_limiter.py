@@ -2,8 +2,8 @@
 
 The limiter implements the generic cell rate algorithm (ITU-T I.371, annex A) with a tolerance of
 one period. Values that arrive at the permitted rate pass immediately, despite network jitter. In
-any second, at most one extra value passes. A fixed minimum interval would instead delay every
-second value.
+any second, at most one value more than permitted passes. A fixed minimum interval would instead
+delay every second value.
 """
 
 from typing import Final

@@ -18,7 +18,7 @@ _LONGEST_S: Final = 1.0
 
 
 class SlewRateLimiter:
-    """The slew rate limits of one held command and its current distance from rest."""
+    """The slew rate limits of one held command, and its arguments' current distances from rest."""
 
     __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
 
@@ -30,7 +30,7 @@ class SlewRateLimiter:
         Args:
             per_s: maximum increase of each argument per second, in the unit of the argument.
             rest: value of each argument at standstill; 0 for a missing argument.
-            first_s: time credited to the first value of a motion, in seconds.
+            first_s: time step assumed for the first value of a motion, in seconds.
         """
         self._per_s = per_s
         self._rest = {name: rest.get(name) for name in per_s}

@@ -26,15 +26,15 @@ SHORTEST_CUT_S: Final = 0.2
 STOP_WITHIN_S: Final = 0.1
 """Maximum time between the end of a network interruption and the stop, in seconds."""
 TICK_S: Final = 0.05
-"""Period of the ticks of a held control, in seconds. After an interruption begins, up to one tick
-may pass before the first write."""
+"""Period of the ticks of a held control, in seconds. After an interruption begins, up to one such
+period may pass before the first write."""
 AFRESH_S: Final = 0.03
 """Time for resetting and reopening the connection to a nearby robot and writing the stop, in
 seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
 """Age of unsent bytes at which a connection counts as stalled, in seconds. A stalled connection is
 reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte written one tick
-after the shortest interruption begins reaches this age just in time."""
+period after the shortest interruption begins reaches this age just in time."""
 WAITED_S: Final = 1.0
 """Age of unsent bytes at which a connection that is slow to open counts as stalled, in seconds."""
 IN_FLIGHT_S: Final = 0.15
@@ -45,7 +45,7 @@ _MOST: Final = 256
 
 
 class StallWatch:
-    """The stall watch of one connection."""
+    """Detects whether one connection has stalled."""
 
     __slots__ = ("_marks", "_taken", "_written", "limit_s")
 
@@ -84,7 +84,7 @@ class StallWatch:
         return self.age_s(now) >= self.limit_s
 
     def wrote(self, size: int, now: float) -> None:
-        """Record a write of `size` bytes; the next call to `saw` records the exact number."""
+        """Record a write of `size` bytes; the next `saw` call records how many bytes are unsent."""
         self._written += size
         self._mark(now)
 

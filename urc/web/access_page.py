@@ -57,7 +57,7 @@ class AccessMiddleware:
             app: the wrapped application.
             access: the identities and rights of the server.
             routes: the routes of the application.
-            pages: the sign-in pages.
+            pages: the pages that sign visitors in.
         """
         self._app = app
         self._access = access
@@ -149,7 +149,7 @@ class AccessMiddleware:
 
 
 def _has_token(scope: Scope) -> bool:
-    """Return whether a request has a token, valid or not."""
+    """Return whether a request contains a program's token, even an invalid token."""
     return any(
         name == b"authorization" and value[:7].lower() == b"bearer "
         for name, value in scope["headers"]

@@ -50,7 +50,7 @@ _IN_PATH: Final = {
 }
 """Descriptions of the path parameters."""
 _ALL: Final = (413, 429, 503)
-"""Failure statuses of every call: an oversized request, or too many requests or connections."""
+"""Failure statuses of every call, for oversized requests and too many requests or connections."""
 
 
 async def document(_: Request) -> Response:

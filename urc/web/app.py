@@ -1,7 +1,7 @@
 """The dashboard as one ASGI application: routes to pages, files and sockets.
 
-Layer 5. The module contains only wiring. `build_app` takes the robots and all options; `serve` runs
-the application.
+Layer 5. The module only combines the other modules. `build_app` takes the robots and all options;
+`serve` runs the application.
 """
 
 import asyncio
@@ -113,8 +113,8 @@ class DashboardOptions:
     data: Path | None = None
     """Folder for the latches and the audit log; with None, neither is stored."""
     audit: AuditLog | None = None
-    """Open audit log of the folder, which the application closes when it ends. With None, the
-    application opens the log."""
+    """The folder's audit log, already open; the application closes the log at its end. With None,
+    the application opens the log."""
     tiles: Path | None = None
     """Folder with map tiles, ``z/x/y.png``; None if the server has no tiles."""
     remake: Mapping[str, Remake] | None = None
@@ -233,7 +233,7 @@ class _Dashboard(Starlette):
         )
 
     def build_middleware_stack(self) -> ASGIApp:
-        """Wrap the whole application in the page policy, including its error handlers."""
+        """Wrap the application and its error handlers in the page policy."""
         inner = super().build_middleware_stack()
         door = AccessMiddleware(inner, self._access, self.routes, self._people.pages)
         policy = Policy(
@@ -285,7 +285,7 @@ class _Routes:
             self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
     def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
-        """Return the page providers that also have API calls."""
+        """Return the objects that provide both pages and API calls."""
         found: list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart] = [
             AuditRoutes(self.audit, self.recorder, lambda: self.services, self.ways)
         ]
@@ -394,7 +394,7 @@ class _Routes:
                 await asyncio.to_thread(self.audit.close)
 
     async def _record_late(self) -> None:
-        """Record clock jumps and counts of repeated events until cancelled."""
+        """Write clock jumps and counts of repeated events to the audit log until cancelled."""
         while True:
             await asyncio.sleep(_LATE_S)
             self.recorder.flush()
@@ -495,7 +495,7 @@ class _Routes:
             await RedundantSocket(websocket, service.controls, service.clock, flow).serve()
 
     async def _accepted(self, websocket: WebSocket) -> tuple[str, RobotService | None]:
-        """Accept a socket; return its robot's name and service, or close the socket."""
+        """Accept a page's socket; return its robot's name and service, or close the socket."""
         await websocket.accept()
         names = list(self.services)
         name = websocket.query_params.get("robot", names[0] if len(names) == 1 else "")

@@ -35,7 +35,7 @@ def count_of(
 
 
 def by_urgency(record: AlarmRecord) -> tuple[object, ...]:
-    """Return an alarm's sort key: annunciated, active, unacknowledged, severity, then first-out."""
+    """Return a sort key: annunciated, active, unacknowledged and severe alarms come first."""
     hidden = not record.is_annunciated
     order = severity(record.condition, record.priority)
     return (hidden, not record.is_active, record.is_acknowledged, order, record.number)

@@ -1,9 +1,10 @@
 """Alarm notifications through the maintainer's hook: a command or a URL.
 
 Layer 5. `AlarmNotifier.queue` never blocks. A separate thread collects alarms for one second, then
-calls the hook once per robot. During a flood, the hook is called at most once a minute for the
-affected robot. The queue is bounded, each attempt has a timeout, and failures are counted and
-logged. The hook never receives robot secrets, because the hub removes them from all values.
+calls the hook once for each affected robot. During a flood, the hook is called at most once a
+minute for the affected robot. The queue is bounded, each attempt has a timeout, and failures are
+counted and logged. The hook never receives robot secrets, because the hub removes them from all
+values.
 """
 
 import asyncio
@@ -159,7 +160,7 @@ class AlarmNotifier:
             return []
 
     def _pause(self, seconds: float) -> None:
-        """Wait, but return early when the notifier closes."""
+        """Wait for `seconds`, but no longer than until the notifier closes."""
         self._wakes.wait_for(lambda: self._is_closing, seconds)
 
     def _notify(self, robot: str, batch: Sequence[_QueuedAlarm]) -> None:

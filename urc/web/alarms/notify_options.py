@@ -17,7 +17,7 @@ __all__ = ["KEYS", "NotifyOptions", "read_notify_options"]
 KEYS: Final = (
     "command", "url", "url_file", "secret_file", "priority", "returned", "timeout_s", "tries",
 )  # fmt: skip
-"""All keys permitted in the file."""
+"""All keys that the options file may contain."""
 _MOST_WORDS: Final = 50
 _LONGEST_S: Final = 60.0
 _MOST_TRIES: Final = 5
@@ -25,7 +25,7 @@ _MOST_TRIES: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class NotifyOptions:
-    """The hook: a command or a URL."""
+    """The maintainer's hook for alarm notifications: a command or a URL."""
 
     command: tuple[str, ...] = ()
     """Program and arguments; the program reads the notification as JSON from standard input."""
@@ -43,7 +43,7 @@ class NotifyOptions:
 
     @property
     def place(self) -> str:
-        """The program, or the URL's scheme and host; logs must not contain the rest."""
+        """Hook as it appears in logs: the program, or only the URL's scheme and host."""
         if self.command:
             return self.command[0]
         url = httpx2.URL(self.url)
@@ -51,7 +51,7 @@ class NotifyOptions:
 
 
 def read_notify_options(file: str) -> NotifyOptions:
-    """Return the options in a file.
+    """Read the options file and return its options.
 
     Raises:
         ProblemsError: the file cannot be read, or has an error.

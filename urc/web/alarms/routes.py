@@ -45,7 +45,7 @@ from urc.web.show.cells import spoken
 __all__ = ["AlarmCalls", "alarm_key"]
 
 STORED_S: Final = 2.0
-"""Longest wait for an action to be stored, in seconds."""
+"""Longest time that a response waits until its action is stored, in seconds."""
 _SETTLE_S: Final = 0.5
 _SEARCHES: Final = 2
 """Maximum number of concurrent searches; the limit leaves threads free for other work."""

@@ -53,13 +53,13 @@ class AlarmInfo(AlarmMessage, frozen=True):
     """Value at the last change, as text."""
     unit: str
     cause: str
-    """Probable cause, from the document."""
+    """Probable cause of the alarm, from the robot's document."""
     action: str
     """Operator action."""
     number: int
     """Number of the activation; numbers increase in first-out order."""
     group: int
-    """Number of the alarm's burst."""
+    """Number of the burst to which the alarm belongs."""
     raised: int
     """Number assigned when the alarm was last raised; an acknowledgement must repeat it."""
     times: int
@@ -71,11 +71,11 @@ class AlarmInfo(AlarmMessage, frozen=True):
     acknowledged_at: float
     """Time of the acknowledgement, in seconds since 1970 (UTC); 0 if unacknowledged."""
     acknowledged_by: str
-    """Name of the person or program that acknowledged the alarm, or ""."""
+    """Name of the person or program that acknowledged the alarm; "" if unacknowledged."""
     shelved_until: float
     """Time at which shelving ends, in seconds since 1970 (UTC); 0 if unshelved."""
     shelved_by: str
-    """Name of the person or program that shelved the alarm, or ""."""
+    """Name of the person or program that shelved the alarm; "" if unshelved."""
 
 
 class AlarmCount(AlarmMessage, frozen=True):
@@ -144,7 +144,7 @@ class AlarmHistoryEvent(AlarmMessage, frozen=True):
     who: str
     """Name of the person or program that acted; "" for events from the robot."""
     until: float
-    """Time at which shelving ends."""
+    """Time at which shelving ends, in seconds since 1970 (UTC); 0 if the alarm is not shelved."""
     times: int
 
 
@@ -164,7 +164,8 @@ class AcknowledgeAsked(AlarmMessage, frozen=True):
     """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """`raised` number of the alarm, by signal. An alarm that has been raised again is skipped."""
+    """Value of `raised` that the operator saw, keyed by signal. An alarm that has been raised again is
+    skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):
@@ -172,7 +173,7 @@ class ShelveAsked(AlarmMessage, frozen=True):
 
     signals: _Signals
     for_s: Annotated[float, msgspec.Meta(ge=1, le=LONGEST_SHELF_S)]
-    """Time until shelving ends, in seconds."""
+    """Time from now until shelving ends, in seconds."""
 
 
 class UnshelveAsked(AlarmMessage, frozen=True):

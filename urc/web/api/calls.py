@@ -108,9 +108,9 @@ _FILTERS: Final = (
     Query("robot", "Name of a robot."),
     Query("who", "Name of a person, device or program."),
     Query("what", "Kinds of entries, separated by commas."),
-    Query("text", "Text to find in entries."),
-    Query("since", "Earliest time, in seconds since 1970.", "number"),
-    Query("until", "Latest time, in seconds since 1970.", "number"),
+    Query("text", "Text that the entries must contain."),
+    Query("since", "Earliest time of the entries, in seconds since 1970 (UTC).", "number"),
+    Query("until", "Latest time of the entries, in seconds since 1970 (UTC).", "number"),
     Query("before", "Number of an entry; only older entries are returned.", "integer"),
     Query("last", "Maximum number of entries, at most 1000.", "integer"),
 )
@@ -159,7 +159,7 @@ CALLS: Final[tuple[Call, ...]] = (
         WATCH,
         "Server-Sent Events: “values” contains changed signals, “connections” contains the states"
         " of the connections, and “end” contains the reason why the stream ended. A slow reader"
-        " misses values.",
+        " misses intermediate values.",
         None,
         query=(_NAMES,),
         errors=_NO_ROBOT,
@@ -192,8 +192,8 @@ CALLS: Final[tuple[Call, ...]] = (
         "motion",
         f"{_ROBOT}/motion",
         DRIVE,
-        "Send the newest input of a held command. A pause longer than the lease stops the robot."
-        " Prefer the WebSocket for motion.",
+        "Send the newest input of a held command. The robot stops if no input arrives for longer"
+        " than the lease. For motion, the WebSocket `/ws` is preferable.",
         MotionAnswer,
         MotionAsked,
         "POST",
@@ -491,7 +491,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "job_agree",
         "/api/v1/job/agree",
         MAINTAIN_SERVER_FRESH,
-        "Approve the planned package and install it.",
+        "Approve the package of the current job and install it.",
         JobNews,
         JobDecision,
         "POST",

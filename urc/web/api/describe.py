@@ -36,7 +36,7 @@ _LIMITS: Final = ("lolo", "low", "high", "hihi")
 def summary(
     name: str, service: RobotService, role: Role, times: ContactTimes = NO_CONTACT
 ) -> RobotSummary:
-    """Return a robot's list entry.
+    """Return a robot's entry in the list of robots.
 
     Args:
         name: the robot's name in URLs.

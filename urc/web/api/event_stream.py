@@ -1,8 +1,8 @@
 """Server-Sent Events of one robot: the newest values of changed signals.
 
-Layer 5. Readers have no queues. When a reader's connection is free, the reader gets the newest
-value of each signal that changed since its last event. A slow reader skips values, without delaying
-other readers. Source of the format: HTML standard, section 9.2 “Server-sent events”.
+Layer 5. No values are queued for a reader. When a reader's connection is free, the reader gets the
+newest value of each signal that changed since its last event. A slow reader skips values, without
+delaying other readers. Source of the format: HTML standard, section 9.2 “Server-sent events”.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ from urc.web.fleet.robots import LiveSession
 __all__ = ["BEAT_S", "EVENTS_PER_S", "STALL_S", "EventStream"]
 
 EVENTS_PER_S: Final = 30.0
-"""Maximum rate of events."""
+"""Maximum number of events per second and reader."""
 BEAT_S: Final = 5.0
 """Interval between keep-alive comments on a quiet stream, in seconds."""
 STALL_S: Final = 15.0
@@ -76,7 +76,7 @@ class EventStream:
         self._seen = 0
         """Hub revision of the last sent event."""
         self._links = -1
-        """Number of link state changes when the connection states were last sent."""
+        """Number of connection state changes up to the last event with connection states."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send events until the stream ends."""

@@ -16,7 +16,7 @@ __all__ = ["field_texts"]
 def field_texts(message: type) -> Mapping[str, str]:
     """Return the field docstrings of `message` and its base classes, by field name.
 
-    Without source code, the result is empty.
+    If the source code is not available, the result is empty.
     """
     found: dict[str, str] = {}
     for one in reversed(message.__mro__):

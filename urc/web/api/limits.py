@@ -14,7 +14,7 @@ from urc.web.serve.replies import ApiError
 __all__ = ["AT_ONCE", "MOST_VISITORS", "REQUESTS_PER_S", "RequestLimits"]
 
 REQUESTS_PER_S: Final = 200
-"""Maximum rate of one visitor's commands, lease requests and motion requests."""
+"""Maximum number of one visitor's commands, lease requests and motion requests per second."""
 AT_ONCE: Final = 16
 """Maximum number of one visitor's running commands."""
 MOST_VISITORS: Final = 1024
@@ -23,7 +23,7 @@ dropped."""
 
 
 class RequestLimits:
-    """The rates and running commands of all visitors."""
+    """Limits the request rate and the running commands of each visitor."""
 
     def __init__(self) -> None:
         self._rates: OrderedDict[str, TokenBucket] = OrderedDict()

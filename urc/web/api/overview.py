@@ -44,7 +44,7 @@ def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
 
     Args:
         service: the robot.
-        name: result of `battery_signal`.
+        name: name of the battery signal, as returned by `battery_signal`.
     """
     live = service.open_session
     signal = service.robot.profile.driver.signals.get(name)
@@ -63,7 +63,7 @@ def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
     """Return the number and the highest priority of a robot's annunciated alarms.
 
     Alarms that have returned to normal count until they are acknowledged. Shelved and suppressed
-    alarms are not counted. The function needs no session.
+    alarms are not counted. The robot needs no open session.
 
     Args:
         name: the robot's name in URLs.

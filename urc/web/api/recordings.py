@@ -1,8 +1,8 @@
 """Recordings over HTTP: files in the server's folder and recordings started by programs.
 
-Layer 5. Programs specify a file name in the folder, never a path. The module reads the folder in a
-thread, because reading blocks. A recording ends on request, when the robot's session ends, or after
-`LONGEST_S`.
+Layer 5. Programs specify a file name in the folder, never a path. A thread reads the folder,
+because reading would block the event loop. A recording ends on request, when the robot's session
+ends, or after `LONGEST_S`.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ MOST_LISTED: Final = 1000
 _BEGIN_S: Final = 5.0
 _LOOK_S: Final = 0.02
 _FROM_START: Final = "bytes=0-"
-"""Beginning of a Range header for a range from the first byte; other ranges do not count as new
+"""Beginning of a Range header that asks for the first byte; only such requests count as new
 downloads."""
 _NAME: Final = re.compile(
     r"(?P<robot>[a-z][a-z0-9-]*)-(?P<began>[0-9]{8}T[0-9]{6}Z)(?:-[0-9]+)?\.mcap", re.ASCII

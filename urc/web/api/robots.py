@@ -211,7 +211,7 @@ class RobotCalls:
             service: the robot.
             peer: the visitor, who has the right `DRIVE` for the robot.
             wanted: name of the command.
-            asked: arguments and options.
+            asked: the arguments and options of the command.
 
         Raises:
             ApiError: the command was refused, or has failed.
@@ -292,7 +292,7 @@ class RobotCalls:
         return peer_of(request, name)
 
     def _moving_peer(self, request: Request, name: str, service: RobotService) -> SocketPeer:
-        """Return the visitor; raise `ApiError` for a playback or above the maximum rate."""
+        """Return the visitor; raise `ApiError` for a playback or too many requests per second."""
         peer = self._peer(request, name)
         self._admit(peer, service)
         return peer

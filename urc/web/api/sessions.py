@@ -120,7 +120,7 @@ class ProgramSession:
         return MotionAnswer(self.epoch, self.beat, command in operator.pending, self.notices())
 
     def _refusal(self, asked: MotionAsked) -> str:
-        """Return the reason why the last input was refused."""
+        """Return the reason why the server refused the input."""
         for notice in self.notices():
             if notice.kind == "refused":
                 return notice.message
@@ -153,7 +153,7 @@ class ProgramSessions:
     def temporary(
         self, service: RobotService, live: LiveSession, peer: SocketPeer
     ) -> Iterator[ProgramSession]:
-        """Add a temporary operator for one command while the context is open."""
+        """Add an operator for one command; remove the operator when the context closes."""
         session = _entered(service, live, peer)
         try:
             yield session
@@ -266,7 +266,7 @@ def _entered(service: RobotService, live: LiveSession, peer: SocketPeer) -> Prog
 
 
 def _notice(text: str) -> MotionNotice | None:
-    """Convert a page message to a notice; return None for other messages."""
+    """Convert a message for pages to a notice; return None if only pages can use the message."""
     said = msgspec.json.decode(text, type=dict[str, object])
     if said.get("t") == "refused":
         about = said.get("command") or said.get("about")

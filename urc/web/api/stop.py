@@ -19,7 +19,7 @@ def press_stop(name: str, service: RobotService, who: Operator, recorder: Server
         name: name of the robot in URLs.
         service: the robot.
         who: the person or program that presses STOP.
-        recorder: recorder of STOPs by visitors who have not signed in.
+        recorder: receives an audit entry for a STOP by a visitor who has not signed in.
 
     Raises:
         ApiError: the robot cannot move.

@@ -123,7 +123,7 @@ class ConfirmInfo(ApiMessage, frozen=True):
     """A confirmation question, which a person must answer before a command is sent."""
 
     text: str
-    """Text of the question."""
+    """The question, as shown to the person."""
     level: Literal["normal", "hazardous"]
     two_person: bool
     """Whether a second person must approve; only pages can send such a command."""
@@ -153,16 +153,16 @@ class ArgumentInfo(ApiMessage, frozen=True):
     size: int | None
     """Required number of elements of an array; null for any number."""
     confirm: dict[str, ConfirmInfo]
-    """Maps argument values to the confirmation questions that they require."""
+    """Confirmation questions, keyed by the argument value that requires the question."""
 
 
 class HoldInfo(ApiMessage, frozen=True):
     """Motion under a lease: the robot moves only while motion requests arrive."""
 
     period_s: float
-    """Interval between the setpoints that the server sends to the robot."""
+    """Interval between the setpoints that the server sends to the robot, in seconds."""
     lease_s: float
-    """Time from the last motion request until the robot stops."""
+    """Time from the last motion request until the robot stops, in seconds."""
     release: dict[str, Any]
     """Argument values that stop the robot."""
 
@@ -236,9 +236,9 @@ class SignalValue(ApiMessage, frozen=True):
     """The latest value of a signal."""
 
     value: Any
-    """Value; null if unknown or “not available”; for an image, an object with its size in bytes."""
+    """Null if unknown or “not available”; an image is an object with the image's size in bytes."""
     age_s: float | None
-    """Age of the value; null if no value has arrived yet."""
+    """Age of the value, in seconds; null if no value has arrived yet."""
     stale: bool
     """Whether the value is missing, or older than the signal's `stale_after`."""
     alarm: Alarm = ""
@@ -260,7 +260,7 @@ class CommandAsked(ApiMessage, frozen=True):
     arguments: Arguments = {}
     """Values by argument; an omitted argument takes its default."""
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
-    """Longest wait for the reply; null means 30 s for a command and 600 s for a sequence."""
+    """Longest wait for the reply, in seconds; null means 30, or 600 for a sequence."""
     confirmed: bool = False
     """Whether a person has confirmed the command."""
     stops: _Count | None = None
@@ -274,7 +274,7 @@ class CommandAnswer(ApiMessage, frozen=True):
     """The reply to a command."""
 
     values: dict[str, Any]
-    """Values of the reply, by field."""
+    """Values of the reply, keyed by field name."""
 
 
 class LeaseAsked(ApiMessage, frozen=True):
@@ -302,7 +302,7 @@ class MotionNotice(ApiMessage, frozen=True):
 
 
 class LeaseAnswer(ApiMessage, frozen=True):
-    """State of the controls, from one session's point of view."""
+    """State of a robot's controls, as reported to one session."""
 
     session: str
     """Session secret for further requests; "" after the session has ended."""
@@ -323,7 +323,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
     beat: int | None
     """Newest heartbeat number, for the next motion request; null if the session does not drive."""
     idle_s: float
-    """How long the session stays open after the last request."""
+    """Time for which the session stays open after its last request, in seconds."""
     notices: tuple[MotionNotice, ...] = ()
     """Notices since the last response."""
 

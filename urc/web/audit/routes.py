@@ -1,7 +1,8 @@
 """Routes for the audit log: the page, the search, the export and the timeline of a robot.
 
 Layer 5. Visitors with the role ``maintain`` for all robots see all entries. Other visitors see the
-entries about robots that they may maintain. Threads read the log, because reading blocks.
+entries about robots that they may maintain. Threads read the log, because reading would block the
+event loop.
 """
 
 import asyncio

@@ -87,7 +87,7 @@ class Backlog:
 
 
 class _RunningProfile(NamedTuple):
-    """The robot version used to answer the page's requests."""
+    """The profile and settings with which the page's requests are answered."""
 
     profile: Profile
     settings: dict[str, Value]
@@ -135,7 +135,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Append the robot's traffic to the backlog, session by session."""
+        """Append the traffic of the robot's sessions to the backlog, one session after another."""
         while True:
             if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)
@@ -282,7 +282,7 @@ def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _RunningPro
             _tried(asked, known) if isinstance(asked, wire.ParseRequest) else _shown(asked, known)
         )
     except Exception as bug:  # a supervisor: a bug must not end the page's connection
-        log.exception("a request of a developer page failed")
+        log.exception("a request from a developer page failed")
         return _refused(asked, f"internal error in URC ({type(bug).__name__}: {bug})")
 
 

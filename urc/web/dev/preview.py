@@ -1,7 +1,7 @@
 """Preview of a command: its exact bytes or messages, or the reason for its refusal. Sends nothing.
 
 Layer 5, pure. A sequence may wait for a reply between two steps. The preview shows every frame that
-can be built in advance.
+can be built before a reply arrives.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,7 +32,7 @@ class PreviewLine(NamedTuple):
     """Name of the transport; "" for a line without a frame."""
     payload: Payload
     text: str
-    """Description of a step without a frame, or reason for a missing frame."""
+    """Description of a step without a frame, or the reason why its frame is missing."""
 
 
 class Preview(NamedTuple):

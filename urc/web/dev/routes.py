@@ -33,14 +33,14 @@ CLIENTS = 16
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """Context for ``dev.html.j2``. The page receives all other data through two sockets."""
+    """Context for ``dev.html.j2``. The page receives the robot's data through two sockets."""
 
     head: PageHead
     title: str
     url: str
     """Path of the robot's page on the dashboard."""
     values: str
-    """Path and query of the dashboard's WebSocket, which carries values, links and commands."""
+    """Path and query of the dashboard's WebSocket, for values, connection states and commands."""
     socket: str
     """Path of the developer page's WebSocket."""
     timeline: str

@@ -31,7 +31,7 @@ _NAMES = ("topic", "action", "service", "method", "path", "url")
 
 
 class TrafficRow(msgspec.Struct, omit_defaults=True):
-    """One line of the traffic log."""
+    """One row of the traffic log: a frame or a note."""
 
     n: int
     time_s: float
@@ -39,7 +39,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
     kind: str
     """Kind of the row: ``sent``, ``received`` or ``note``."""
     line: str
-    """Transport that carried the data."""
+    """Name of the transport that carried the data."""
     size: int = 0
     data: bytes = b""
     verb: str = ""

@@ -69,7 +69,7 @@ class DevStart:
             fleet: the robots.
             remake: functions that create a robot from a new version of its profile, keyed by robot
                 name.
-            take: function that switches to the new robot; may raise `UrcError`.
+            take: function that switches to a new version of a robot; may raise `UrcError`.
             ways: navigation links of this server.
         """
         self._fleet = fleet

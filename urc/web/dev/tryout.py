@@ -148,7 +148,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Split `data` into frames and faults with their positions; also count the remaining bytes."""
+    """Return the frames and faults, the number of bytes left, and the number of further frames."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []
@@ -226,7 +226,7 @@ def _taken(frame: Frame, one: _Candidate) -> FrameConsumer | None:
 def _why_not(
     frame: Frame, one: _Candidate, spec: TransportSpec, settings: Mapping[str, object]
 ) -> str:
-    """Return a readable reason why a frame does not match."""
+    """Return the reason why a frame does not match a reader, for display."""
     read = one.read
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
         came = "a reply" if frame.topic is None else repr(frame.topic)
@@ -269,7 +269,7 @@ def _candidates(
 
 
 def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
-    """Yield each reply expected on a transport, with its name, including stages and steps."""
+    """Yield each named reply that a driver can expect on a transport, also in stages and steps."""
     asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
     asked += [
         (f"reply to poll {one.name}", one.transport, one.reply)

@@ -55,13 +55,13 @@ class ProfileWatch:
     service: RobotService
     remake: Remake
     take: Callable[[Robot], None]
-    """Function that switches all users of the robot to another version; may raise `UrcError`."""
+    """Function that switches the robot to another version; may raise `UrcError`."""
     state: State = "running"
     told: str = ""
-    """Readable description of the last event."""
+    """Description of the last saved version and its outcome, for display."""
     problems: tuple[Problem, ...] = ()
     edition: int = 0
-    """Number of changes to the published state."""
+    """Number of changes to the state that developer pages show."""
     listeners: set[Callable[[], None]] = field(default_factory=set)
     _next: Profile | None = None
     _robot: Robot | None = None

@@ -214,11 +214,11 @@ def encode_profile(
     Args:
         driver: the running driver.
         messaging: types of the transports that carry messages.
-        edition: number of changes to the published state.
+        edition: number of changes to the state that developer pages show.
         state: ``running``, ``waiting`` (a valid new version is pending) or ``broken`` (the file has
             errors).
         file: path of the robot's document.
-        told: readable description of the last event.
+        told: description of the last saved version and its outcome, for display.
         problems: all problems of the document.
     """
     kinds = frozenset(messaging)

@@ -28,7 +28,7 @@ COMMAND_TIMEOUT_S: Final = 30.0
 
 
 class CommandTarget(Protocol):
-    """The part of a robot's session that runs commands."""
+    """The methods of a robot's session that run commands and sequences."""
 
     async def command(
         self,

@@ -1,4 +1,4 @@
-"""The controls of one robot: one motion controller and one operator session for each page.
+"""The controls of one robot: its motion controller, and an operator session for each page.
 
 Layer 5. No call blocks. When a page's socket is free, the page receives the newest lease, the
 newest heartbeat and one notice per control. Above the rate limit, each new tick replaces the
@@ -37,7 +37,7 @@ the numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between a control's applied ticks, in seconds."""
 PATIENCE_S = 0.25
-"""How long refusals of late ticks go unreported after a control's motion ends, in seconds."""
+"""Time after a control's motion in which refused late ticks are not reported, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
@@ -191,8 +191,9 @@ class ControlService:
     def name_screen(self, operator: OperatorSession, name: str) -> None:
         """Set the screen name of a page on this computer or of a visitor without a sign-in.
 
-        People, devices and programs keep the names of their sign-ins. If another page already has
-        the name, the screen number is appended, so that no page can impersonate another.
+        Signed-in people, devices and programs keep the names of their sign-ins. If another page
+        already has the name, the screen number is appended, so that no page can impersonate
+        another.
         """
         client = operator.client
         if client.who and client.way != "key":
@@ -442,7 +443,7 @@ class ControlService:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Report that the latched STOP cannot be stored or that it can be stored again."""
+        """Report a failure to store the latched STOP, or the end of the failure."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
