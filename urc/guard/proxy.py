@@ -157,7 +157,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close the connection immediately, without exceptions; a second call does nothing."""
+        """Close the connection immediately and never raise; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()

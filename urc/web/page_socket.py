@@ -35,8 +35,8 @@ ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
 """First bytes of a page's tick; ticks that begin differently take longer to decode."""
 EARLY_MESSAGES = 100
-"""Maximum number of messages that wait while the robot's session opens. Ticks are dropped, and STOP
-does not wait."""
+"""Maximum number of messages that wait while the robot's session opens. Meanwhile, ticks are
+dropped, and STOP takes effect immediately."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 STALL_S = 15.0
@@ -117,7 +117,7 @@ class BrowserClient:
             controls.remove_page(self._operator)
 
     async def _opened(self) -> LiveSession | None:
-        """Return the robot's open session; None if the page disconnects or sends too much first."""
+        """Return the open session; None if the page disconnects or floods the server first."""
         opening = asyncio.ensure_future(self._service.live())
         reading = asyncio.ensure_future(self._read_early())
         # A page that leaves while the session is still opening must not count as a client.
@@ -260,7 +260,7 @@ class BrowserClient:
             self._is_listening = False
 
     def _offered(self, data: bytes) -> bool:
-        """Handle a tick if no earlier message is pending; return False for other messages."""
+        """Handle a tick if no earlier message is pending; return whether the tick was handled."""
         operator = self._operator
         if operator is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False

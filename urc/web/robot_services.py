@@ -31,7 +31,7 @@ class Stores(NamedTuple):
     audit: AuditLog | None
     alarms: AlarmStore | None
     notifier: AlarmNotifier | None
-    """Receiver of all robots' new alarms."""
+    """Receiver of all robots' new alarms, which sends the notifications."""
 
 
 def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fleet:

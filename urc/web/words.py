@@ -90,8 +90,8 @@ def module(tag: str) -> str:
 def choose(chosen: str, accepted: str) -> str:
     """Return the BCP 47 tag of a user's language.
 
-    `chosen` is the language chosen on the device, or "". `accepted` is the Accept-Language header
-    (RFC 9110, 12.5.4).
+    `chosen` is the language chosen on the device; "" if no language was chosen. `accepted` is the
+    Accept-Language header (RFC 9110, 12.5.4).
     """
     if chosen in LANGUAGES:
         return chosen

@@ -164,8 +164,8 @@ class AcknowledgeAsked(AlarmMessage, frozen=True):
     """Request to acknowledge alarms in the state that the operator saw."""
 
     alarms: Annotated[dict[_Word, _Number], msgspec.Meta(min_length=1, max_length=_MOST)]
-    """Value of `raised` that the operator saw, keyed by signal. An alarm that has been raised again is
-    skipped."""
+    """Value of `raised` that the operator saw, keyed by signal. An alarm that has been raised again
+    is skipped."""
 
 
 class ShelveAsked(AlarmMessage, frozen=True):

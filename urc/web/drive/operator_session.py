@@ -48,7 +48,7 @@ class OperatorSession:
         self.wake = wake
         self.heartbeat: int | None = None
         self.on_role: set[Callable[[], None]] = set()
-        """Callbacks for changes of the role in `client`."""
+        """Callbacks that are called after each change of the role in `client`."""
         self.notices: dict[str, str] = {}
         """Newest notice about each control or lease request, by name."""
         self.seen = -1

@@ -7,7 +7,7 @@ message about held controls over both sockets and receives heartbeats over both.
 number. Only the first copy takes effect.
 
 A redundant socket has no rights without a page. The socket joins a page with a key that only this
-page knows and closes together with the page.
+page has, and closes when the page closes.
 """
 
 import msgspec

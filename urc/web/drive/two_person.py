@@ -36,7 +36,7 @@ WAIT_S: Final = 30.0
 TOKEN_S: Final = 5.0
 """How long a token is valid, in seconds."""
 _MOST: Final = 8
-"""Maximum number of pending questions per robot and of tokens per page."""
+"""Maximum number of pending questions for each robot, and of tokens for each page."""
 
 
 @dataclass(slots=True)
@@ -59,7 +59,7 @@ class _Yes(NamedTuple):
 
 
 class TwoPersonRule:
-    """The pending questions of one robot."""
+    """The pending questions and the valid tokens of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
         """Start with no questions; `operators` returns the sessions of the robot's pages."""

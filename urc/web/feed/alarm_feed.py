@@ -28,7 +28,7 @@ class AlarmPlace:
 
     def __init__(self) -> None:
         self.edition = -1
-        """Edition of the alarm list that the page has; -1 before the first message."""
+        """Edition of the alarm list that was last sent to the page; -1 before the first message."""
         self.revision = 0
 
 

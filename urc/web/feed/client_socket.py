@@ -137,7 +137,7 @@ class TokenBucket:
         self._time_s = now_s
 
     def allow(self, now_s: float) -> bool:
-        """Count one message; return False if the message exceeds the limit."""
+        """Count one message; return False if the message exceeds the rate limit."""
         earned = (now_s - self._time_s) * self._rate_hz
         self._left = min(self._rate_hz, self._left + earned)
         self._time_s = now_s

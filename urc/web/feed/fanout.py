@@ -24,8 +24,8 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time limit for reusing an encoded frame, in seconds. The ages in a frame are the ages at the time
-of encoding."""
+"""Maximum age at which an encoded frame is reused, in seconds. The ages in a frame are the ages at
+the time of encoding."""
 
 
 class FanoutPosition(NamedTuple):
@@ -149,7 +149,7 @@ class Fanout:
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake`, which must not block, at each flush; return a new client position."""
+        """Return a new client's position; each flush calls `wake`, which must not block."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))

@@ -16,13 +16,13 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Time limit for reusing an encoded image, in seconds. The message contains the image's age at the
-time of encoding. A reused message therefore states an age up to 50 ms too low; this small error
-does not justify another copy of several kilobytes."""
+"""Maximum age at which an encoded image is reused, in seconds. The message contains the image's age
+at the time of encoding. A reused message therefore states an age up to 50 ms too low; this small
+error does not justify another copy of several kilobytes."""
 
 
 class EncodedImage(NamedTuple):
-    """An encoded image for any client."""
+    """An encoded image, which can be sent to any client."""
 
     frame: bytes
     """The complete WebSocket frame."""

@@ -1,6 +1,7 @@
 """The task that records when robots were last used and last sent data.
 
-Layer 5. The task polls, because a check of a hundred robots takes only microseconds.
+Layer 5. The task checks all robots periodically; a check of a hundred robots takes only
+microseconds.
 """
 
 import asyncio
@@ -67,7 +68,7 @@ class ContactWatch:
                 await asyncio.to_thread(self._store.save)
 
     async def close(self) -> None:
-        """Record and save the final times."""
+        """Record and save the contact times for the last time, before the server ends."""
         self.look()
         await asyncio.to_thread(self._store.save)
 

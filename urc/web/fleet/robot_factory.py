@@ -50,7 +50,7 @@ class RobotOptions:
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
     monitors: bool = False
-    """Whether robots stay connected to monitor their alarms by default."""
+    """Whether robots stay connected by default, so that their alarms are monitored."""
 
 
 class ResolvedSettings(NamedTuple):
@@ -61,7 +61,7 @@ class ResolvedSettings(NamedTuple):
     given: dict[str, Value]
     """Values given when the server started, by setting name."""
     destination: str
-    """Hosts and ports of the robot's transports."""
+    """Hosts and ports of the robot's transports, to which secrets are tied."""
     withheld: frozenset[str]
     """Names of the secrets that were entered for another destination."""
 
@@ -188,7 +188,7 @@ class RobotFactory:
         return "/".join(parts[1:3])
 
     def with_interfaces(self, profile: Profile, first: str = "") -> Profile:
-        """Return the profile with all suitable installed interfaces, starting with `first`."""
+        """Return the profile with all suitable installed interfaces, beginning with `first`."""
         interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
         for added in self.interfaces():
             found = self.fit(added, profile)

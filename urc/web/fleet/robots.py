@@ -79,10 +79,10 @@ class Playback(Protocol):
         """Start the playback; at the end of the recording, restart from the beginning."""
 
     def pause(self) -> None:
-        """Pause at the current position."""
+        """Pause the playback at the current position."""
 
     def seek(self, position_s: float) -> None:
-        """Seek to a position."""
+        """Move the playback to a position, in seconds from the beginning."""
 
 
 LINGER_S = 2.0
@@ -90,7 +90,7 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 CLIENTS_OF_UNKNOWN, CLIENTS_OF_KNOWN = 8, 64
-"""Maximum clients of a robot: per address of unknown visitors, and per signed-in visitor."""
+"""Maximum clients of one robot: for unknown visitors at one address, and for a known visitor."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for a session to end, in seconds."""
 STOP_WITHIN_S = 1.0
@@ -200,7 +200,7 @@ def keep_all_signals(profile: Profile) -> frozenset[str]:
 
 
 class RobotService:
-    """A service that opens a robot's session for the first client and closes it after the last."""
+    """Opens a robot's session for the first client, and closes it after the last has left."""
 
     def __init__(
         self,

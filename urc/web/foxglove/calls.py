@@ -38,7 +38,7 @@ class RunCommand(Protocol):
 
 
 class FoxgloveCalls:
-    """The calls of one visitor."""
+    """Runs the service calls of one visitor."""
 
     def __init__(
         self, run: RunCommand, visitor: Callable[[str], Operator], recorder: ServerRecorder

@@ -30,8 +30,8 @@ from urc.wire import foxglove as wire
 __all__ = ["CALLS_AT_ONCE", "MESSAGES_PER_S", "MOST_FAULTS", "FoxgloveClient"]
 
 MESSAGES_PER_S: Final = 500
-"""Maximum rate of messages from a client; a higher rate closes the socket. A viewer sends a
-separate message for each topic that it subscribes to."""
+"""Maximum number of messages per second from a client; a higher rate closes the socket. A viewer
+sends a separate message for each topic that it subscribes to."""
 MOST_FAULTS: Final = 32
 """Number of invalid messages after which the socket is closed."""
 CALLS_AT_ONCE: Final = 16
@@ -50,7 +50,7 @@ log = logging.getLogger(__name__)
 
 
 class FoxgloveClient:
-    """The server side of one accepted socket."""
+    """The server side of one Foxglove client's socket."""
 
     def __init__(
         self,
@@ -159,7 +159,7 @@ class FoxgloveClient:
                 await self._news.wait()
 
     def _send(self) -> bool:
-        """Send messages while the kernel accepts them; return whether some may be left."""
+        """Send messages while the kernel accepts them; return whether messages may be left."""
         frames = self._outbox.frames(has_messages=not self._closing)
         for _ in range(_BURST):
             if not self._flow.is_free():
@@ -281,7 +281,7 @@ class FoxgloveClient:
         return found is not None and found[1].command == STOP
 
     def _stop(self, said: wire.ServiceCall) -> None:
-        """Press STOP immediately; respond once the robot has received it, or after a short wait."""
+        """Press STOP immediately; respond when the robot has received the stop, or soon after."""
         offer, _ = self._offers.services[said.service]
         try:
             self._calls.press_stop(offer)

@@ -1,7 +1,7 @@
 """The channels and services that one visitor's current rights permit.
 
-Layer 5. Pure, except that the client stores a task in each `Offer`. Channel and service ids come
-from one counter, so no id is ever reused.
+Layer 5. The module has no side effects, but the client stores a task in each `Offer`. Channel and
+service ids come from one counter, so no id is ever reused.
 """
 
 import asyncio
@@ -102,7 +102,7 @@ class Offer:
 
 
 class Changes(NamedTuple):
-    """The result of an update."""
+    """The changes that resulted from one update of the offers."""
 
     texts: list[bytes]
     """Messages for the client, in order."""

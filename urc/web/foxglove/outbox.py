@@ -39,7 +39,7 @@ class Outbox:
         self._warned: dict[str, str] = {}
         """Text of each robot's status, until the status is withdrawn."""
         self._ready: dict[str, RobotFeed] = {}
-        """Robots with unsent messages; the first robot is next."""
+        """Robots with unsent messages, in the order in which their messages are sent."""
         self._dropped = 0
         self._told_dropped = 0
         self._told_dropped_s = float("-inf")

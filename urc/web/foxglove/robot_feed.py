@@ -30,13 +30,13 @@ class RobotFeed:
         """Start without subscriptions; `wake` is called when a message is ready to be sent."""
         self._wake = wake
         self._ids: dict[TopicSource, int] = {}
-        """The client's subscription ids."""
+        """The client's subscription ids, keyed by the source of the messages."""
         self._waiting: dict[TopicSource, deque[Sample | TopicMessage]] = {}
         """Unsent readings and messages, keyed by subscribed signal or slot."""
         self._sources: dict[str, list[TopicSource]] = {}
         """Subscribed signals and slots, keyed by the signal that changes them."""
         self._ready: dict[TopicSource, None] = {}
-        """Sources with unsent messages; the first source is next."""
+        """Sources with unsent messages, in the order in which their messages are sent."""
         self._seen_notes = 0
         self._seen_links: dict[str, LinkStatus] = {}
         """Last state sent for each subscribed connection."""
@@ -162,7 +162,7 @@ class RobotFeed:
                 self._look(source, hub)
 
     def _look(self, source: TopicSource, hub: Hub) -> None:
-        """Queue the state of a connection if it is new."""
+        """Queue the state of a connection if it differs from the last sent state."""
         if source.kind == "link":
             status = hub.links.get(source.name)
             if status is not None and status is not self._seen_links.get(source.name):

@@ -102,7 +102,7 @@ class HubMessages:
         return place.inputs.values() if place is not None else ()
 
     def of_place(self, slot: str, hub: Hub) -> TopicMessage | None:
-        """Return the newest message of a slot; None without a value."""
+        """Return the newest message of a slot; None if the slot has no value yet."""
         known = self._newest_places.get(slot)
         if known is not None and known[0] == hub.revision:
             return known[1]

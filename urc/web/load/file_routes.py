@@ -60,7 +60,7 @@ class FileRoutes:
         return self._static.respond("app.webmanifest", request)
 
     async def _worker(self, request: Request) -> Response:
-        """Serve the service worker from the root URL, because this URL determines its scope."""
+        """Serve the service worker from the root URL, so that it covers all pages."""
         return self._static.respond("sw.js", request)
 
     async def _words(self, request: Request) -> Response:

@@ -47,7 +47,7 @@ class BlockWatch:
                 thread and may raise `UrcError`, for example for a blocked package.
             own_interfaces: function that returns the names of the interfaces in a robot's own
                 document. The function is called in a thread and may raise `UrcError`.
-            ask: function that starts a request to all repositories.
+            ask: function that starts a request for the block lists of all repositories.
         """
         self._store = store
         self._fleet = fleet
@@ -84,7 +84,7 @@ class BlockWatch:
         """Stop and disable robots with a blocked package; enable them again after unblocking.
 
         Raises:
-            UrcError: the lists cannot be read. No robot was changed.
+            UrcError: the lists cannot be read; all robots stay unchanged.
         """
         for name, robot in list(self._fleet.robots.items()):
             lines = await asyncio.to_thread(self._lines, name, robot)

@@ -55,7 +55,7 @@ class PackageCatalog:
         return Repositories(self._folder, complain)
 
     def refresh(self, *, force: bool = False) -> None:
-        """Start a refresh from all repositories, unless the last refresh is recent."""
+        """Start a refresh from all repositories, unless the last began within `FRESH_S` seconds."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
         if self.is_asking or (is_fresh and not force):
             return
@@ -127,4 +127,4 @@ class PackageCatalog:
 
 
 def _unheard(_: str) -> None:
-    """Ignore a warning, because the result of the request also contains it."""
+    """Ignore a warning, because the result of the request contains the same text."""

@@ -1,8 +1,8 @@
 """Installation jobs; each consists of planning, review, approval and installation.
 
 Layer 5. A job can be cancelled until the installation starts. No function in this module blocks the
-event loop. Downloads run in a thread, which is abandoned if the job is cancelled. The package store
-changes only at the end, in one step.
+event loop. Downloads run in a thread, which is abandoned if the job is cancelled. A job changes the
+package store only at its end, in one step.
 """
 
 import asyncio
@@ -141,7 +141,7 @@ class _ReportingSource:
 class Jobs:
     """The jobs of one package store.
 
-    Only one job runs at a time. The newest job stays visible.
+    Only one job runs at a time. The newest job stays visible on the pages after its end.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Jobs:
         sources: Callable[[Callable[[str], None]], Sequence[Source]],
         used: Callable[[PackageId], Lock | None] = lambda _: None,
     ) -> None:
-        """Create the job queue.
+        """Start without a job.
 
         Args:
             store: the store of installed packages.
@@ -304,7 +304,7 @@ class Jobs:
     def _changes(
         self, job: Job, before: Lock | None, plan: InstallPlan, folder: Path, look: PreviewWorker
     ) -> UpdateDiff | None:
-        """Return the known differences from the installed version."""
+        """Return the differences from the installed version; None if none can be determined."""
         if before is None:
             return None
         if before.key != plan.lock.key:

@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 
 class Manager:
-    """The operations of the manager pages."""
+    """Changes packages, repositories and settings on behalf of the manager pages."""
 
     def __init__(
         self,
@@ -165,7 +165,7 @@ class Manager:
         return self.factory.reload(robot.profile)
 
     def drivers(self) -> dict[str, str]:
-        """Return each robot's installed package, such as ``drivers/puppet 1.0.0``, by name."""
+        """Return robots' installed packages, such as ``drivers/puppet 1.0.0``, by robot name."""
         return {name: str(lock) for name, lock in self._packages.items()}
 
     def lock_of(self, name: str) -> Lock | None:
@@ -215,7 +215,7 @@ class Manager:
         self.catalogue.refresh(force=True)
 
     def gone(self, required: PackageRequirement) -> list[str]:
-        """Return all packages that would be removed, or raise `PackageError`."""
+        """Return all packages that a removal would remove, or raise `PackageError`."""
         before = self.factory.store.installed()
         meant = self._meant(required)
         after = [lock for lock in before if lock not in meant]
@@ -305,7 +305,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: PackageId) -> Lock | None:
-        """Return a package's version in use; robot packages match by name."""
+        """Return the version in use of a package, or of a robot or driver with the same name."""
         installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)

@@ -1,7 +1,7 @@
 """Requests that read or change the playback of a recording.
 
-Layer 5. A playback has the same pages as a robot without controls. Visitors with the role ``drive``
-may control the playback without a lease, because no real robot is connected.
+Layer 5. A playback has the same pages as a robot, but without controls. Visitors with the role
+``drive`` may control the playback without a lease, because no real robot is connected.
 """
 
 import math

@@ -33,7 +33,7 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
     "silent": ("port", "baud", "url", "host"),
     "host-key": ("host_key", "host"),
 }
-"""Options that may explain a failure, by cause, with the most likely option first."""
+"""Transport options that may explain a failed connection, keyed by cause, the most likely first."""
 
 
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:

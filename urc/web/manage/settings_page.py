@@ -96,7 +96,7 @@ class SettingsPage:
     """Choices for the monitoring of alarms; empty for a robot without alarms."""
     groups: tuple[FieldGroup, ...]
     transports: tuple[str, ...]
-    """Names of the tested transports."""
+    """Names of the transports that a connection test opens."""
     may_manage: bool
     is_simulated: bool
     fault: str

@@ -112,7 +112,7 @@ class SettingsRoutes:
         return robot.profile if robot is not None else None
 
     async def save(self, request: Request) -> Response:
-        """Test and store the entered settings."""
+        """Test the entered settings, then store and apply them."""
         name = request.path_params["name"]
         try:
             said = await body_of(request, SettingsAsked)
@@ -167,7 +167,7 @@ class SettingsRoutes:
             return StoredSettings()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
-        """Return the profile from the chosen version's document."""
+        """Return the robot's profile from the package version that the user chose."""
         manager, factory = self._manager, self._manager.factory
         lock = manager.lock_of(name)
         if lock is not None:

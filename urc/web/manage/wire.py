@@ -57,7 +57,7 @@ class RefreshRequest(ManageMessage, frozen=True):
     """Request to refresh the package lists."""
 
     force: bool = False
-    """Whether to ignore the age of the lists."""
+    """Whether to refresh the lists even if they are recent."""
 
 
 class InstallRequest(ManageMessage, frozen=True):
@@ -65,7 +65,7 @@ class InstallRequest(ManageMessage, frozen=True):
 
     package: _Short
     yes: bool = False
-    """Whether to remove the packages; if false, the server only lists them."""
+    """Whether to remove the packages; if false, the server only lists what would be removed."""
     forget: bool = True
     """Whether a removal also deletes the robot's settings and secrets."""
 
@@ -115,7 +115,7 @@ class JobNews(ManageMessage, frozen=True):
     """Permissions that the update adds."""
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
-    """Changes to the frames sent to the robot."""
+    """Changes that the update makes to the frames sent to the robot."""
     stays: str = ""
     """Version that stays in use until the user chooses another version; "" if the new version is
     used."""
@@ -133,7 +133,7 @@ class RepositoryInfo(ManageMessage, frozen=True):
     fault: str
     """Reason why the last request failed; "" if it succeeded."""
     is_kept: bool
-    """Whether the repository's cached list is in use."""
+    """Whether the repository's cached list is shown, because the last request failed."""
     is_plain: bool
     """Whether the connection to the repository is unencrypted."""
     keeper: str = ""
@@ -265,7 +265,7 @@ class AuditResult(ManageMessage, frozen=True):
     """Entries of the audit log, newest first."""
 
     entries: list[dict[str, Any]]
-    """Columns of each entry, including its number ``id``."""
+    """Values of each entry, keyed by column; the column ``id`` is the entry's number."""
     fault: str
     """Reason why the audit log can no longer be written; "" if it can."""
     has_more: bool

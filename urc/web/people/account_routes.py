@@ -64,7 +64,7 @@ class AccountRoutes:
 
     @answers_changes
     async def guest(self, request: Request) -> Response:
-        """Admit a guest with the secret from a link."""
+        """Admit a guest who presents the secret from a guest link."""
         said = await body_of(request, CodeRequest)
         self._sign_ins.check_wait(request)
         who = self._control.identify(said.code)

@@ -133,7 +133,7 @@ class AdminRoutes:
 
     @answers_changes
     async def invite(self, request: Request) -> Response:
-        """Return a link for choosing a passphrase."""
+        """Return a link with which a person chooses a passphrase."""
         person = self._chosen(await body_of(request, PrincipalChoice), "person")
         now = self._control.now()
         ends_at = now + INVITATION_S
@@ -265,7 +265,7 @@ class AdminRoutes:
         return one
 
     async def _changed(self, request: Request, command: str, **about: object) -> None:
-        """Apply a change immediately and record it."""
+        """Apply a stored change to all open connections, and record the change in the audit log."""
         actor = actor_of(request)  # read before the change, which may affect the administrator
         await self._control.reload()
         self._sign_ins.recorder.access_changed(actor, command, **about)

@@ -61,7 +61,7 @@ PEOPLE_CALLS: Final = (
     PeopleCall(
         "pair",
         ANYONE,
-        "Pair the browser as a device; the response sets its key in a cookie.",
+        "Pair the browser as a device; the response sets the device's key in a cookie.",
         told.PairResult,
         told.PairRequest,
     ),

@@ -1,6 +1,7 @@
-"""The common part of all browser sign-in methods: limits, audit entries and the sign-in itself.
+"""Code that all browser sign-in methods share: limits, audit entries and the sign-in itself.
 
-Layer 5. Failed attempts from an address or for a name delay later attempts. STOP is never delayed.
+Layer 5. Failed attempts delay later attempts from the same address or for the same name. STOP is
+never delayed.
 """
 
 import asyncio
@@ -41,9 +42,9 @@ answers_refusals: Final = answers_errors_with(403)
 """Decorator for handlers that admit or refuse a visitor."""
 
 HASHES: Final = 2
-"""Limit on concurrent passphrase hashes, each of which needs 64 MiB."""
+"""Limit on concurrent passphrase hashes; each hash needs 64 MiB of memory."""
 MOST_WAITING: Final = 32
-"""Limit on attempts that wait for their passphrase to be hashed."""
+"""Maximum number of sign-in attempts that wait for their passphrase to be hashed."""
 _LONGEST_AGENT: Final = 200
 
 
@@ -57,7 +58,7 @@ class BrowserSignIns:
         throttle: Throttle | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Set up the common part of all sign-in methods.
+        """Create the object that all sign-in methods of a server share.
 
         Args:
             access: identities and rights.
@@ -101,7 +102,7 @@ class BrowserSignIns:
     def failed(
         self, request: Request, way: Way, error: AccessError, *names: str, person: str = ""
     ) -> None:
-        """Count a failed attempt and record it.
+        """Count a failed attempt, and record the attempt in the audit log.
 
         Args:
             request: the attempt.
@@ -172,7 +173,7 @@ class BrowserSignIns:
     def admit(
         self, request: Request, response: Response, secret: str, *, is_device: bool = False
     ) -> Identity:
-        """Store an open sign-in in the browser and record it.
+        """Store an open sign-in in the browser, and record the sign-in in the audit log.
 
         Args:
             request: the request.

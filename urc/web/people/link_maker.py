@@ -1,7 +1,7 @@
 """Creation of links for other devices: pairing codes, invitations and guest links.
 
-Layer 5. The methods block, because they read files. A link contains its code in the fragment, which
-browsers never send to a server.
+Layer 5. Call the methods in a thread, because they read files. A link contains its code in the
+fragment, which browsers never send to a server.
 """
 
 import ipaddress
@@ -85,7 +85,7 @@ def _public_address(request: Request, data: Path | None, instance: str) -> str:
 
     A request from another device already contains an address that other devices can use. For a
     request from the server's own computer, the function returns the address announced by the
-    server. The function reads files.
+    server. Call the function in a thread, because it reads files.
 
     Args:
         request: the administrator's request; the page policy has checked its host.

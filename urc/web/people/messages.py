@@ -68,18 +68,18 @@ class CodeRequest(PeopleMessage, frozen=True):
 
 
 class CodeInfo(PeopleMessage, frozen=True):
-    """The rights granted by a code."""
+    """The rights that a pairing or invitation code grants."""
 
     kind: str
     """``device`` or ``person``."""
     name: str
     """Name of the device or person; "" if the device chooses its name."""
     suggested: str
-    """Unused name for the device, such as “Chrome on Android”."""
+    """Suggested name for the device, not in use yet, such as “Chrome on Android”."""
     owner: str
     """Name of the device's owner; "" if it has no owner."""
     roles: tuple[str, ...]
-    """Grants, such as ``drive@cart``."""
+    """Grants of the device or person, such as ``drive@cart``."""
     ends_at: float
     """Time at which the code becomes invalid, in seconds since 1970 (UTC)."""
 
@@ -139,7 +139,7 @@ class PairingCode(PeopleMessage, frozen=True):
     is_reachable: bool
     """Whether other devices can open the link."""
     lasts_s: float
-    """Remaining validity, in seconds."""
+    """Time until the code expires, in seconds."""
 
 
 class PairingState(PeopleMessage, frozen=True):
@@ -168,7 +168,7 @@ class PrincipalInfo(PeopleMessage, frozen=True):
     has_passphrase: bool
     passkeys: int
     accounts: int
-    """Number of accounts at identity providers."""
+    """Number of the person's accounts at identity providers."""
     invited_until: float | None
     sign_ins: int
     """Number of open sign-ins."""
@@ -198,13 +198,13 @@ class SignInInfo(PeopleMessage, frozen=True):
     agent: str
     """Browser and operating system, such as “Chrome on Android”."""
     place: str
-    """Network address at sign-in."""
+    """Network address from which the sign-in was opened."""
     created_at: float
     """Time of the sign-in, in seconds since 1970 (UTC)."""
     used_at: float
     """Time of the last request, in seconds since 1970 (UTC)."""
     ends_at: float | None
-    """Time at which the sign-in ends if it is not used again; null if it never ends."""
+    """UTC end time without further use, in seconds since 1970; null if the sign-in never ends."""
     is_own: bool
     """Whether the current request uses this sign-in."""
 
@@ -244,7 +244,7 @@ class RolesRequest(PeopleMessage, frozen=True):
 
 
 class TokenRequest(PeopleMessage, frozen=True):
-    """Request for a token."""
+    """Request to add a program and create its token."""
 
     name: _Short
     roles: _Roles
@@ -291,7 +291,7 @@ class SignInChoice(PeopleMessage, frozen=True):
 
 
 class GuestResult(PeopleMessage, frozen=True):
-    """The page that a guest may open."""
+    """The page that a newly admitted guest opens."""
 
     url: str
 

@@ -123,7 +123,7 @@ class OidcRoutes:
     def _kept(self, request: Request, binding: str, lasts_s: int) -> str:
         """Return the cookie that binds a sign-in to the browser.
 
-        The cookie is not strict, because the browser returns from the provider's site.
+        The cookie is not ``SameSite=Strict``, because the browser returns from the provider's site.
         """
         secure = "; Secure" if request.url.scheme == "https" else ""
         return (

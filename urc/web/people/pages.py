@@ -29,7 +29,7 @@ _NO_STORE: Final = {"cache-control": "no-store"}
 
 
 class GrantScope(NamedTuple):
-    """A choice of the robots that a role applies to."""
+    """A choice of robots to which a role applies: all robots, a tag or one robot."""
 
     value: str
     """Suffix of a grant: "", ``@cart`` or ``@#lab``."""

@@ -1,7 +1,8 @@
 """Routes for single-use codes, which pair a device or let an invited person choose a passphrase.
 
 Layer 5. The fragment of the page's address contains the code, so server logs never contain it. The
-page sends the code in a request body. A code has 128 random bits, and attempts are limited as well.
+page sends the code in a request body. A code has 128 random bits, and failed attempts delay later
+attempts.
 """
 
 import asyncio
@@ -36,7 +37,7 @@ from urc.web.words import t
 __all__ = ["PairingRoutes"]
 
 MOST_LINKS: Final = 8
-"""Limit on robots listed on a new device's page; above the limit, the page links to the menu."""
+"""Maximum number of robots listed for a new device; above it, the page links to the menu."""
 
 
 class PairingRoutes:
@@ -142,7 +143,7 @@ class PairingRoutes:
         return done
 
     async def _invitation(self, request: Request, code: str) -> Invitation:
-        """Return the invitation for a code; count and report an unknown code."""
+        """Return the invitation for a code; count an unknown code and raise `ApiError`."""
         sign_ins = self._sign_ins
         sign_ins.check_wait(request)
         found = await asyncio.to_thread(sign_ins.store.invitation, code, sign_ins.control.now())

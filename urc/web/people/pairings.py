@@ -14,7 +14,7 @@ from urc.web.people.messages import PairingState
 __all__ = ["MOST_PAIRINGS", "Pairings"]
 
 MOST_PAIRINGS: Final = 256
-"""Limit on remembered pairings; above the limit, the oldest pairing is dropped."""
+"""Maximum number of remembered pairings; above it, the oldest pairing is dropped."""
 
 
 class _Pairing:

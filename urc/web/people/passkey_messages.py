@@ -59,6 +59,6 @@ class PasskeyList(msgspec.Struct, frozen=True):
 
 
 class ProviderAddress(msgspec.Struct, frozen=True):
-    """The identity provider's page, which the browser opens next."""
+    """URL of the identity provider's page, which the browser opens next."""
 
     url: str

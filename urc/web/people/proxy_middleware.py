@@ -30,7 +30,7 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["MOST_PROXIED", "ProxyMiddleware"]
 
 MOST_PROXIED: Final = 1000
-"""Limit on remembered browsers behind proxies; the least recently used browser is forgotten."""
+"""Maximum number of remembered browsers; above it, the least recently used is forgotten."""
 _LASTS_S: Final = 12 * 3600.0
 _TELL_S: Final = 60.0
 _REFUSED_S: Final = 5.0

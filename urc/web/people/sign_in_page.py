@@ -54,8 +54,8 @@ class AccessPage:
     """Whether the request had an invalid key, which the page then reports first."""
     path: str
     """Path and query of the page that opens after the sign-in. A browser that followed a link from
-    another site sends no cookie. It sends the cookie once the user follows a link from this page to
-    this path."""
+    another site sends no cookie. The browser sends the cookie once the user follows a link from the
+    sign-in page to this path."""
     robots: tuple[Stoppable, ...]
     has_people: bool
     """Whether the server has people who can sign in with a name and a passphrase."""
@@ -89,7 +89,7 @@ class SignInPages:
         return [ProtectedRoute("/sign-in", self.page, ANYONE)]
 
     async def page(self, request: Request) -> Response:
-        """Show the sign-in page; the query parameter ``to`` is the path of the next page."""
+        """Show the sign-in page; the query parameter ``to`` is the path to open afterwards."""
         found = self.response(request.scope, path=own_path(request.query_params.get("to", "/")))
         found.status_code = 200
         del found.headers["www-authenticate"]

@@ -46,7 +46,7 @@ class WaysIn:
         recorder.hide(one.secret.decode() for one in options.proxies)
         recorder.hide([options.oidc.client_secret] if options.oidc else [])
         self.sign_ins = BrowserSignIns(access, recorder)
-        """The common part of all sign-in methods."""
+        """The object that all sign-in methods share, for limits, audit entries and sign-ins."""
         provider = OidcSignIn(options.oidc) if options.oidc else None
         self.oidc = OidcRoutes(self.sign_ins, provider)
         self._passkeys = PasskeyRoutes(self.sign_ins)

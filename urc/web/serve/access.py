@@ -42,7 +42,7 @@ _Headers = Iterable[tuple[bytes, bytes]]
 
 
 class Access:
-    """The identities of one server's requests and the sockets that depend on these identities."""
+    """Identifies the sender of each request, and notifies sockets of changed rights."""
 
     def __init__(
         self,
@@ -83,7 +83,8 @@ class Access:
         """Callback for each request with an unknown, expired or revoked token. Its argument is the
         network address."""
         self.clock_check: Callable[[], str] = _right_clock
-        """Function that returns a warning about a wrong clock, or "". It may block."""
+        """Function that returns a warning about a wrong clock; "" for a correct clock. It may
+        block."""
         self.clock_warning = ""
         """Latest result of `clock_check`, which every page shows."""
         self._dependents: set[Callable[[], None]] = set()
@@ -114,8 +115,8 @@ class Access:
 
         Args:
             headers: headers of the request, with names in lower case.
-            is_secure: whether the request came over TLS. If true, only cookies with `SECURE` count,
-                because other servers under the same host name cannot set them.
+            is_secure: whether the request came over TLS. If true, only cookies whose names begin
+                with `SECURE` count, because other servers under the same host name cannot set them.
         """
         pairs = list(headers)
         for name, value in pairs:
@@ -232,7 +233,7 @@ class Access:
             group.create_task(self._watch_clock())
 
     async def _watch_clock(self) -> None:
-        """Check the clock now and every minute, because the network may set it at any time."""
+        """Check the clock now and every minute, because a time service may set it later."""
         while True:
             self.clock_warning = await asyncio.to_thread(self.clock_check)
             await asyncio.sleep(CLOCK_S)

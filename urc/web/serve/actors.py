@@ -18,7 +18,7 @@ def actor_of(connection: HTTPConnection, robot: str = "") -> Actor:
 
     Args:
         connection: the request.
-        robot: name of the robot in question; "" for the server.
+        robot: name of the robot that the request is about; "" for the whole server.
     """
     visitor = visitor_of(connection)
     who = visitor.identity

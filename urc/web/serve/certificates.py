@@ -23,7 +23,7 @@ from urc.web.serve.policy import own_names
 __all__ = ["Certificates", "GivenCertificate", "LoadedCertificate", "LocalCertificate", "names_of"]
 
 LOOK_S: Final = 60.0
-"""Interval between checks of addresses, files and dates, in seconds."""
+"""Interval between checks of addresses, certificate files and expiry dates, in seconds."""
 _ALWAYS: Final = ("localhost", "127.0.0.1", "::1")
 log = logging.getLogger(__name__)
 
@@ -45,20 +45,20 @@ class LoadedCertificate(NamedTuple):
 
 
 class CertificateSource(Protocol):
-    """A source of certificates. Both methods block."""
+    """The authority or the operator's files, as the source of certificates. Both methods block."""
 
     def load(self) -> LoadedCertificate:
         """Return the current certificate, or raise `UrcError`."""
 
     def has_changed(self) -> bool:
-        """Return whether `load` would return another certificate."""
+        """Return whether `load` would now return a different certificate."""
 
 
 class LocalCertificate:
     """A certificate from the local authority, for this machine's names and addresses."""
 
     def __init__(self, folder: Path, host: str, allowed_hosts: Iterable[str] = ()) -> None:
-        """Store the folder and the names.
+        """Create the source; only `load` reads the files.
 
         Args:
             folder: the authority's folder.
@@ -136,7 +136,7 @@ class GivenCertificate:
             self._key.read_bytes()  # its error names the file
             context = _context(self._chain, self._key)
         except _PassphraseError:
-            text = f"--tls-key: {self._key} has a passphrase; expected a key without one"
+            text = f"--tls-key: {self._key} has a passphrase; remove the passphrase"
             raise UrcError(text) from None
         except ssl.SSLError as error:
             reason = error.reason or "the certificate and the key do not match"
@@ -154,7 +154,7 @@ class GivenCertificate:
         )
 
     def has_changed(self) -> bool:
-        """Return whether a file has been replaced."""
+        """Return whether the certificate file or the key file has been replaced."""
         return self._stamps() != self._seen
 
     def _stamps(self) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""One HTTP connection: it takes turns, limits request times and adds headers to refusals.
+"""One HTTP connection, with request turns, time limits, and policy headers for refusals.
 
 Layer 5. The module is a thin layer over uvicorn's protocol, used only by `server`. The library
 uvicorn refuses invalid HTTP and connections above its limit. Without this layer, uvicorn's refusals
@@ -61,7 +61,7 @@ class HttpConnection(H11Protocol):
         class uses the constructor's arguments and the methods `handle_events`, `send_400_response`
         and `shutdown`. It also uses the attributes `conn`, `connections`, `flow`, `loop` and
         `transport`. The tests in tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail
-        if one of these parts changes.
+        if one of these names changes.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave the queue and cancel the request's time limit."""
+        """Remove the lost connection from the queue, and cancel its request's time limit."""
         self._turns.remove(self)
         self._unwatch()
         super().connection_lost(exc)

@@ -18,8 +18,8 @@ PLACES = 32
 uses up to two sockets and six requests, so the limit permits several pages and a few people behind
 one address."""
 KNOWN_PLACES = 256
-"""Maximum number of concurrent requests and sockets of one known person, device or program. A
-known visitor may watch many robots."""
+"""Maximum number of concurrent requests and sockets of one known person, device or program. The
+limit is high, because a known visitor may watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 

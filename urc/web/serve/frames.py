@@ -1,8 +1,8 @@
 """A parser for WebSocket frames that each contain a complete text message, such as most ticks.
 
-Layer 5, pure. The parser only reads the bytes. The WebSocket library processes everything else in
-the same bytes: fragments, control frames and protocol errors. For other frames, this module only
-counts the bytes, to find the start of the next frame.
+Layer 5, pure. The parser reads the bytes without changing them. The WebSocket library processes
+everything else in the same bytes: fragments, control frames and protocol errors. For other frames,
+this module only counts the bytes, to find the start of the next frame.
 """
 
 from typing import Final
@@ -29,7 +29,7 @@ class WebSocketFrames:
         self._left = 0
         """Number of bytes still missing from the current frame."""
         self._head = b""
-        """Bytes of an incomplete frame header."""
+        """Received bytes of an incomplete frame header."""
         self._is_inside = False
         """Whether a fragmented message is incomplete."""
         self.spans: list[tuple[int, int]] = []

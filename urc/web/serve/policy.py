@@ -97,8 +97,8 @@ REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
     *_FIXED_HEADERS,
 )
-"""Headers of a plain-text refusal from outside the application. They forbid all scripts and
-resources."""
+"""Headers of a plain-text refusal that does not come from the application. These headers forbid all
+scripts and resources."""
 
 
 class Authority(NamedTuple):
@@ -204,7 +204,7 @@ class Policy:
         self._places = ConnectionQuota()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse the request, or call the application and add the headers of the policy."""
+        """Refuse the request, or call the application and add headers to its response."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -320,7 +320,7 @@ class _Answer:
 
 
 def _limited(scope: Scope, receive: Receive) -> Receive:
-    """Return a version of `receive` that limits the total body size."""
+    """Return a version of `receive` that limits the total size of the request's body."""
     if scope["type"] == "websocket":
         return receive
     total = 0

@@ -45,11 +45,11 @@ class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     message: str
     """Reason for human readers, in one line."""
     error: str
-    """Same as `message`; earlier versions had only this key."""
+    """Copy of `message` for old programs, because earlier versions had only this key."""
 
 
 class ApiError(Exception):
-    """A failure with a status, one line of text and a code."""
+    """A failed API request, with an HTTP status, a one-line reason and a reason code."""
 
     def __init__(self, status: int, line: str, code: str = "") -> None:
         super().__init__(line)

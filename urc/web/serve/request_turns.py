@@ -26,7 +26,7 @@ class RequestTurns:
         """
         self._most = most
         self._left = most
-        """Turns left in this iteration."""
+        """Number of turns left in this iteration of the event loop."""
         self._waiting: dict[object, Callable[[], None]] = {}
         self._is_scheduled = False
 
@@ -48,7 +48,7 @@ class RequestTurns:
         return True
 
     def remove(self, connection: object) -> None:
-        """Remove a lost connection."""
+        """Remove a lost connection, whose requests are no longer read."""
         self._waiting.pop(connection, None)
 
     def _schedule(self) -> None:

@@ -64,8 +64,8 @@ class Right(NamedTuple):
 
 
 FRESH_S: Final = 300.0
-"""Time after a sign-in, in seconds, during which people can change packages, settings and rights. A
-tablet that was left signed in therefore does not permit such changes."""
+"""Time after a sign-in, in seconds, during which people can change packages, settings and rights.
+After this time, a tablet that was left signed in no longer permits such changes."""
 ANYONE: Final = Right(None)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
@@ -116,14 +116,14 @@ class ProtectedRoute(Route):
 
 
 class ProtectedSocket(WebSocketRoute):
-    """A socket route that is open only to visitors with a right."""
+    """A socket route whose endpoint is called only for visitors with a right."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], right: Right) -> None:
         super().__init__(path, endpoint)
         self.right = right
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Call the endpoint, or close the socket with the reason."""
+        """Call the endpoint; for visitors without the right, close the socket with the reason."""
         if _may(scope, self.right):
             await super().handle(scope, receive, send)
         else:

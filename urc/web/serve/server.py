@@ -333,7 +333,7 @@ async def _follow(server: _UvicornServer, running: "asyncio.Future[None]") -> No
 
 @contextlib.contextmanager
 def _ending(server: _UvicornServer) -> Iterator[None]:
-    """End the server on SIGINT and SIGTERM while the context is open, if the platform permits."""
+    """End the server on SIGINT and SIGTERM while the context is open, where supported."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 

@@ -24,13 +24,13 @@ __all__ = ["ServiceManager", "answers"]
 log = logging.getLogger(__name__)
 
 _SIGNS: Final = 3
-"""Heartbeats per watchdog interval. sd_watchdog_enabled(3) recommends two. With three heartbeats,
-one lost request does not end the server."""
+"""Number of heartbeats per watchdog interval. sd_watchdog_enabled(3) recommends two. With three
+heartbeats, one lost request does not end the server."""
 _STATUS: Final = b"HTTP/1.1 "
 
 
 class ServiceManager:
-    """The service manager of this process.
+    """Sends messages to this process's service manager, if there is one.
 
     Args:
         environment: the environment, with `NOTIFY_SOCKET`, `WATCHDOG_USEC` and `WATCHDOG_PID`.
@@ -93,7 +93,7 @@ async def answers(url: str, within_s: float) -> bool:
 
     Args:
         url: address of the server. HTTPS ports also answer plain HTTP for this path.
-        within_s: time limit in seconds.
+        within_s: time limit for the answer, in seconds.
     """
     place = urlsplit(url)
     writer: asyncio.StreamWriter | None = None

@@ -3,8 +3,8 @@
 Layer 5. The standard library's `ssl.SSLObject` encrypts the data. An event loop's own TLS layer has
 a buffer above the TCP transport and reports a full buffer one write too late. The dashboard would
 then write one more frame, which becomes outdated in the buffer. This class passes each write to TCP
-immediately, so TCP's callbacks arrive at the right time. During a pause, received data stays in the
-kernel.
+immediately, so TCP's callbacks arrive at the right time. While reading is paused, received data
+stays in the kernel.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ from typing import Any
 __all__ = ["READ_BYTES", "TlsConnection"]
 
 READ_BYTES = 64 * 1024
-"""Maximum number of decrypted bytes per protocol call."""
+"""Maximum number of decrypted bytes passed to the upper protocol in one call."""
 HANDSHAKE_BYTES = 64 * 1024
 """Maximum number of received bytes that can wait for the next step of a handshake."""
 
@@ -99,7 +99,7 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             self._protocol.resume_writing()
 
     def continue_handshake(self) -> None:
-        """Process the received handshake data, which takes long because of the cryptography."""
+        """Process the received handshake data; this takes long because of the cryptography."""
         if self._is_closing or self._is_ready:
             return
         try:

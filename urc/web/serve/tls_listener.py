@@ -128,7 +128,7 @@ class FirstBytes(asyncio.Protocol):
         """Network address of the client."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Wait for the first bytes."""
+        """Store the transport, and wait for the client's first bytes."""
         self._tcp = cast("asyncio.Transport", transport)
         peer = transport.get_extra_info("peername") or ("",)
         self.address = str(peer[0])

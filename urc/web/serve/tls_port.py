@@ -31,7 +31,7 @@ _PLAIN = re.compile(
     r"/trust(?:/authority\.crt)?|/healthz|/favicon\.ico|/app\.webmanifest"
     r"|/(?:static|vendor|words)/.+\.\w+"
 )
-"""Paths without data about robots, which need no encryption."""
+"""Paths that need no encryption, because their responses contain no data about robots."""
 
 
 class TlsPort:

@@ -17,7 +17,7 @@ __all__ = ["Visitor", "VisitorRights", "is_loopback", "peer_of", "visitor_of"]
 
 
 class VisitorRights(Protocol):
-    """The part of `urc.web.serve.access.Access` that visitors use."""
+    """The methods of `urc.web.serve.access.Access` that visitors use."""
 
     def role(self, who: Identity, robot: str = "") -> Role | None:
         """Return the current role of `who` for a robot; "" stands for the whole server."""
@@ -69,7 +69,7 @@ class Visitor:
     def is_fresh(self) -> bool:
         """Whether the visitor has signed in within the last `FRESH_S` seconds.
 
-        The local user and programs cannot sign in again, so they always count as fresh.
+        The local user and programs cannot sign in again, so their sign-ins always count as recent.
         """
         if self.is_local or self.identity.way == "token":
             return True

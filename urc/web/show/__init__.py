@@ -1,1 +1,1 @@
-"""Rendering of pages and their parts."""
+"""Rendering of the dashboard's pages, cells and cards."""

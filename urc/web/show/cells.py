@@ -80,7 +80,7 @@ class WidgetContext:
     """Readable name of each output's command, by output name. Unbound outputs are omitted, so that
     a widget can omit their controls."""
     hazardous: tuple[str, ...] = ()
-    """Outputs whose command always requires a slide to confirm."""
+    """Names of the outputs whose command must always be confirmed with a slide."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
@@ -133,8 +133,8 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
     """Return the name of a widget's subject: its first required signal, or else its command.
 
-    An optional output is not the subject. For example, the subject of a camera widget with pan and
-    tilt is the camera.
+    The command of an optional output is never the subject. For example, the subject of a camera
+    widget with pan and tilt is the camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]

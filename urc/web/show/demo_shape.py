@@ -48,7 +48,7 @@ _VALUE: Final = {
     "items": {"enum": _ELEMENTS},
     "size": _COUNT,
 }
-"""Common properties of signals and arguments."""
+"""Schema properties that the signals and arguments of a demo have in common."""
 _SIGNAL: Final = _mapping(
     "signal of a demo",
     {

@@ -93,7 +93,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
 def _signals(
     declared: Mapping[str, Any],
 ) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the signals and the bindings of single inputs and of multiple inputs."""
+    """Return the signals, the bindings of single inputs, and the bindings of multiple inputs."""
     signals: dict[str, Signal] = {}
     inputs: dict[str, str] = {}
     lists: dict[str, tuple[str, ...]] = {}

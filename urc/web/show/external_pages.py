@@ -47,7 +47,7 @@ class FramedPage:
     url: str
     """URL of the third-party page; "" for a refused page."""
     fault: str
-    """Reason for a refusal, in one line; otherwise ""."""
+    """Reason why the page is refused, in one line; "" for a permitted page."""
     style: Markup = _STYLE
     """Exact text of the style; the policy contains the text's digest."""
 

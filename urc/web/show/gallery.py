@@ -98,7 +98,7 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function only marks the text for translation; pages translate it with `t`.
+    The function only marks the text for translation; pages translate the text with `t`.
     """
     return text
 

@@ -35,8 +35,8 @@ DEBUGGING: Final = Interface(DEBUG, "Debug")
 """Placeholder for the debug interface, which has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Name of the cookie for the interface that this device last showed for a robot. The cookie's path
-is the robot's page; ``interfaces.js`` writes the cookie."""
+"""Name of the cookie that stores which interface of a robot this device last showed. The cookie's
+path is the robot's page; ``interfaces.js`` writes the cookie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def choices(
         profile: profile of the robot.
         interface: the interface that the page shows.
         url: path of the robot's page.
-        more: suffix of each URL.
+        more: further query parameters for each URL, beginning with ``&``; may be empty.
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(

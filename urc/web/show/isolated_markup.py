@@ -82,7 +82,7 @@ def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
 
 
 def _asked(jobs: list[str]) -> list[RenderedMarkup] | None:
-    """Return the output of the process; None if the process ended early."""
+    """Return what the process wrote to its standard output; None if the process ended early."""
     try:
         done = subprocess.run(  # noqa: S603 (our own program)
             [sys.executable, *_COMMAND],

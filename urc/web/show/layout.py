@@ -59,7 +59,7 @@ _MOST_COVERED = 2
 the middle of the background, for example the robot on a map."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
-do."""
+extend down next to STOP."""
 _SHRINKING = ("value", "instrument", "view", "list")
 """Footprints whose rows shrink to make room for sticks and buttons on a phone in landscape."""
 _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-drive)"}
@@ -106,7 +106,7 @@ def grid_css(
 
 
 class _Canvas(NamedTuple):
-    """The slots of a page, with its background slot."""
+    """The slots of one page of an interface, including the background slot."""
 
     slots: Sequence[str]
     background: str = ""

@@ -23,7 +23,7 @@ __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_pag
 
 @dataclass(frozen=True, slots=True)
 class NavigationLinks:
-    """The navigation links of this server."""
+    """The optional pages of this server, which the navigation links to."""
 
     has_managers: bool = False
     """Whether the server has pages for drivers, interfaces, widgets and settings."""
@@ -192,7 +192,7 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
 
 
 def _initials(title: str) -> str:
-    """Return the initials of the first two words."""
+    """Return the initials of a title's first two words, in upper case."""
     words = title.replace("-", " ").split()
     return "".join(word[0] for word in words[:2]).upper()
 

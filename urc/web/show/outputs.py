@@ -40,7 +40,7 @@ def _scale(have: str, want: str) -> dict[str, object] | None:
 
 
 def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return the configuration of one output."""
+    """Return the configuration of one output for ``output.js``."""
     name = use.outputs[output]
     command = driver.commands.get(name)
     port = widget.outputs.get(output, _NO_PORT)
@@ -183,7 +183,7 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The function only marks the text for translation; the page translates it.
+    The function only marks the text for translation; the page translates the text.
     """
     return text
 

@@ -54,7 +54,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class PageHead:
-    """Data for the head element of every page."""
+    """Data for the head element of a page."""
 
     nonce: str
     """Nonce of the response, required in every script and style element."""
@@ -111,7 +111,7 @@ class RobotPage:
     """The driver's hints for lost connections, by transport, as a JSON object."""
     on_demand: str
     """Transports that only commands open, as a JSON list. The robot does not count as lost while
-    they are closed."""
+    these transports are closed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class ErrorPage:
 
 @dataclass(frozen=True, slots=True)
 class ServerParts:
-    """The parts that all robot pages of a server share."""
+    """Data and rules that all robot pages of a server share."""
 
     modules: Mapping[str, object]
     """The import map."""
@@ -168,7 +168,7 @@ def robot_page(
         name: the robot's name in URLs.
         robot: the robot or playback.
         interface: the interface to show.
-        server: the parts that all pages share.
+        server: data and rules that all pages share.
         request: the visitor's request.
     """
     profile, is_recorded = robot.profile, robot.playback is not None

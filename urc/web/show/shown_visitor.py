@@ -1,7 +1,7 @@
 """A page's visitor, for display on the page.
 
 Layer 5. The access middleware sets the visitor for each request; ``nav.html.j2`` and
-``robot.html.j2`` show it.
+``robot.html.j2`` show the visitor.
 """
 
 from contextvars import ContextVar

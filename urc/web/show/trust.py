@@ -1,4 +1,4 @@
-"""The connection page: the browser's features at this address and trust in the authority.
+"""The connection page: which browser features work at this address, and how to trust URC.
 
 Layer 5. The page and the certificate contain no data about robots. Everyone may load both, even
 over plain HTTP, because a device needs them before it trusts the certificate.
@@ -121,7 +121,7 @@ _GUIDES: Final = (
         phrase("Choose the certificate in the same list, then “Delete or Distrust”."),
     ),
 )
-"""Guides in English, to be translated. Menu names match those in the operating systems."""
+"""Guides in English, to be translated. Each menu has the name that the operating system shows."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ __all__ = ["FILES", "check_widget"]
 
 MODULE: Final = "widget.js"
 FILES: Final = (TEMPLATE, MODULE, "demo.yaml")
-"""Files of a widget, in addition to its manifest."""
+"""Names of the files that a widget has in addition to its manifest."""
 MOST_BYTES: Final = 1 << 20
 _EXPORT: Final = re.compile(
     r"(?:^|[;}])\s*export\s+(?:default\b|\{[^}]*\bdefault\b[^}]*\})", re.MULTILINE

@@ -245,7 +245,7 @@ def encode_error(code: str, message: str) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return the value in a form for browsers, with sizes in place of bytes."""
+    """Return a value that browsers can read: long text is cut, and bytes become their size."""
     if isinstance(value, str):
         return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:

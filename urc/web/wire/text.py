@@ -51,5 +51,5 @@ def cut(text: str) -> str:
 
 
 def milliseconds(seconds: float) -> int:
-    """Return a time in milliseconds, rounded to a whole number."""
+    """Convert a time in seconds to milliseconds, rounded to a whole number."""
     return round(seconds * 1000)
