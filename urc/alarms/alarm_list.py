@@ -56,7 +56,7 @@ class AlarmList:
         """Continue with the alarms from an earlier run.
 
         Args:
-            limits: limits, keyed by signal; `judge` accepts only these signals.
+            limits: alarm limits, keyed by signal; `judge` accepts only these signals.
             records: the records from the last run; their values count as unknown until the next
                 sample.
         """
@@ -189,7 +189,7 @@ class AlarmList:
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
         """Set the pairs of signal and condition that are suppressed by design from now on.
 
-        An alarm whose value is unknown stays unchanged until its next value.
+        An alarm with an unknown value stays unchanged until the next sample of its signal.
         """
         if suppressed == self._suppressed:
             return
@@ -230,7 +230,7 @@ class AlarmList:
         """Acknowledge alarms; return the newly acknowledged alarms.
 
         Args:
-            raised: the attribute `raised` of each alarm that the operator saw, by signal. An alarm
+            raised: the value of `raised` that the operator saw, keyed by signal. An alarm
                 that has been raised again since then is not acknowledged.
             actor: the person, device or program that acknowledges the alarms.
             now: UTC time in seconds.
@@ -256,7 +256,7 @@ class AlarmList:
     ) -> list[AlarmRecord]:
         """Shelve alarms until a time; return the newly shelved alarms.
 
-        The time is limited to `LONGEST_SHELF_S` from now.
+        Shelving ends at most `LONGEST_SHELF_S` seconds after `now`.
         """
         until = min(until, now + LONGEST_SHELF_S)
         done = []

@@ -57,7 +57,7 @@ class _Control:
     at_s: float = 0.0
     """Time of the newest tick on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
-    """Frame of the newest tick, if it contains counters; otherwise None."""
+    """Frame of the newest tick; None if the frame contains no counters."""
     may_move: bool = False
     stopped_s: float = float("-inf")
     """Time of the last written stop, as reported by the guard, in seconds."""
@@ -79,7 +79,7 @@ class GuardClient:
 
         Args:
             lines: the guarded transports; a tunnel precedes the transports that it carries.
-            held: the held commands by name.
+            held: the held commands, keyed by name.
             channel_to: function that creates the channel for this client.
         """
         self.lines = tuple(lines)
@@ -94,7 +94,7 @@ class GuardClient:
             )
             for spec in lines
         }
-        """Guarded transports by name, used by the session's links."""
+        """Guarded transports, keyed by name; the session's links use these transports."""
         self.on_stand: Stands = _unheard
         """Callback that receives a transport's counters, and whether all of the engine's frames
         with counters were sent.
@@ -161,7 +161,7 @@ class GuardClient:
         return control is not None and control.is_armed
 
     def release(self, command: str) -> None:
-        """Stop `command` because its control was released."""
+        """Stop `command`, because the operator has released its control."""
         self._discard_tick(command)
         self.channel.post(messages.ReleaseControl(command))
 

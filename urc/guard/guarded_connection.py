@@ -271,7 +271,7 @@ class GuardedConnection:
         await self._serve()
 
     async def _attempt(self, timeout_s: float) -> str:
-        """Open the transport; return the reason for a failure, or "" on success."""
+        """Open the transport; return the reason for a failure, "" on success."""
         began_s = self._clock.now()
         try:
             async with asyncio.timeout(timeout_s + _GRACE_S):

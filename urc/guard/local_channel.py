@@ -33,7 +33,7 @@ class LocalChannel:
         self._host = GuardServer(self._emit, clock)
 
     def start(self) -> None:
-        """Start the guard and create its transports."""
+        """Create the transports in the guard, which needs no start of its own."""
         for spec in self._lines:
             self._host.add(spec.make, spec.transport)
 

@@ -46,7 +46,7 @@ __all__ = [
 
 
 class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
-    """Create a transport without opening it."""
+    """Create a transport in the guard; `OpenLine` opens the transport."""
 
     line: str
     factory: str
@@ -248,7 +248,7 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
     sent: int
     """Number of the newest sent `SendBytes` with counters."""
     stand: dict[str, int]
-    """Last sent value of each counter, by name."""
+    """Last sent value of each counter, keyed by the counter's name."""
     stale: list[tuple[str, int]]
     """Control and number of each tick that cannot be sent, because other frames used its counter
     values."""

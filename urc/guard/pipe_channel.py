@@ -5,8 +5,8 @@ has been silent for half a second, is replaced immediately; a silent guard is ki
 that waits for processor time is not replaced, because a new guard would also wait. A new guard has
 no state, so the client initialises it first.
 
-The first guard waits for its turn (`urc.guard.start_turns`), unless a stop must be sent. A guard
-that replaces another guard does not wait.
+The first guard of a channel waits for its turn (`urc.guard.start_turns`), unless a stop must be
+sent. A guard that replaces another guard does not wait.
 """
 
 import asyncio

@@ -81,7 +81,7 @@ class GuardAcceptor:
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the guard process; return it with either this end of the pipe or the acceptor."""
+    """Start the guard; return its process with either this end of the pipe or the acceptor."""
     return _heir() if is_inherited else _visitor()
 
 

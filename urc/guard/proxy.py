@@ -46,7 +46,7 @@ class _Sent:
     """Future of the caller that waits until the data is passed on; None if no caller waits."""
     counted: CountedFrame | None
     left: Callable[[Payload], None] | None
-    """Callback that receives the data handed to the transport, or None."""
+    """Callback that receives the data once the transport has it; None without a callback."""
 
 
 class GuardedTransport:
@@ -104,7 +104,7 @@ class GuardedTransport:
         return self._is_open
 
     async def ready(self) -> None:
-        """Wait for the guard, which may have to wait for its turn to start.
+        """Wait until the guard is ready; the guard itself may wait for its turn to start.
 
         Raises:
             ConnectFailed: no guard started in time.

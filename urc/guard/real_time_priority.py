@@ -1,11 +1,11 @@
 """Real-time priority of the guard process, where the system permits it.
 
-Real-time priority suits the guard, because the guard evaluates no part of a document and does only
-bounded work in each turn. The guard uses the lowest real-time priority (``SCHED_RR``, 1), which has
-precedence over ordinary programs but not over other real-time programs. Two limits prevent a faulty
-guard from blocking the machine. After `LONGEST_S` seconds of uninterrupted work, the guard runs at
-ordinary priority for `PAUSE_S` seconds. After `FATAL_S` seconds, the kernel kills the guard, and
-the server starts a new guard. Child threads and child processes run at ordinary priority.
+Real-time priority suits the guard, because the guard does only a bounded amount of work in each
+turn. The guard uses the lowest real-time priority (``SCHED_RR``, 1), which has precedence over
+ordinary programs but not over other real-time programs. Two limits prevent a faulty guard from
+blocking the machine. After `LONGEST_S` seconds of uninterrupted work, the guard runs at ordinary
+priority for `PAUSE_S` seconds. After `FATAL_S` seconds, the kernel kills the guard, and the server
+starts a new guard. Child threads and child processes run at ordinary priority.
 """
 
 import os
@@ -29,7 +29,7 @@ if sys.platform == "linux":
     import resource
 
     def _ask() -> str:
-        """Request real-time priority; return the reason for a refusal, or ""."""
+        """Request real-time priority; return the reason for a refusal, "" on success."""
         policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK
         try:
             os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
@@ -67,7 +67,7 @@ class RealTimePriority:
         """
 
     def request(self) -> str:
-        """Request real-time priority; return the reason for a refusal, or ""."""
+        """Request real-time priority; return the reason for a refusal, "" on success."""
         if os.environ.get(REAL_TIME, "").lower() == "no":
             return f"{REAL_TIME} is no"
         refusal = _ask()

@@ -61,7 +61,8 @@ class SendQueue(Generic[_Tag]):
         Args:
             sender: the transport.
             clock: the time source.
-            done: callback for each frame; the arguments are the frame's tag, and the error or None.
+            done: callback after each frame, with the frame's tag and the error; None without an
+                error.
             after: queue whose frames are sent before this queue's frames; None for no other queue.
         """
         self._sender = sender

@@ -18,7 +18,7 @@ class SentCounters:
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
-        """Last sent value of each counter, by name; unsent counters are missing."""
+        """Last sent value of each counter, keyed by name; unsent counters are missing."""
         self.is_changed = False
         """Whether some sent values have not been reported to the engine yet."""
 

@@ -1,4 +1,4 @@
-"""One hold-to-run control: its frames during motion and its stop.
+"""One hold-to-run control: which frames it sends during motion, and when it stops.
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
 while *ticks of sampled input* arrive. Each tick renews a short lease and replaces any unsent value.
@@ -8,7 +8,7 @@ rendered when the control is armed. After the stop and its repeats, nothing is s
 stop frames would override other sources of motion.
 
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
-are refused. The operator must release the control and press it again to rearm it.
+are refused. The operator arms the control again by releasing and pressing it.
 
 If the connection is lost while the robot may be moving, a stop is still due. This stop is the first
 frame sent on the restored connection. All other unsent values are dropped.
@@ -167,7 +167,7 @@ class HoldToRun:
         self._stop_until = now + STOP_FOR_S if is_repeated else now
 
     def due(self, now: float, *, is_clear: bool) -> Payload | None:
-        """Return the frame to write now, or None if no frame is due.
+        """Return the frame to write now; None if no frame is due.
 
         Args:
             now: the current time.

@@ -59,7 +59,7 @@ class LeaseState(NamedTuple):
     latched_by: str = ""
     """Name of the operator who pressed STOP; "" if no stop is latched."""
     stops: int = 0
-    """Number of stops since the server started. A request made before the last stop is invalid,
+    """Number of STOPs since the server started. A request made before the last STOP is invalid,
     even after a reset."""
 
 
@@ -116,7 +116,7 @@ class Lease:
 
         Args:
             client: the operator who issues the command.
-            stops: number of stops when the command was requested; None for a request made now.
+            stops: number of STOPs at the time of the request; None for a request made now.
         """
         state = self.state
         if not includes(client.role, "drive"):
@@ -131,7 +131,7 @@ class Lease:
 
     @property
     def latched(self) -> str:
-        """Message about the latched stop, or "" if no stop is latched."""
+        """Message about the latched stop; "" if no stop is latched."""
         by = self.state.latched_by
         return f"Stopped by {by}. Reset to drive again." if by else ""
 

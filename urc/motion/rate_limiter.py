@@ -23,7 +23,7 @@ class RateLimiter:
             raise ValueError(f"the period must be greater than 0 s, not {period_s:g}")
         self._period_s = period_s
         self._early_s = 0.0 if is_strict else period_s
-        """Maximum time by which a value may pass ahead of its nominal time, in seconds."""
+        """Maximum time by which a passing value may be ahead of its nominal time, in seconds."""
         self._due = float("-inf")
         """Nominal time of the next value."""
 

@@ -2,7 +2,7 @@
 
 Distances are measured from rest, the value at which the robot stands still. A change towards rest
 is applied immediately. A change away from rest is limited. A change that crosses rest reaches rest
-immediately, and only the part beyond rest is limited.
+immediately; only the change beyond rest is limited.
 """
 
 import math

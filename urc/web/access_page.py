@@ -33,7 +33,7 @@ from urc.web.words import t
 __all__ = ["AccessMiddleware"]
 
 SAID = "sign in, or open the address that URC printed when it started"
-"""Refusal message for programs and sockets; `words.js` translates it."""
+"""Refusal message for programs and sockets; `words.js` translates the message."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
 """Paths of the files that widget frames load, without the secret prefix."""
 _HEADERS = {"cache-control": "no-store"}

@@ -109,9 +109,9 @@ class DashboardOptions:
     allowed_hosts: Collection[str] = ()
     """Accepted host names in addition to addresses, ``localhost`` and the server's own names."""
     linger_s: float = LINGER_S
-    """How long a robot stays connected after its last client has left, in seconds."""
+    """Time for which a robot stays connected after its last client has left, in seconds."""
     data: Path | None = None
-    """Folder for the latches and the audit log; with None, neither is stored."""
+    """Folder for the latches and the audit log; None to store neither."""
     audit: AuditLog | None = None
     """The folder's audit log, already open; the application closes the log at its end. With None,
     the application opens the log."""
@@ -132,7 +132,7 @@ class DashboardOptions:
     sign_in: SignInOptions = field(default_factory=SignInOptions)
     """Options of the sign-in methods."""
     notifier: AlarmNotifier | None = None
-    """Receiver of all robots' new alarms; with None, no notifications are sent."""
+    """Receiver of all robots' new alarms, which sends notifications; None to send none."""
 
 
 _DEFAULT: Final = DashboardOptions()

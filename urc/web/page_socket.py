@@ -133,7 +133,7 @@ class BrowserClient:
         return None
 
     async def _read_early(self) -> str:
-        """Read while the session opens; return why to close the page, or "" if it disconnected.
+        """Read while the session opens; return why to close the page, "" if the page disconnected.
 
         STOP is handled immediately and cancels waiting requests about the lease, so that an earlier
         reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All other

@@ -19,7 +19,7 @@ def count_of(
     Args:
         robot: the robot's name in URLs.
         records: all alarms outside the normal state.
-        is_monitored: whether the robot stays connected to monitor its alarms.
+        is_monitored: whether the robot stays connected so that its alarms are monitored.
     """
     shown = [one for one in records if one.is_annunciated]
     worst = min((severity(one.condition, one.priority) for one in shown), default=None)

@@ -135,7 +135,7 @@ CALLS: Final[tuple[Call, ...]] = (
         "signals",
         f"{_ROBOT}/signals",
         WATCH,
-        "The latest values of signals. URC connects to the robot if necessary.",
+        "The latest values of signals. URC connects to the robot if no connection is open.",
         SignalValues,
         query=(_NAMES,),
         errors=_NO_ROBOT,

@@ -14,7 +14,7 @@ __all__ = ["field_texts"]
 
 
 def field_texts(message: type) -> Mapping[str, str]:
-    """Return the field docstrings of `message` and its base classes, by field name.
+    """Return the field docstrings of `message` and its base classes, keyed by field name.
 
     If the source code is not available, the result is empty.
     """
@@ -26,7 +26,7 @@ def field_texts(message: type) -> Mapping[str, str]:
 
 @cache
 def _texts_of_module(name: str) -> Mapping[str, Mapping[str, str]]:
-    """Return the field docstrings of each class in a module, by class name."""
+    """Return the field docstrings of each class in a module, keyed by class name."""
     try:
         source = inspect.getsource(sys.modules[name])
     except (OSError, TypeError):  # a module without a file

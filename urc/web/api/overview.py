@@ -26,7 +26,7 @@ def battery_signal(profile: Profile) -> str:
     """Return the name of the battery signal; "" if there is no such signal.
 
     If a battery widget shows a signal as its level, the function returns this signal's name.
-    Otherwise, it returns a usual name, such as ``battery``, of a numeric signal in percent or
+    Otherwise, the result is a usual name, such as ``battery``, of a numeric signal in percent or
     volts.
     """
     uses = [*profile.slots.values()]
@@ -62,7 +62,7 @@ def battery_of(service: RobotService, name: str) -> BatteryLevel | None:
 def active_alarms(name: str, service: RobotService) -> ActiveAlarms:
     """Return the number and the highest priority of a robot's annunciated alarms.
 
-    Alarms that have returned to normal count until they are acknowledged. Shelved and suppressed
+    An alarm that has returned to normal is counted until it is acknowledged. Shelved and suppressed
     alarms are not counted. The robot needs no open session.
 
     Args:

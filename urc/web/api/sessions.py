@@ -29,7 +29,7 @@ from urc.wire.client_messages import Drive, Release, Tick
 __all__ = ["IDLE_S", "MOST_SESSIONS", "ProgramSession", "ProgramSessions"]
 
 IDLE_S: Final = 10.0
-"""How long a session stays open after its last request, in seconds."""
+"""Time for which a session stays open after its last request, in seconds."""
 MOST_SESSIONS: Final = 8
 """Maximum number of one visitor's open sessions, counted across all robots."""
 _Followed = Callable[[Callable[[], None]], AbstractContextManager[None]]
@@ -179,7 +179,7 @@ class ProgramSessions:
         return session
 
     def find(self, secret: str, service: RobotService, who: Identity) -> ProgramSession:
-        """Return an open session and extend it by another `IDLE_S` seconds.
+        """Return an open session; the session now stays open for another `IDLE_S` seconds.
 
         Raises:
             ApiError: the session is not open, or it belongs to another visitor or robot.

@@ -33,6 +33,6 @@ def press_stop(name: str, service: RobotService, who: Operator, recorder: Server
 
 
 async def delivered_stop(service: RobotService) -> StopResult:
-    """Wait briefly until the robot has received a STOP; connect if necessary."""
+    """Wait a short time until the robot has received a STOP; connect if no session is open."""
     is_confirmed = await service.deliver_stop()
     return StopResult(service.controls.controller.lease.state.latched_by, is_confirmed)

@@ -95,7 +95,7 @@ class RobotSummary(ApiMessage, frozen=True):
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     emulated: bool
-    """Whether the robot is emulated or a playback."""
+    """Whether the robot is emulated, or is the playback of a recording."""
     role: Role
     """The visitor's role for this robot."""
     connected: bool = False
@@ -208,7 +208,7 @@ class SignalInfo(ApiMessage, frozen=True):
     states: dict[str, str]
     """Display text for each raw value, for enumerated signals."""
     limits: dict[str, float]
-    """Alarm limits by name: ``lolo``, ``low``, ``high``, ``hihi``."""
+    """Alarm limits, keyed by name: ``lolo``, ``low``, ``high``, ``hihi``."""
     stale_after_s: float
     """Age in seconds after which a value is stale; 0 if values never become stale."""
     axes: str

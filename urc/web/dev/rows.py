@@ -73,7 +73,7 @@ def note_row(note: LogEntry) -> TrafficRow:
 
 
 def fill(row: TrafficRow, envelope: Envelope) -> None:
-    """Fill a row with a message: its verb, address, other attributes and body."""
+    """Fill a row with the verb, the address, the other attributes and the body of a message."""
     named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
     told = [str(envelope.attributes[name]) for name in named]
     row.verb, row.address = envelope.verb, cut(" ".join(told))

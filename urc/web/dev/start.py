@@ -33,7 +33,7 @@ _NO_STORE = {"cache-control": "no-store"}
 
 @dataclass(frozen=True, slots=True)
 class PinnedRobot:
-    """One robot with its fixed settings."""
+    """One robot on the start page, with the fixed settings that the start page uses."""
 
     name: str
     title: str

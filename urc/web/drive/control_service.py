@@ -57,8 +57,8 @@ class ControlService:
         """Restore the latch from `file`.
 
         The controls are the held commands of `driver`. The store `file` preserves the latch across
-        restarts; with None, the latch is not stored. The `recorder` receives audit events; with
-        None, no events are recorded.
+        restarts; None means that the latch is not stored. The `recorder` receives audit events;
+        None means that no events are recorded.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -232,7 +232,7 @@ class ControlService:
         )
 
     def changes(self, operator: OperatorSession) -> list[str]:
-        """Return the page's pending messages and clear them."""
+        """Remove and return all pending messages for the page."""
         texts: list[str] = []
         # The lease message contains the page's role, on which its buttons depend.
         is_told = self.controller.can_move or self._has_roles
@@ -508,7 +508,7 @@ class ControlService:
 
 
 def _roles(driver: Driver) -> dict[str, Role]:
-    """Return the role required for each held command, by command name."""
+    """Return the role required for each held command, keyed by command name."""
     return {name: one.role for name, one in driver.commands.items() if one.hold is not None}
 
 

@@ -50,7 +50,7 @@ class OperatorSession:
         self.on_role: set[Callable[[], None]] = set()
         """Callbacks that are called after each change of the role in `client`."""
         self.notices: dict[str, str] = {}
-        """Newest notice about each control or lease request, by name."""
+        """Newest unsent notice about each control or lease request, keyed by name."""
         self.seen = -1
         """Number of the newest lease sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}

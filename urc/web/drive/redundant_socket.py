@@ -1,10 +1,10 @@
 """The redundant socket of a page, for links with packet loss.
 
-Layer 5. A lost packet delays all later data on its TCP connection by at least one round trip. If
-the retransmitted packet is lost too, the delay doubles and exceeds the duration of a lease. Packet
-losses rarely affect two connections at the same time. A page on a link with packet loss sends each
-message about held controls over both sockets and receives heartbeats over both. Each message has a
-number. Only the first copy takes effect.
+Layer 5. A lost packet delays all later data on the same TCP connection by at least one round trip.
+If the retransmitted packet is lost too, the delay doubles and exceeds the duration of a lease.
+Packet losses rarely affect two connections at the same time. A page on a link with packet loss
+sends each message about held controls over both sockets and receives heartbeats over both. Each
+message has a number. Only the first copy takes effect.
 
 A redundant socket has no rights without a page. The socket joins a page with a key that only this
 page has, and closes when the page closes.

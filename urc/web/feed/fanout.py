@@ -64,7 +64,7 @@ class Pacer:
     """A rate limiter that passes the first event of a burst immediately and later events steadily.
 
     The limiter tolerates jitter of one period, so it never delays a source that sends at exactly
-    the permitted rate. In any second, it passes at most one event more than permitted.
+    the permitted rate. In any second, the limiter passes at most one event more than permitted.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -110,7 +110,7 @@ class Fanout:
         self.cache = ImageCache(hub, self._clock)
 
     async def run(self) -> None:
-        """Flush until cancelled; a failed flush raises its exception here."""
+        """Flush until cancelled; raise the exception of a failed flush."""
         self._loop = asyncio.get_running_loop()  # cached, because each call costs a system call
         self._broken = self._loop.create_future()
         try:

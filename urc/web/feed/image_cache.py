@@ -38,7 +38,7 @@ class ImageSubscription:
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)
-    """Number of the last image sent to the client, by signal."""
+    """Number of the last image sent to the client, keyed by signal."""
     turn: int = 0
     """Round-robin position among the images; prevents a fast camera from blocking other cameras."""
 
@@ -63,7 +63,7 @@ class ImageCache:
         self._count = 0
 
     def next_image(self, subscription: ImageSubscription) -> EncodedImage | None:
-        """Return a new image for the client and mark it as sent; None if there is no new image."""
+        """Return a new image for the client and mark the image as sent; None if no image is new."""
         count = len(subscription.names)
         for step in range(count):
             name = subscription.names[(subscription.turn + step) % count]

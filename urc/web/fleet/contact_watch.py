@@ -35,7 +35,7 @@ class ContactWatch:
         Args:
             services: function that returns the robots' services, keyed by the robots' names in
                 URLs.
-            folder: the data folder; with None, nothing is stored.
+            folder: the data folder; None to store nothing.
             utc: function that returns the UTC time, in seconds since 1970.
         """
         self._services = services

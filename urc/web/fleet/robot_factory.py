@@ -57,9 +57,9 @@ class ResolvedSettings(NamedTuple):
     """The resolved settings of a robot."""
 
     values: dict[str, Value]
-    """Values of all usable settings, by setting name."""
+    """Values of all usable settings, keyed by setting name."""
     given: dict[str, Value]
-    """Values given when the server started, by setting name."""
+    """Values given when the server started, keyed by setting name."""
     destination: str
     """Hosts and ports of the robot's transports, to which secrets are tied."""
     withheld: frozenset[str]
@@ -83,8 +83,8 @@ class RobotFactory:
         self._there = self._roots()
         """Packages that were installed when the server started."""
         self._begun: dict[str, str] = {}
-        """First destination of each robot, by package or robot name. Settings given when the server
-        started are valid only for that destination."""
+        """First destination of each robot, keyed by package or robot name. Settings given when the
+        server started are valid only for that destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
         """Cached manifests, keyed by the digest and the state of the archive; pages often need all
         manifests."""
@@ -113,7 +113,7 @@ class RobotFactory:
         Args:
             name: the robot's name in URLs.
             profile: the robot's profile, without added interfaces.
-            kept: the robot's stored settings; with None, they are read from the file.
+            kept: the robot's stored settings; None to read them from the file.
         """
         chosen = self.settings_store(name).load() if kept is None else kept
         filled = self.resolved_settings(profile, chosen)
@@ -218,7 +218,7 @@ class RobotFactory:
         return found
 
     def installed_robots(self) -> dict[str, list[Lock]]:
-        """Return the versions of each installed package that contains a robot, by package name.
+        """Return the versions of each installed package with a robot, keyed by package name.
 
         Versions are in ascending order. If a robot package and a driver package have the same
         name, the result contains only the package in use.

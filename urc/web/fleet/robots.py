@@ -133,7 +133,7 @@ class SessionLike(MotionSession, Protocol):
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
-"""An image, or values by signal; None if the robot's state is unknown."""
+"""An image, or values keyed by signal; None if the robot's state is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,12 +219,11 @@ class RobotService:
             robot: the robot.
             linger_s: how long the session stays open after the last client has left, in seconds.
             clock: the clock.
-            latch: store that preserves a latched STOP across restarts; with None, the latch is not
-                stored.
-            recorder: receives the audit events; with None, no events are recorded.
+            latch: store that preserves a latched STOP across restarts; None to store no latch.
+            recorder: receives the audit events; None to record no events.
             start_lock: lock shared by all of a server's robots, so that sessions start one at a
                 time.
-            alarms: the robot's alarms; with None, the service creates alarms that are not stored.
+            alarms: the robot's alarms; None to create alarms that are not stored.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -317,7 +316,7 @@ class RobotService:
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
 
     async def deliver_stop(self) -> bool:
-        """Connect if necessary and wait briefly; return whether the robot received the stop."""
+        """Wait for at most `STOP_WITHIN_S` seconds; return whether the robot received the stop."""
         controller = self.controls.controller
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():

@@ -83,7 +83,7 @@ class FoxgloveClient:
         self._subscriptions: dict[int, tuple[Offer, int]] = {}
         """Robot and channel, by the client's subscription id."""
         self._ended: dict[int, None] = {}
-        """Subscriptions that ended with their channels; the client may still unsubscribe them."""
+        """Subscriptions that ended with their channels; the client may still unsubscribe."""
         self._running: set[asyncio.Task[None]] = set()
         self._allowance = TokenBucket(MESSAGES_PER_S, clock.now())
         self._group: asyncio.TaskGroup | None = None
@@ -210,7 +210,7 @@ class FoxgloveClient:
         self._count_all(faults)
 
     def _subscribed(self, subscription: int, channel: int) -> str:
-        """Start one subscription; return the error in the request, or ""."""
+        """Start one subscription; return the error in the request, "" on success."""
         if subscription in self._subscriptions:
             return f"the subscription {subscription} already exists"
         found = self._offers.channels.get(channel)
@@ -250,7 +250,7 @@ class FoxgloveClient:
             self._count(faults[0] + more)
 
     def _count(self, fault: str) -> None:
-        """Count an invalid message and report it."""
+        """Count an invalid message, and report the error to the client."""
         self.faults += 1
         if self.faults >= MOST_FAULTS:
             self._close(CLOSE_BAD_MESSAGES, f"{MOST_FAULTS} messages were invalid")

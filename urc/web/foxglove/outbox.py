@@ -35,7 +35,7 @@ class Outbox:
         self._texts: deque[bytes] = deque()
         self._answers: deque[tuple[bytes, bool]] = deque()
         self._statuses: dict[str, bytes] = {}
-        """Newest unsent status, by id."""
+        """Newest unsent status, keyed by the status's id."""
         self._warned: dict[str, str] = {}
         """Text of each robot's status, until the status is withdrawn."""
         self._ready: dict[str, RobotFeed] = {}

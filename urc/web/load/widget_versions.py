@@ -1,7 +1,7 @@
 """Support for several versions of one widget: each robot keeps its installed version.
 
-Layer 5. Pages load widgets by name. If two different widgets have the same name, the second widget
-is renamed.
+Layer 5. Pages identify widgets only by name. If two different widgets have the same name, the
+second widget is renamed.
 """
 
 import filecmp

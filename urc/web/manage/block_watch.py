@@ -55,7 +55,7 @@ class BlockWatch:
         self._own_interfaces = own_interfaces
         self._ask = ask
         self._disabled: dict[str, Robot] = {}
-        """Robots disabled by this watcher, by name."""
+        """Robots that this watcher has disabled, keyed by name."""
 
     async def run(self, changed: Callable[[], Awaitable[None]]) -> None:
         """Watch until cancelled.

@@ -63,9 +63,9 @@ class Manager:
             lambda: self.catalogue.refresh(force=True),
         )
         self._packages: dict[str, Lock] = {}
-        """Served version of each robot from an installed package, by robot name."""
+        """Served version of each robot from an installed package, keyed by robot name."""
         self._offered: dict[str, str] = {}
-        """Digest of each installed interface, by name."""
+        """Digest of each installed interface, keyed by name."""
         self._seen: object = None
         """State of the package store when the menu was last updated."""
         self._is_behind = False

@@ -47,7 +47,7 @@ KINDS = {
     "interfaces": ("interface",),
     "widgets": ("widget",),
 }
-"""Kinds of packages on each manager page, by page name."""
+"""Kinds of packages on each manager page, keyed by page name."""
 
 
 @dataclass(frozen=True, slots=True)

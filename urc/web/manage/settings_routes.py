@@ -180,7 +180,7 @@ class SettingsRoutes:
     def _filled_in(
         self, profile: Profile, before: StoredSettings, said: SettingsAsked
     ) -> tuple[StoredSettings, dict[str, str]]:
-        """Return the settings to store and the errors by field."""
+        """Return the settings to store, and the errors keyed by field."""
         texts, faults = _typed(profile, said)
         factory = self._manager.factory
         package = factory.package_of(profile)
@@ -267,7 +267,7 @@ def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
 
 
 def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the valid inputs and the errors for invalid inputs, each by field."""
+    """Return the valid inputs, and the errors of the invalid inputs, both keyed by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():

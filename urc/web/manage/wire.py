@@ -232,7 +232,7 @@ class StopResult(ManageMessage, frozen=True):
 
 
 class ControlState(ManageMessage, frozen=True):
-    """Holder of the lease and state of the STOP latch."""
+    """The holder of a robot's lease, and the state of its STOP latch."""
 
     holder: str
     """Name of the operator in control; "" if no operator is in control."""
@@ -284,7 +284,7 @@ class SettingsAsked(ManageMessage, frozen=True):
     """A robot's settings, as submitted by the page."""
 
     settings: _Settings = {}
-    """Entered text of each setting, by name; null leaves a secret unchanged."""
+    """Entered text of each setting, keyed by name; null leaves a secret unchanged."""
     version: _Short = ""
     interface: _Short = ""
     test: bool = True
@@ -316,7 +316,7 @@ class SettingsAnswer(ManageMessage, frozen=True):
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """One-line error for each invalid setting, by setting name."""
+    """One-line error for each invalid setting, keyed by setting name."""
     missing: tuple[str, ...] = ()
     """Titles of required settings without a value."""
     lines: tuple[ProbedTransport, ...] = ()

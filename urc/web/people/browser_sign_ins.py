@@ -42,7 +42,7 @@ answers_refusals: Final = answers_errors_with(403)
 """Decorator for handlers that admit or refuse a visitor."""
 
 HASHES: Final = 2
-"""Limit on concurrent passphrase hashes; each hash needs 64 MiB of memory."""
+"""Maximum number of passphrases hashed at the same time; each hash needs 64 MiB of memory."""
 MOST_WAITING: Final = 32
 """Maximum number of sign-in attempts that wait for their passphrase to be hashed."""
 _LONGEST_AGENT: Final = 200
@@ -143,7 +143,7 @@ class BrowserSignIns:
         *,
         ends_at: float | None = None,
     ) -> Identity:
-        """Open a sign-in for a person and store it in the browser.
+        """Open a sign-in for a person, and store its secret in the browser.
 
         Args:
             request: the request that proved the person's identity.

@@ -1,7 +1,7 @@
 """Requests from trusted proxies: the person in the proxy's header becomes the request's visitor.
 
-Layer 5. This is the outermost ASGI middleware. It removes proxy headers from all requests, so no
-other part of the server can see or trust a forged header.
+Layer 5. This is the outermost ASGI middleware. The middleware removes proxy headers from all
+requests, so the rest of the server never sees a forged header.
 
 Theory of operation. Each request contains a secret that proves that it comes from the proxy. A
 browser's first request opens a sign-in, whose secret never leaves this process. The middleware adds
@@ -132,7 +132,7 @@ class ProxyMiddleware:
             return secret
 
     def _known(self, browser: _Browser) -> str | None:
-        """Return the browser's sign-in secret; None if it ended or its person was renamed."""
+        """Return the browser's sign-in secret; None if it ended or the person was renamed."""
         secret = self._secrets.get(browser)
         who = self._sign_ins.control.identify(secret) if secret is not None else NOBODY
         if who == NOBODY or who.name.casefold() != browser.user:

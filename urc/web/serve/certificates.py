@@ -72,7 +72,7 @@ class LocalCertificate:
         self._renew_at = datetime.max.replace(tzinfo=UTC)
 
     def load(self) -> LoadedCertificate:
-        """Return the certificate; issue a new one if necessary.
+        """Return the certificate; issue a new certificate if the old one no longer suffices.
 
         Raises:
             AccessError: the files cannot be read or written.
@@ -188,7 +188,7 @@ class Certificates:
             await self.renew()
 
     async def renew(self) -> bool:
-        """Load the certificate again if necessary; return whether it was replaced."""
+        """Load the certificate again if it has changed; return whether it was replaced."""
         try:
             if not await asyncio.to_thread(self._source.has_changed):
                 return False

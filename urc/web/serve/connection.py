@@ -24,7 +24,7 @@ CONNECTIONS = 1024
 """Maximum number of open connections, including WebSockets. At the limit, a new connection closes
 the oldest idle connection from the address with the most idle connections."""
 RESERVE = 64
-"""Number of additional connections that accept only STOP; they are used while no connection is
+"""Number of additional connections that accept only STOP, used while no other connection is
 idle."""
 REQUEST_S = 5.0
 """Time limit for receiving a complete request with its body, in seconds. For the first request, the
@@ -57,11 +57,11 @@ class HttpConnection(H11Protocol):
     The request state has two keys for endless responses. The event ``closing`` is set when the
     server ends. The function ``abort`` closes the connection.
 
-    WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        class uses the constructor's arguments and the methods `handle_events`, `send_400_response`
-        and `shutdown`. It also uses the attributes `conn`, `connections`, `flow`, `loop` and
-        `transport`. The tests in tests/e2e/test_dashboard_server.py and tests/e2e/test_api.py fail
-        if one of these names changes.
+    WARNING: this class depends on asyncio's protocol methods and on private names of its base
+        class. The class uses the constructor's arguments and the methods `handle_events`,
+        `send_400_response` and `shutdown`. It also uses the attributes `conn`, `connections`,
+        `flow`, `loop` and `transport`. The tests in tests/e2e/test_dashboard_server.py and
+        tests/e2e/test_api.py fail if one of these names changes.
     """
 
     def __init__(

@@ -111,7 +111,7 @@ class Authority(NamedTuple):
 
 
 def parse_host(text: str) -> Authority | None:
-    """Return the host and port of a ``Host`` header, or None for an invalid header."""
+    """Return the host and port of a ``Host`` header; None for an invalid header."""
     match = _HOST.fullmatch(text)
     return _authority(match) if match else None
 

@@ -137,7 +137,7 @@ def stale_text() -> str:
 
 
 async def turn_away(scope: Scope, receive: Receive, send: Send, reason: str) -> None:
-    """Accept a socket and close it with the reason; pages can't read refused handshakes."""
+    """Accept a socket, then close it with the reason; pages cannot read a refused handshake."""
     await receive()
     # A viewer shows a status of its own protocol.
     subprotocol = chosen_subprotocol(scope.get("subprotocols", ()))

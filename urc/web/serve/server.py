@@ -159,7 +159,7 @@ def _renewed(certificates: Certificates | None, handshakes: Handshakes | None) -
 
 
 class _UvicornServer(uvicorn.Server):
-    """A uvicorn server that signals its end through an event instead of being polled."""
+    """A uvicorn server whose main loop waits for an event instead of polling for its end."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)

@@ -115,6 +115,6 @@ def _redirect(scope: Scope, names: frozenset[str]) -> ASGIApp:
 
 
 def _host(scope: Scope) -> Authority | None:
-    """Return the host of a request, or None for a missing, repeated or invalid header."""
+    """Return the host of a request; None for a missing, repeated or invalid Host header."""
     found = [value for name, value in scope["headers"] if name == b"host"]
     return parse_host(found[0].decode("latin-1")) if len(found) == 1 else None

@@ -70,15 +70,15 @@ class WidgetContext:
     options: Mapping[str, object]
     """Checked options. Every declared option has a key; None means that the option has no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Each input's signal, or each multiple input's list of signals, by input name. Unbound inputs
-    are omitted."""
+    """Each input's signal, or each multiple input's list of signals, keyed by input name. Unbound
+    inputs are omitted."""
     widget: str
     """The widget's name."""
     uid: str
     """Identifier that is unique on the page, for ``id`` and ``aria-labelledby``."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Readable name of each output's command, by output name. Unbound outputs are omitted, so that
-    a widget can omit their controls."""
+    """Readable name of each output's command, keyed by output name. Unbound outputs are omitted, so
+    that a widget can omit their controls."""
     hazardous: tuple[str, ...] = ()
     """Names of the outputs whose command must always be confirmed with a slide."""
 

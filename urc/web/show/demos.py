@@ -186,7 +186,7 @@ def _nth(given: Any, place: int) -> Any:
 def _images(
     widget: Widget, document: Document, state: str, shown: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the images among a state's values, by signal name."""
+    """Return the images among a state's values, keyed by signal name."""
     images = {}
     for name, value in (shown.get("values") or {}).items():
         try:

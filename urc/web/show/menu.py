@@ -124,8 +124,8 @@ def menu_page(
         robots: the robots in display order, keyed by their names in URLs.
         states: states of the robots, in the format of the API call ``/api/v1/robots``.
         ways: navigation links of this server.
-        drivers: installed package and version of each robot, by robot name.
-        broken: unusable robots, by name.
+        drivers: installed package and version of each robot, keyed by robot name.
+        broken: unusable robots, keyed by name.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()

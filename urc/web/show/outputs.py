@@ -79,7 +79,7 @@ def _moves(command: Command, given: OutputBinding) -> bool:
 
 
 def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[str, object]]:
-    """Return the arguments without a fixed value, by name."""
+    """Return the arguments without a fixed value, keyed by name."""
     found: dict[str, dict[str, object]] = {}
     for name, one in (command.arguments if command is not None else {}).items():
         if name not in given.fixed:

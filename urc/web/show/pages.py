@@ -108,7 +108,7 @@ class RobotPage:
     settings_url: str
     """URL of the robot's settings; "" if the settings are fixed."""
     hints: str
-    """The driver's hints for lost connections, by transport, as a JSON object."""
+    """The driver's hints for lost connections, keyed by transport, as a JSON object."""
     on_demand: str
     """Transports that only commands open, as a JSON list. The robot does not count as lost while
     these transports are closed."""

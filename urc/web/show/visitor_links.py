@@ -1,6 +1,6 @@
 """Navigation links that are visible only to some visitors.
 
-Layer 5. The access middleware sets the links for each request; ``nav.html.j2`` shows them.
+Layer 5. The access middleware sets the links for each request; ``nav.html.j2`` shows the links.
 """
 
 from contextvars import ContextVar

@@ -1,6 +1,7 @@
 """Warnings for every page of a server, shown at the top in red.
 
-Layer 5. The access middleware sets the warnings for each request; the base template shows them.
+Layer 5. The access middleware sets the warnings for each request; the base template shows the
+warnings.
 """
 
 from contextvars import ContextVar

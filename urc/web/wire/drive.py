@@ -54,7 +54,7 @@ _TICK_OF = b'{"t":"tick","command":"'
 
 
 def command_of(data: bytes) -> str:
-    """Return the command in a tick's first bytes; "" if they do not contain the command."""
+    """Return the command named in a tick's first bytes; "" if these bytes name no command."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 

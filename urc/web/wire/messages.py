@@ -29,9 +29,9 @@ Messages from the server to the page, listed by their tag ``t``::
 Images are sent as binary messages; see `urc.web.wire.picture`.
 
 Messages from the page to the server are ``ping``, ``run``, ``show``, ``agree``, ``prepare`` and
-``steer``. For the controls, they are ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases
-and stops may also use a redundant socket, which begins with the message ``spare`` and receives
-heartbeats.
+``steer``. The messages for the controls are ``drive``, ``tick``, ``release`` and ``stop``. Ticks,
+releases and stops may also use a redundant socket, which begins with the message ``spare`` and
+receives heartbeats.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
