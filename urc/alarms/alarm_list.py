@@ -227,7 +227,7 @@ class AlarmList:
     def acknowledge(
         self, raised: Mapping[str, int], actor: AlarmActor, now: float
     ) -> list[AlarmRecord]:
-        """Acknowledge alarms; return the newly acknowledged alarms.
+        """Acknowledge alarms; return the alarms that were unacknowledged before.
 
         Args:
             raised: the value of `raised` that the operator saw, keyed by signal. An alarm

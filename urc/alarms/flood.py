@@ -27,7 +27,7 @@ class FloodDetector:
         """Begin with no alarms; `group` is the number of the last burst before a restart."""
         self.is_flooded = False
         self.group = group
-        """Number of the current burst."""
+        """Number of the current burst; each new burst gets the next number."""
         self._times: deque[float] = deque(maxlen=FLOOD_BEGINS + 1)
         """Times of the newest alarms; a flood begins if the oldest is at most `FLOOD_S` old."""
 

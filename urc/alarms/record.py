@@ -37,7 +37,7 @@ _LONGEST_VALUE: Final = 100
 
 
 class AlarmRecord(NamedTuple):
-    """The alarm state of one signal."""
+    """The alarm of one signal: its condition, its times, and the operators' actions."""
 
     signal: str
     condition: str
@@ -127,7 +127,7 @@ def is_easing(before: str, after: str) -> bool:
 
 
 def text_of_value(value: Reading) -> str:
-    """Return a value as short text."""
+    """Return a signal's value as text for the alarm list; bytes become their size."""
     if isinstance(value, bytes):
         return f"{len(value)} bytes"
     if isinstance(value, bool):

@@ -70,7 +70,7 @@ class Channel(Protocol):
         """
 
     def drop(self, slot: str) -> None:
-        """Discard a slot's unsent message."""
+        """Discard the unsent message with this slot, if there is one."""
 
     async def ready(self) -> None:
         """Wait until a guard has been started and initialised."""

@@ -5,8 +5,8 @@ keeps a table of all held commands that were armed or stopped. Each entry stores
 and whether the robot may still be moving because of the command. A new guard is initialised from
 this table. The new guard receives the list of transports, and a pending stop for each command that
 may be moving the robot. The new guard also receives the terms of other armed commands. For each
-pending stop, the guard opens the connection and writes the stop first. Motion never resumes
-automatically.
+pending stop, the guard opens the connection and writes the stop first. After a restart of the
+guard, motion never resumes automatically.
 
 A command *may be moving* the robot from its first tick or stop request. This state ends when the
 guard reports that it has written the stop after the newest tick. The state begins again if the
@@ -36,7 +36,7 @@ _UNCOUNTED: Final = Count({}, {})
 
 
 class HeldSpec(NamedTuple):
-    """One held command of the robot."""
+    """One held command of the robot: its transport and its initial terms."""
 
     line: str
     terms: HoldTerms
@@ -116,7 +116,7 @@ class GuardClient:
     # -- held commands: `urc.runtime.motion_controller.MotionBackend`
 
     def arm(self, command: str, terms: HoldTerms) -> None:
-        """Accept ticks of `command` from now on.
+        """Arm `command`, so that the guard accepts its ticks from now on.
 
         Raises:
             UrcError: the terms contain no method to stop the motion.

@@ -3,9 +3,9 @@
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
 closes the transport. The engine requests the opening and closing of the connection. The guard sends
 received data to the engine within the engine's flow-control credit. If the connection is lost while
-the robot may be moving, the guard does not wait for the engine. The engine may be frozen or dead.
-The guard itself reopens the connection (a *rescue*) and writes the stop first. The guard then keeps
-the open connection for the engine's next attempt to connect.
+the robot may be moving, the guard does not wait for the engine. At this moment, the engine may be
+frozen or dead. The guard itself reopens the connection (a *rescue*) and writes the stop first. The
+guard then keeps the open connection for the engine's next attempt to connect.
 """
 
 import asyncio
@@ -57,8 +57,8 @@ _TIMES: Final = 4.0
 _LOG_IN_S: Final = 6.0
 _GROWTH: Final = 1.25
 _LONG_S: Final = 0.5
-"""Maximum timeout for connection attempts that cannot overlap, in seconds. The timeout grows with
-each attempt.
+"""Maximum timeout for connection attempts that cannot overlap, in seconds. The timeout of these
+attempts grows with each attempt, up to this maximum.
 """
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
@@ -245,7 +245,7 @@ class GuardedConnection:
     # -- one connection
 
     def _switch(self, work: Coroutine[Any, Any, None]) -> None:
-        """Replace the running task with `work`."""
+        """Cancel the running task, and run `work` in a new task."""
         self._task = asyncio.get_running_loop().create_task(self._after(self._task, work))
 
     async def _after(self, old: asyncio.Task[None] | None, work: Coroutine[Any, Any, None]) -> None:

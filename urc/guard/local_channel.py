@@ -53,7 +53,7 @@ class LocalChannel:
         """Return immediately."""
 
     def now(self) -> float:
-        """Return the clock's current time, in seconds."""
+        """Return the current time of the guard's clock, in seconds."""
         return self._clock.now()
 
     def _emit(self, message: messages.FromGuard) -> int:

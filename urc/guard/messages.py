@@ -2,7 +2,7 @@
 
 Each message is a MessagePack array that begins with the message type. `line` is a transport's name,
 and `control` is a held command's name. `turn` counts how many times the engine has opened the
-connection. Messages with an earlier `turn` are dropped.
+connection. The receiver drops messages with an earlier `turn`.
 """
 
 from collections.abc import Mapping
@@ -130,7 +130,7 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
 
 
 class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
-    """A control was released."""
+    """The operator released a control, so the guard must stop its motion."""
 
     control: str
 
@@ -193,7 +193,7 @@ class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):
 
 
 class SendRefused(msgspec.Struct, array_like=True, frozen=True, tag=25):
-    """A frame could not be sent."""
+    """A `SendBytes` frame could not be sent."""
 
     line: str
     turn: int
@@ -260,7 +260,7 @@ class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
     line: str
     turn: int
     number: int
-    """Number of the first unsent frame."""
+    """Number of the first frame that was not sent."""
     stand: dict[str, int]
 
 

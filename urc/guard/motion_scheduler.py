@@ -122,7 +122,7 @@ class MotionScheduler:
     # -- requests for a control
 
     def arm(self, control: str, terms: HoldTerms) -> None:
-        """Accept ticks of `control`."""
+        """Arm `control`: accept its ticks from now on."""
         self._hold_to_run(control, terms).arm()
 
     def tick(
@@ -226,7 +226,7 @@ class MotionScheduler:
         return lost
 
     def write_due(self) -> None:
-        """Write all due frames."""
+        """Write every frame that is due now, stops first."""
         if not self._is_open:
             return
         now = self._clock.now()
@@ -247,7 +247,7 @@ class MotionScheduler:
         self.tell_counted()
 
     def tell_counted(self) -> None:
-        """Report changed counters and obsolete ticks."""
+        """Report the counters and obsolete ticks that changed since the last report."""
         if self._sent_counters.is_changed:
             for control, hold_to_run in self._holds.items():
                 if hold_to_run.is_waiting and not self._sent_counters.fits(

@@ -1,4 +1,4 @@
-"""Starts and ends the guard process."""
+"""Functions that start the guard process, read its state and end the process."""
 
 import asyncio
 import hmac
@@ -39,7 +39,7 @@ class GuardAcceptor:
 
     @property
     def port(self) -> int:
-        """TCP port number of the acceptor."""
+        """Number of the local TCP port to which the guard connects."""
         return int(self._listener.getsockname()[1])
 
     async def admitted(self) -> socket.socket:

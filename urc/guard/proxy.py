@@ -107,7 +107,7 @@ class GuardedTransport:
         """Wait until the guard is ready; the guard itself may wait for its turn to start.
 
         Raises:
-            ConnectFailed: no guard started in time.
+            ConnectFailed: no guard was ready within the time limit.
         """
         try:
             async with asyncio.timeout(START_S):
@@ -192,7 +192,7 @@ class GuardedTransport:
         """Send a frame with counters; wait while the queue is full.
 
         Raises:
-            TransportError: the connection broke.
+            TransportError: the connection broke before the guard accepted the frame.
         """
         if not self._is_open:
             raise PeerClosed(self._ended)

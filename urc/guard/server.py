@@ -18,7 +18,7 @@ FINISH_S: Final = 2.0
 
 
 class GuardServer:
-    """The guarded transports of one robot.
+    """The guarded transports of one robot, with the handlers for the engine's messages.
 
     All handlers run on one event loop, and no handler waits.
     """
@@ -76,7 +76,7 @@ class GuardServer:
         self.add(said, transport)
 
     def add(self, said: messages.MakeTransport, transport: Transport) -> None:
-        """Add a guarded connection for a transport."""
+        """Add a transport, whose connection the engine can then open."""
         self._lines[said.line] = GuardedConnection(said, transport, self._emit, self._clock)
 
     def _send(self, said: messages.SendBytes) -> None:

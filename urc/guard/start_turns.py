@@ -24,7 +24,7 @@ class StartTurns:
     """The guards that are starting, and the guards waiting for their turn, oldest first."""
 
     def __init__(self, at_once: int) -> None:
-        """Begin with no guards.
+        """Create the turns before any guard starts.
 
         Args:
             at_once: maximum number of guards that start at the same time.
@@ -66,7 +66,7 @@ def start_turns() -> StartTurns:
     """Return the start turns of the running event loop.
 
     The number of turns is the number of processors minus one, but at least 1 and at most 4. The
-    remaining processor serves the driven robots.
+    remaining processor stays free for the robots that are being driven.
     """
     loop = asyncio.get_running_loop()
     return _turns.setdefault(loop, StartTurns(min(max(_processors() - 1, 1), _MOST)))

@@ -11,7 +11,8 @@ Motion never resumes automatically. Every stop except a release disarms the cont
 are refused. The operator arms the control again by releasing and pressing it.
 
 If the connection is lost while the robot may be moving, a stop is still due. This stop is the first
-frame sent on the restored connection. All other unsent values are dropped.
+frame sent on the restored connection. Values that were unsent when the connection was lost are
+dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -83,7 +84,7 @@ class HoldToRun:
         self.is_armed = False
         """Whether ticks are accepted."""
         self.reason: Reason | None = None
-        """Reason for the last stop."""
+        """Reason for the last stop, such as a release or an expired lease."""
         self.is_told = True
         """Whether the last stop was reported; set by the owner of the connection."""
         self.owes_stop = False
@@ -152,8 +153,8 @@ class HoldToRun:
     def stop(self, reason: Reason, now: float) -> None:
         """Stop the motion.
 
-        A release has no effect unless the control is moving the robot. Other stops always take
-        effect.
+        A release has no effect unless the control is moving the robot. All stops for other reasons
+        always take effect.
         """
         if reason == "released" and self.state != "moving":
             return  # nothing moves, and an idle control is silent

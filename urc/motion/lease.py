@@ -64,7 +64,7 @@ class LeaseState(NamedTuple):
 
 
 class LeaseChanged(NamedTuple):
-    """A change to the lease."""
+    """An accepted change to the lease, with the lease's new state."""
 
     state: LeaseState
     must_stop: bool
@@ -72,7 +72,7 @@ class LeaseChanged(NamedTuple):
 
 
 class LeaseRefused(NamedTuple):
-    """A refusal to change the lease."""
+    """The refusal of a requested change to the lease."""
 
     message: str
     """Reason to display, including the holder's name if the holder blocks the change."""

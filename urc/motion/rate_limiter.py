@@ -25,7 +25,7 @@ class RateLimiter:
         self._early_s = 0.0 if is_strict else period_s
         """Maximum time by which a passing value may be ahead of its nominal time, in seconds."""
         self._due = float("-inf")
-        """Nominal time of the next value."""
+        """Nominal time of the next value, at exactly the permitted rate, in seconds."""
 
     @property
     def free_at(self) -> float:

@@ -136,8 +136,8 @@ class BrowserClient:
         """Read while the session opens; return why to close the page, "" if the page disconnected.
 
         STOP is handled immediately and cancels waiting requests about the lease, so that an earlier
-        reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All other
-        messages wait for the session.
+        reset cannot undo the STOP. Ticks are dropped, because they would be outdated. All messages
+        except STOP and ticks wait until the session is open.
         """
         while len(self._early) < EARLY_MESSAGES:
             message = await self._line.receive()

@@ -1,1 +1,1 @@
-"""The HTTP API for alarms."""
+"""The HTTP API for alarms, and the notifications about new alarms."""

@@ -46,7 +46,7 @@ log = logging.getLogger(__name__)
 
 
 class NotifyFailed(UrcError):
-    """A failed call to the hook."""
+    """A call to the maintainer's hook failed."""
 
 
 class NotifyCount(NamedTuple):
@@ -92,7 +92,7 @@ class AlarmNotifier:
     ) -> None:
         """Queue the alarms that need a notification and return immediately.
 
-        Shelved and suppressed alarms are skipped.
+        Shelved and suppressed alarms cause no notification.
         """
         found = [
             _QueuedAlarm(robot, title, alarms.list.is_flooded, _alarm(one, alarms))

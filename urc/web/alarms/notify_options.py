@@ -38,7 +38,7 @@ class NotifyOptions:
     has_returned: bool = False
     """Whether to also send a notification when an alarm returns to normal."""
     timeout_s: float = 10.0
-    """Longest duration of one attempt, in seconds."""
+    """Maximum duration of one attempt to notify, in seconds."""
     tries: int = 3
 
     @property

@@ -1,8 +1,8 @@
 """HTTP API endpoints for alarms: list, history, acknowledge, shelve, unshelve.
 
-Layer 5. Reading requires the role ``watch``, and actions require ``drive``. No call connects to a
-robot. The response to an action waits until the change is stored, so an acknowledgement survives a
-server crash.
+Layer 5. Reading requires the role ``watch``, and actions require ``drive``. No call of this API
+opens a connection to a robot. The response to an action waits until the change is stored, so an
+acknowledgement survives a server crash.
 """
 
 import asyncio
@@ -82,7 +82,7 @@ class AlarmCalls:
         self._searching = asyncio.Semaphore(_SEARCHES)
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the endpoints, keyed by call name."""
+        """Return the alarm endpoints, keyed by the name of their API call."""
         return {
             "alarms_overview": self.overview,
             "alarms": self.alarms,

@@ -50,7 +50,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     known: bool
     """Whether the current value is known."""
     value: str
-    """Value at the last change, as text."""
+    """Value of the signal at the alarm's last change, as text."""
     unit: str
     cause: str
     """Probable cause of the alarm, from the robot's document."""
@@ -85,7 +85,7 @@ class AlarmCount(AlarmMessage, frozen=True):
     active: int
     """Number of active alarms, excluding shelved and suppressed alarms."""
     unacknowledged: int
-    """Number of unacknowledged alarms."""
+    """Number of annunciated alarms that are not acknowledged."""
     worst: str
     """Highest priority of the annunciated alarms; "" if there are no such alarms."""
     known: bool
@@ -117,7 +117,7 @@ class RobotAlarmList(AlarmMessage, frozen=True):
     """A robot's alarms outside the normal state, most urgent first."""
 
     time: float
-    """Current time on the server."""
+    """Current time of the server's clock, in seconds since 1970 (UTC)."""
     flood: bool
     """Whether more than 10 alarms were raised within 10 minutes."""
     count: AlarmCount
@@ -183,9 +183,9 @@ class UnshelveAsked(AlarmMessage, frozen=True):
 
 
 class AlarmAction(AlarmMessage, frozen=True):
-    """Result of an action on alarms."""
+    """Result of a request to acknowledge, shelve or unshelve alarms."""
 
     signals: tuple[str, ...]
-    """Names of the signals whose alarms changed."""
+    """Names of the signals whose alarms the request changed."""
     stored: bool
     """Whether the change is stored and survives a restart."""

@@ -388,7 +388,7 @@ CALLS: Final[tuple[Call, ...]] = (
         PackageList,
         query=(
             Query("kinds", "Kinds of packages, separated by commas."),
-            Query("words", "Words to search for."),
+            Query("words", "Words that each listed package must contain."),
         ),
     ),
     Call(

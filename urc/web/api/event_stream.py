@@ -79,7 +79,7 @@ class EventStream:
         """Number of connection state changes up to the last event with connection states."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send events until the stream ends."""
+        """Send events until the reader disconnects, its right ends or the session ends."""
         await send({"type": "http.response.start", "status": 200, "headers": _HEADERS})
         if scope["method"] == "HEAD":  # a HEAD response has no body
             await send({"type": "http.response.body", "body": b""})

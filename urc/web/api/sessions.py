@@ -1,9 +1,9 @@
 """Operator sessions of programs that drive over HTTP.
 
 Layer 5. A page has a socket, so the server notices immediately when the page disconnects. A program
-sends only separate requests. Its operator session therefore ends after `IDLE_S` seconds without a
-request, or when the program's right ends. Motion stops earlier, because the lease of a held command
-lasts at most one second.
+has no socket and sends only separate requests. Its operator session therefore ends after `IDLE_S`
+seconds without a request, or when the program's right ends. Motion stops earlier, because the lease
+of a held command lasts at most one second.
 """
 
 import secrets
@@ -36,7 +36,7 @@ _Followed = Callable[[Callable[[], None]], AbstractContextManager[None]]
 
 
 class ProgramSession:
-    """One program's session with one robot."""
+    """The session in which one program drives one robot."""
 
     def __init__(self, service: RobotService, live: LiveSession, peer: SocketPeer) -> None:
         """Add the program to the robot's operators.
@@ -52,7 +52,7 @@ class ProgramSession:
 
     @property
     def epoch(self) -> int:
-        """Number of the current lease."""
+        """Number of the current lease, which each motion request must repeat."""
         return self._lease.epoch
 
     @property

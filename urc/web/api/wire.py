@@ -49,7 +49,7 @@ class ApiMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ConnectionInfo(ApiMessage, frozen=True):
-    """One of a robot's connections."""
+    """The state of one of a robot's connections."""
 
     transport: str
     state: Literal["idle", "connecting", "live", "silent", "lost"]
@@ -72,7 +72,7 @@ class BatteryLevel(ApiMessage, frozen=True):
 
 
 class ActiveAlarms(ApiMessage, frozen=True):
-    """The current alarms of a robot."""
+    """Number and highest priority of a robot's current alarms."""
 
     count: int = 0
     """Number of annunciated alarms: all except normal, shelved and suppressed alarms."""
@@ -81,7 +81,7 @@ class ActiveAlarms(ApiMessage, frozen=True):
 
 
 class RobotSummary(ApiMessage, frozen=True):
-    """A robot as a list entry."""
+    """A robot in the list of robots."""
 
     name: str
     """The robot's name in URLs."""
@@ -298,7 +298,7 @@ class MotionNotice(ApiMessage, frozen=True):
     about: str
     """Name of the held command or request that the notice is about."""
     message: str
-    """Reason, as one line of text."""
+    """Reason for the notice, as one line of text."""
 
 
 class LeaseAnswer(ApiMessage, frozen=True):
@@ -309,7 +309,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
     name: str
     """Name of the program as shown to operators."""
     drives: bool
-    """Whether this session has the controls."""
+    """Whether this session holds the lease and may therefore drive the robot."""
     epoch: int
     """Number of the lease; motion requests must repeat it."""
     holder: str

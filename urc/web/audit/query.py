@@ -18,7 +18,7 @@ _HIGHEST = 2**62
 
 
 class BadQuery(UrcError):
-    """A query with an invalid value."""
+    """A parameter of the audit log query has an invalid value."""
 
 
 def query_of(given: Mapping[str, str], robots: frozenset[str] | None) -> AuditQuery:

@@ -45,7 +45,7 @@ class CommandTarget(Protocol):
 
 
 class CommandOutcome(NamedTuple):
-    """The outcome of a command."""
+    """The outcome of a command: the values of its reply, or the reason for its failure."""
 
     values: Mapping[str, Reading] = NOTHING
     """Values from the reply."""

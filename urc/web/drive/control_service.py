@@ -32,8 +32,8 @@ from urc.web.wire import drive as wire
 __all__ = ["BEAT_S", "ControlService", "OperatorSession"]
 
 BEAT_S = 0.05
-"""Interval between heartbeat numbers sent to the page in control, in seconds. The page's ticks echo
-the numbers."""
+"""Interval between heartbeat numbers sent to the page in control, in seconds. Each tick from the
+page contains the newest number that the page has received."""
 THINNED_S = 0.01
 """Minimum mean interval between a control's applied ticks, in seconds."""
 PATIENCE_S = 0.25
@@ -286,7 +286,7 @@ class ControlService:
         return "one more"
 
     def handle(self, operator: OperatorSession, said: wire.Driving) -> None:
-        """Handle a message from the page."""
+        """Handle a page's message about the controls."""
         self.recheck(operator)
         match said:
             case wire.Tick():

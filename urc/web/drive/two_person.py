@@ -99,7 +99,7 @@ class TwoPersonRule:
             token: single-use token from `prepare`; "" if the operator confirmed nothing.
 
         Raises:
-            CommandFailed: a confirmation is missing.
+            CommandFailed: a confirmation is missing, invalid or for other arguments.
         """
         yes = self._tokens.pop(token, None)
         asks = questions(known, arguments)

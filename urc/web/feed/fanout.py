@@ -1,9 +1,9 @@
 """Fan-out of one robot's readings to all its pages, at most once per display frame.
 
-Layer 5. Clients have no queues. A flush wakes every client. As soon as a client's socket is free,
-the client receives all values newer than its last frame. Each frame is encoded once for all clients
-with the same position. A slow client receives the newest values in one frame, without delaying
-other clients.
+Layer 5. No values are queued for a client. A flush wakes every client. As soon as a client's socket
+is free, the client receives all values newer than its last frame. Each frame is encoded once for
+all clients with the same position. A slow client receives the newest values in one frame, without
+delaying other clients.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ class FanoutPosition(NamedTuple):
 
 @dataclass(slots=True)
 class Place:
-    """One client's position in values and images."""
+    """One client's position: the newest values and images that the client has received."""
 
     known: FanoutPosition = field(default_factory=FanoutPosition)
     subscription: ImageSubscription = field(default_factory=ImageSubscription)
@@ -97,7 +97,7 @@ class Fanout:
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        """Hub revision at the last flush. Newer values wait for the next flush."""
+        """Hub revision at the last flush. Values with a higher revision wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
         """Hub revision for which `_updates` were encoded."""

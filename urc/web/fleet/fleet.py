@@ -32,7 +32,7 @@ class BrokenRobot(NamedTuple):
 
 
 class Fleet:
-    """All robots of a dashboard."""
+    """All robots that a dashboard serves, with one service for each robot."""
 
     def __init__(
         self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]

@@ -1,8 +1,8 @@
 """The dashboard's robots and the code that opens and closes their sessions.
 
 Layer 5. A robot's session opens when the first client connects and closes shortly after the last
-client disconnects. Reloading a page therefore keeps the robot connected. Leaving the last page
-disconnects the robot.
+client disconnects. Reloading a page therefore keeps the robot connected. When the last page is
+closed, the robot is disconnected.
 """
 
 import asyncio
@@ -144,7 +144,7 @@ class Robot:
     settings: Mapping[str, Value]
     """Current values of the settings, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Function that returns a context. The robot stays connected while the context is open.
+    """Function that returns a context, which keeps the robot connected while the context is open.
     Entering the context must not wait for a reply from the robot."""
     glimpse: Callable[[], Glimpse] | None = None
     """Function that returns a view of an emulated robot without connecting. None for a real
@@ -160,7 +160,7 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class LiveSession:
-    """An open session and its fan-out."""
+    """An open session of a robot, with the fan-out to the robot's pages."""
 
     session: SessionLike
     fanout: Fanout
@@ -264,7 +264,7 @@ class RobotService:
         return self._visitors >= CLIENTS
 
     def has_room_for(self, peer: SocketPeer) -> bool:
-        """Return whether `peer` may connect another client."""
+        """Return whether `peer` may open one more page or stream of the robot."""
         most = CLIENTS_OF_KNOWN if peer.is_known else CLIENTS_OF_UNKNOWN
         return not peer.who or self._operators[peer.who] < most
 
@@ -380,7 +380,7 @@ class RobotService:
             self.alarms.renew(self.robot.profile.driver, is_monitored=self._wants_monitoring)
 
     async def run(self) -> None:
-        """Supervise the session until cancelled."""
+        """Open and end the robot's sessions as they are needed, until cancelled."""
         self.alarms.start()
         try:
             await self._supervise()

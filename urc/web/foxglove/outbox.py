@@ -21,7 +21,7 @@ DROPPED_EVERY_S: Final = 10.0
 
 
 class Outbox:
-    """The unsent frames of one client."""
+    """The unsent frames of one Foxglove client, in sending order."""
 
     def __init__(self, wake: Callable[[], None], now: Callable[[], float]) -> None:
         """Start without frames.

@@ -2,7 +2,7 @@
 
 Layer 5. The unsent messages are limited to a few readings of each signal, the newest image and the
 newest state of each connection. If a client reads too slowly, older readings are dropped and
-counted. Other clients are not affected.
+counted. A slow client does not affect other clients.
 """
 
 from collections import deque

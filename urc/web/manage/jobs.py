@@ -139,7 +139,7 @@ class _ReportingSource:
 
 
 class Jobs:
-    """The jobs of one package store.
+    """Runs the installation jobs of one package store.
 
     Only one job runs at a time. The newest job stays visible on the pages after its end.
     """
@@ -188,7 +188,7 @@ class Jobs:
     async def agree(
         self, number: int, *, takes_risks: bool = False, unsigned: Iterable[str] = ()
     ) -> Job:
-        """Install the planned package.
+        """Install the planned package, which the user has approved.
 
         Args:
             number: number of the job.

@@ -180,7 +180,7 @@ class Manager:
             await self.changed()
 
     async def watch_blocks(self) -> None:
-        """Enforce the block lists until cancelled."""
+        """Stop and disable robots with blocked packages, until cancelled."""
         await self._block_watch.run(self._blocks_changed)
 
     async def _blocks_changed(self) -> None:

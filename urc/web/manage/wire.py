@@ -112,7 +112,7 @@ class JobNews(ManageMessage, frozen=True):
     """Packages without the required signature, such as ``widgets/dial``. The user must approve each
     package by name."""
     gained: tuple[str, ...] = ()
-    """Permissions that the update adds."""
+    """Permissions of the new version that the installed version does not have."""
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
     """Changes that the update makes to the frames sent to the robot."""
@@ -206,7 +206,7 @@ class ResultLine(ManageMessage, frozen=True):
 
 
 class RemovedPackages(ManageMessage, frozen=True):
-    """Packages affected by a removal."""
+    """Packages that a request removes, or would remove."""
 
     gone: tuple[str, ...]
     """Names and versions, such as ``drivers/puppet 1.0.0``."""
@@ -311,7 +311,7 @@ class ProbedTransport(ManageMessage, frozen=True):
 
 
 class SettingsAnswer(ManageMessage, frozen=True):
-    """Result of submitting settings."""
+    """Result of a request to test, store and apply settings."""
 
     is_saved: bool
     text: str

@@ -38,7 +38,7 @@ LINK_OVER = "this link is unknown or has expired"
 
 
 class AccountRoutes:
-    """The routes for accounts and guests."""
+    """The routes with which visitors manage their own accounts, and guests are admitted."""
 
     def __init__(self, sign_ins: BrowserSignIns, links: LinkMaker) -> None:
         """Create the routes.

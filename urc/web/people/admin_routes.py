@@ -59,7 +59,7 @@ _PLURALS: Final[dict[Kind, str]] = {
 
 
 class AdminRoutes:
-    """The routes for administrators."""
+    """The routes with which administrators manage identities, rights and sign-ins."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, links: LinkMaker) -> None:
         """Create the routes.

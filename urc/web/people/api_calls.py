@@ -81,7 +81,7 @@ PEOPLE_CALLS: Final = (
     ),
     _list("people", ADMINISTER, "All people.", told.PrincipalList),
     _list("devices", ADMINISTER, "All paired devices.", told.PrincipalList),
-    _list("tokens", ADMINISTER, "All programs with a token.", told.PrincipalList),
+    _list("tokens", ADMINISTER, "All programs that have a token.", told.PrincipalList),
     _list("guests", ADMINISTER, "All guests.", told.PrincipalList),
     _list("sign-ins", ADMINISTER, "All sign-ins, the most recently used first.", told.SignInList),
     _list("pairings/{id}", SIGNED_IN, "State of a pairing.", told.PairingState),

@@ -76,7 +76,7 @@ class BrowserSignIns:
 
     @property
     def control(self) -> AccessControl:
-        """The identities and rights."""
+        """The server's identities and rights."""
         return self.access.control
 
     @property

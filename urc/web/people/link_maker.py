@@ -28,7 +28,7 @@ _SCALE: Final = 8
 
 
 class LinkMaker:
-    """Creates links to one server."""
+    """Creates links with which other devices can reach one server."""
 
     def __init__(self, sign_ins: BrowserSignIns, pairings: Pairings, data: Path | None) -> None:
         """Create the maker.

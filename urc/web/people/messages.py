@@ -48,7 +48,7 @@ class PeopleMessage(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_
 
 
 class SignInRequest(PeopleMessage, frozen=True):
-    """Request to sign in a person."""
+    """Request to sign a person in with a name and a passphrase."""
 
     name: _Short
     passphrase: _Passphrase
@@ -143,7 +143,7 @@ class PairingCode(PeopleMessage, frozen=True):
 
 
 class PairingState(PeopleMessage, frozen=True):
-    """The state of a pairing."""
+    """The state of a pairing, as shown to the administrator who created its code."""
 
     state: Literal["waiting", "paired", "over"]
     name: str = ""
@@ -270,7 +270,7 @@ class GuestRequest(PeopleMessage, frozen=True):
     name: _Short
     robot: _Short
     hours: Annotated[float, msgspec.Meta(gt=0, le=720)] = 24
-    """Time until the access ends, in hours."""
+    """Time until the guests' access ends, in hours."""
 
 
 class SecretLink(PeopleMessage, frozen=True):

@@ -23,7 +23,7 @@ class PasskeyAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     response: dict[str, Any]
     """Credential in the JSON form of WebAuthn."""
     name: str = ""
-    """Name of a new passkey."""
+    """Name that the person gives to a new passkey."""
 
 
 class PasskeyChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,7 +40,7 @@ class PasskeyName(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PasskeyLine(msgspec.Struct, frozen=True):
-    """One passkey in a list."""
+    """One passkey in the list of a person's passkeys."""
 
     id: str
     name: str

@@ -1,6 +1,6 @@
 """All of a server's routes for people, devices, tokens and sign-ins.
 
-Layer 5. The module contains only wiring.
+Layer 5. The module only combines other modules of this package.
 """
 
 from collections.abc import Callable, Iterable, Mapping

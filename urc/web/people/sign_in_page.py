@@ -23,7 +23,7 @@ _REFUSED: Final = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class Stoppable(NamedTuple):
-    """A robot that can move."""
+    """One robot on the sign-in page, with the URL of its STOP."""
 
     name: str
     """The robot's name in URLs."""

@@ -32,7 +32,7 @@ class WaysIn:
     """The sign-in methods of one server."""
 
     def __init__(self, access: Access, recorder: ServerRecorder, options: SignInOptions) -> None:
-        """Create the sign-in methods.
+        """Create the sign-in methods that the options enable.
 
         Args:
             access: identities and rights.

@@ -52,7 +52,7 @@ class Access:
         key: str = "",
         instance: str = "",
     ) -> None:
-        """Set up access to one server.
+        """Create the access control for the requests to one server.
 
         Args:
             control: identities and rights; None creates a control with only the local user.
@@ -77,11 +77,11 @@ class Access:
         self.tags_of: Callable[[str], Collection[str]] = _untagged
         """Function that returns a robot's tags."""
         self.on_admit: Callable[[Identity, str, str], None] = _unrecorded
-        """Callback for each use of a start key or code. Its arguments are the new identity
-        (`NOBODY` for a wrong key), the network address and the browser."""
+        """Callback for each use of a start key or code. The callback's arguments are the new
+        identity (`NOBODY` for a wrong key), the network address and the browser."""
         self.on_bad_token: Callable[[str], None] = _unheard
-        """Callback for each request with an unknown, expired or revoked token. Its argument is the
-        network address."""
+        """Callback for each request with an unknown, expired or revoked token. The callback's
+        argument is the network address."""
         self.clock_check: Callable[[], str] = _right_clock
         """Function that returns a warning about a wrong clock; "" for a correct clock. It may
         block."""

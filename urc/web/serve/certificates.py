@@ -114,7 +114,7 @@ class GivenCertificate:
     """A certificate and a key from the operator's files."""
 
     def __init__(self, chain: Path, key: Path) -> None:
-        """Store the paths of the files.
+        """Create the source; only `load` reads the files.
 
         Args:
             chain: PEM file with the server's certificate, followed by intermediate certificates.

@@ -19,7 +19,7 @@ class RequestTurns:
     """The connections of one server with unread requests, oldest first."""
 
     def __init__(self, *, most: int = REQUESTS_AT_ONCE) -> None:
-        """Start with no connections.
+        """Start without any waiting connections.
 
         Args:
             most: maximum number of turns in one iteration of the event loop.

@@ -293,7 +293,7 @@ def reachable_urls(host: str, port: int, scheme: str = "http") -> tuple[str, ...
 
     For ``0.0.0.0`` and ``::``, the URLs contain the network addresses of this machine, or the
     loopback address if this machine has none. For any other host, the only URL contains `host`. The
-    function sends no packets.
+    function finds the addresses without sending packets.
 
     Args:
         host: the address or name on which the server listens.

@@ -69,7 +69,7 @@ class Card:
     """URL of the robot's page, or of its settings while a setting is missing; "" if there is no URL
     to open."""
     link_label: str
-    """Link name for screen readers."""
+    """Name of the card's link, for screen readers."""
     driver: str
     """Name and version of the driver's package, or the driver's file name."""
     interface: str
