@@ -1,7 +1,8 @@
 """One robot's alarms: a state machine for each signal with limits, as in ISA-18.2.
 
 Layer 3. Pure. The inputs are the alarm of each sample, suppressed conditions, lost values and
-operator actions, each with its time. The outputs are the records and the history events.
+operator actions, each with its time. The outputs are the alarm records and the events of the alarm
+history.
 
 An alarm leaves the list only when its value is normal and it is acknowledged, or when a new
 document no longer declares it. An alarm stays in the list if its value becomes unknown. A
@@ -53,7 +54,7 @@ class AlarmList:
     def __init__(
         self, limits: Mapping[str, AlarmLimits], records: Iterable[AlarmRecord] = ()
     ) -> None:
-        """Continue with the alarms from an earlier run.
+        """Create the list with the alarms that were stored before a restart.
 
         Args:
             limits: alarm limits, keyed by signal; `judge` accepts only these signals.
@@ -65,7 +66,7 @@ class AlarmList:
         }
         """Alarms outside the normal state, keyed by signal."""
         self.revision = 0
-        """Number of changes to the alarms and to the flood so far."""
+        """Number of changes to alarms and floods since the list was created."""
         self.changed: dict[str, int] = {}
         """Revision of the last change to each signal's alarm, including removed alarms."""
         self._limits = limits
@@ -88,21 +89,21 @@ class AlarmList:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next scheduled change; None if no change is scheduled."""
+        """Time at which `tick` next changes the list; None if no change is scheduled."""
         shelves = [one.shelved_until for one in self.records.values() if one.shelved_until]
         flood = self._flood.deadline
         more = [] if flood is None else [flood]
         return min((*shelves, *self._settling.values(), *more), default=None)
 
     def take_events(self) -> list[AlarmEvent]:
-        """Return and clear the events since the last call."""
+        """Remove and return the history events since the last call."""
         events, self._events = self._events, []
         return events
 
     # The robot
 
     def judge(self, signal: str, alarm: Alarm, value: Reading, now: float) -> None:
-        """Process a sample's alarm; an unavailable value does not end an alarm."""
+        """Update a signal's alarm from a sample; a sample without a value does not end an alarm."""
         if value is None:
             self.forget((signal,), now)
             return
@@ -187,7 +188,7 @@ class AlarmList:
                 self._record(self._put(record._replace(is_known=False)), "unknown", now)
 
     def suppress(self, suppressed: frozenset[tuple[str, str]], now: float) -> None:
-        """Set the pairs of signal and condition that are suppressed by design from now on.
+        """Set which conditions of which signals are suppressed by design from now on.
 
         An alarm with an unknown value stays unchanged until the next sample of its signal.
         """

@@ -24,7 +24,7 @@ class FloodDetector:
     """Detects the floods and bursts of one robot's alarms."""
 
     def __init__(self, group: int = 0) -> None:
-        """Begin with no alarms; `group` is the number of the last burst before a restart."""
+        """Start without alarms; `group` is the number of the last burst before the restart."""
         self.is_flooded = False
         self.group = group
         """Number of the current burst; each new burst gets the next number."""
@@ -45,7 +45,7 @@ class FloodDetector:
         return self._times[-FLOOD_ENDS] + FLOOD_S if self.is_flooded else None
 
     def tick(self, now: float) -> None:
-        """End a flood whose rate has fallen, or during which the clock was set back."""
+        """End a flood if the alarm rate has fallen, or if the clock has been set back since."""
         end = self.deadline
         if end is not None and not end - FLOOD_S <= now < end:
             self.is_flooded = False

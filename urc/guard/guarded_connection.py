@@ -120,7 +120,7 @@ class GuardedConnection:
         self._handed = asyncio.Event()
         self._is_rescuing = False
         self._waiting: TimerHandle | None = None
-        """Timer for the engine's timeout while the engine waits for a rescue; otherwise None."""
+        """Timer that ends the engine's wait for a rescue; None while the engine does not wait."""
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
@@ -131,7 +131,7 @@ class GuardedConnection:
         self._is_reading = False
         self._acked = 0
         self._counted = 0
-        """Number of the engine's newest sent frame with counters."""
+        """Number of the newest frame with counters that was sent for the engine."""
         self._round = 0
         """Number of `SendStale` messages sent on this connection, each a refusal of frames."""
 
@@ -205,7 +205,7 @@ class GuardedConnection:
             self._credited.set()
 
     def settle(self) -> None:
-        """Report the results of a message batch and watch liveness during motion."""
+        """Report the results of a batch of messages, and watch liveness while the robot moves."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))

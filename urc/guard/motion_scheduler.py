@@ -111,7 +111,7 @@ class MotionScheduler:
 
     @property
     def is_settled(self) -> bool:
-        """Whether all controls are idle, and the transport has all stops, including repeats."""
+        """Whether all controls are idle, and the transport has accepted all stops and repeats."""
         return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property

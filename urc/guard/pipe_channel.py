@@ -88,7 +88,7 @@ class PipeChannel:
     # -- messages
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message; drop it if no guard is running. See `urc.guard.channel.Channel`."""
+        """Send a message; drop the message if no guard runs. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
         elif is_urgent and self._turns is not None:

@@ -43,7 +43,7 @@ class Freshness:
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a new heartbeat; the caller must send it to the page immediately."""
+        """Return a new heartbeat's number, which the caller must send to the page immediately."""
         self._number += 1
         self._issued.append(now)
         return self._number

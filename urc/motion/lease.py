@@ -184,7 +184,7 @@ class Lease:
         return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
-        """Remove a client as holder or requester; return None for any other client."""
+        """Remove the holder or the requester of the lease; return None for any other client."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)

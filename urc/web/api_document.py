@@ -97,7 +97,7 @@ def _messages(annotations: Iterable[object], found: set[type[msgspec.Struct]]) -
 
 
 def _describe(schema: dict[str, Any], message: type[msgspec.Struct]) -> None:
-    """Add the docstrings of the fields to the schema of a message type."""
+    """Add the fields' docstrings, as descriptions, to the schema of a message type."""
     texts = field_texts(message)
     for field in msgspec.structs.fields(message):
         described = schema.get("properties", {}).get(field.encode_name)

@@ -351,7 +351,7 @@ class _Routes:
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot) -> None:
-        """Switch to another version of a robot; raise `UrcError` if widgets conflict."""
+        """Switch to another version of a robot; raise `UrcError` if widget names conflict."""
         latch = latch_of(self.data, robot)
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)

@@ -30,8 +30,8 @@ __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientS
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Maximum rate of ticks from held controls; a higher rate closes the socket. Below this rate, newer
-ticks replace excess ticks, and the socket stays open."""
+"""Maximum number of ticks per second from a page; a higher rate closes the socket. Below this rate,
+newer ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
 """First bytes of a page's tick; ticks that begin differently take longer to decode."""
 EARLY_MESSAGES = 100
@@ -389,6 +389,6 @@ def _decoded(message: Message) -> wire.Inbound | None:
 
 
 def _body(message: Message) -> str | bytes:
-    """Return the text or bytes of a received message."""
+    """Return the text or the bytes of a received WebSocket message."""
     body: str | bytes = message.get("text") or message.get("bytes") or ""
     return body

@@ -35,7 +35,7 @@ class Stores(NamedTuple):
 
 
 def fleet_of(robots: Mapping[str, Robot], stores: Stores, linger_s: float) -> Fleet:
-    """Return the fleet; each robot stays connected for `linger_s` after its last page closes."""
+    """Return the fleet; robots stay connected for `linger_s` after their last page closes."""
     start_lock = asyncio.Lock()
     return Fleet(
         robots,

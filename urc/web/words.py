@@ -51,7 +51,7 @@ LANGUAGES: Mapping[str, str] = {
     "fr": "Français",
     "it": "Italiano",
 }
-"""Native name of each language, by BCP 47 tag."""
+"""Native name of each language, keyed by BCP 47 tag."""
 MOST_WISHES = 20
 """Maximum number of entries read from an Accept-Language header."""
 

@@ -46,7 +46,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     priority: AlarmPriority
     state: AlarmState
     active: bool
-    """Whether the value is abnormal; for an unknown value, whether the last known value was."""
+    """Whether the value is abnormal; if unknown, whether the last known value was abnormal."""
     known: bool
     """Whether the current value is known."""
     value: str
@@ -61,7 +61,7 @@ class AlarmInfo(AlarmMessage, frozen=True):
     group: int
     """Number of the burst to which the alarm belongs."""
     raised: int
-    """Number assigned when the alarm was last raised; an acknowledgement must repeat it."""
+    """Number assigned when the alarm was last raised; an acknowledgement must repeat the number."""
     times: int
     """Number of activations since the alarm was last normal."""
     began_at: float
@@ -91,7 +91,7 @@ class AlarmCount(AlarmMessage, frozen=True):
     known: bool
     """Whether all annunciated alarms have known values."""
     monitored: bool
-    """Whether the robot stays connected to monitor its alarms."""
+    """Whether the robot stays connected so that its alarms are monitored."""
 
 
 class NotificationCount(AlarmMessage, frozen=True):

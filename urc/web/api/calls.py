@@ -97,7 +97,7 @@ class Call(NamedTuple):
     status: int = 200
     query: tuple[Query, ...] = ()
     errors: tuple[int, ...] = ()
-    """Failure statuses in addition to those that result from the right, path and body."""
+    """Failure statuses of this call only; others follow from its right, path and body."""
     media: tuple[str, ...] = (JSON,)
     """Media types of the response."""
     is_body_needed: bool = True

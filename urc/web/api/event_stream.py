@@ -57,7 +57,7 @@ class EventStream:
         Args:
             live: the open session.
             signals: names of the signals to send.
-            clock: clock for the ages of the readings.
+            clock: clock from which the ages of the readings are computed.
             may_read: function that returns whether the visitor may still read.
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.

@@ -258,7 +258,7 @@ class CommandAsked(ApiMessage, frozen=True):
     """A command with its arguments."""
 
     arguments: Arguments = {}
-    """Values by argument; an omitted argument takes its default."""
+    """Argument values, keyed by argument; an omitted argument takes its default."""
     timeout_s: Annotated[float, msgspec.Meta(ge=0.01, le=LONGEST_TIMEOUT_S)] | None = None
     """Longest wait for the reply, in seconds; null means 30, or 600 for a sequence."""
     confirmed: bool = False
@@ -311,7 +311,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
     drives: bool
     """Whether this session holds the lease and may therefore drive the robot."""
     epoch: int
-    """Number of the lease; motion requests must repeat it."""
+    """Number of the lease; motion requests must repeat the number."""
     holder: str
     """Name of the operator in control; "" if no operator is in control."""
     asker: str
@@ -329,7 +329,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
 
 
 class MotionAsked(ApiMessage, frozen=True):
-    """The newest input for a held command. A pause longer than the lease stops the robot."""
+    """The newest input for a held command. Without input for longer than the lease, the robot stops."""
 
     session: _Word
     """Session secret from the lease response."""
@@ -340,9 +340,9 @@ class MotionAsked(ApiMessage, frozen=True):
     number: _Count
     """Number of this input; each new input for the command needs a higher number than the last."""
     beat: _Count
-    """Newest received heartbeat number, at most 0.4 s old."""
+    """Number of the newest received heartbeat, which must be at most 0.4 s old."""
     arguments: Arguments = {}
-    """Values by argument; an omitted argument takes its default."""
+    """Argument values, keyed by argument; an omitted argument takes its default."""
     release: bool = False
     """Whether the control is released; a release stops the robot immediately."""
 
@@ -351,7 +351,7 @@ class MotionAnswer(ApiMessage, frozen=True):
     """State of the controls after an input."""
 
     epoch: int
-    """Number of the lease; motion requests must repeat it."""
+    """Number of the lease; motion requests must repeat the number."""
     beat: int | None
     """Newest heartbeat number, for the next motion request."""
     queued: bool

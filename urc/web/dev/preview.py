@@ -59,7 +59,7 @@ def preview(
         driver: the loaded driver.
         settings: value of every setting, with a placeholder for each secret.
         command: the command's name.
-        arguments: values for some arguments of the command; all others have their defaults.
+        arguments: values of some arguments; the command's other arguments have their defaults.
     """
     found = driver.commands.get(command)
     if found is None:

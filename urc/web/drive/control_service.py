@@ -78,7 +78,7 @@ class ControlService:
         self._expiring: Timer | None = None
         self.once = OneShotCommands(driver, lambda: self.controller, clock, self.recorder)
         self.watch = LoopWatchdog(clock, self._held_up)
-        """Watchdog for a blocked event loop, active while the robot is connected."""
+        """Detects a blocked event loop while the robot is connected."""
         self._heed(file)
 
     @property

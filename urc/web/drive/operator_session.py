@@ -35,7 +35,7 @@ class RedundantLine(Protocol):
 
 
 class OperatorSession:
-    """The state of one page of a robot."""
+    """The server's state for one page of a robot."""
 
     def __init__(
         self, client: Operator, wake: Callable[[], None], rights: PeerRights = _DRIVES

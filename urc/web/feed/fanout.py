@@ -34,9 +34,9 @@ class FanoutPosition(NamedTuple):
     revision: int = 0
     """Hub revision of the client's newest values."""
     links: int = 0
-    """Number of link state changes covered by the client's link states."""
+    """Number of link state changes up to the link states last sent to the client."""
     progress: int = 0
-    """Number of sequence progress changes covered by the client's sequence states."""
+    """Number of sequence progress changes up to the states last sent to the client."""
     notes: int = 0
     """Number of log lines sent to the client or dropped."""
     joined: int = 0
@@ -52,7 +52,7 @@ class Place:
 
 
 class _Update(NamedTuple):
-    """The update for all clients with the same `FanoutPosition`."""
+    """The encoded update for all clients with the same `FanoutPosition`."""
 
     after: FanoutPosition
     frames: bytes
@@ -79,7 +79,7 @@ class Pacer:
 
 
 class Fanout:
-    """The shared flush for all clients of an open session."""
+    """Distributes the new values of an open session to all clients in shared flushes."""
 
     def __init__(
         self,

@@ -155,7 +155,7 @@ class Robot:
     playback: Playback | None = None
     """The playback shown instead of a robot; None for a robot."""
     is_monitored: bool = False
-    """Whether the robot stays connected to monitor its alarms, even without open pages."""
+    """Whether the robot stays connected without open pages, so that its alarms are monitored."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,7 @@ class FoxgloveCalls:
         Args:
             run: function that runs a command.
             visitor: function that returns the visitor as an operator of a robot.
-            recorder: recorder of STOPs by visitors who have not signed in.
+            recorder: receives an audit entry for a STOP by a visitor who has not signed in.
         """
         self._run = run
         self._visitor = visitor
@@ -82,7 +82,7 @@ class FoxgloveCalls:
         press_stop(offer.name, offer.service, self._visitor(offer.name), self._recorder)
 
     async def delivered_stop(self, offer: Offer) -> bytes:
-        """Wait briefly for the robot to receive a STOP; return the result as JSON text."""
+        """Wait a short time until the robot receives a STOP; return the result as JSON text."""
         result = await delivered_stop(offer.service)
         return as_json({"latched": result.latched, "confirmed": result.confirmed})
 

@@ -81,7 +81,7 @@ class FoxgloveClient:
         self._outbox = Outbox(self._news.set, clock.now)
         self._outbox.announce([wire.encode_server_info("URC", __version__, session)])
         self._subscriptions: dict[int, tuple[Offer, int]] = {}
-        """Robot and channel, by the client's subscription id."""
+        """Robot and channel, keyed by the client's subscription id."""
         self._ended: dict[int, None] = {}
         """Subscriptions that ended with their channels; the client may still unsubscribe."""
         self._running: set[asyncio.Task[None]] = set()

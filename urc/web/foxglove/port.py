@@ -31,7 +31,7 @@ class FoxglovePort:
         """The open port; 0 before the server listens."""
 
     def opened(self, port: int) -> None:
-        """Store the port on which the server listens."""
+        """Store the TCP port on which the server really listens."""
         self.port = port
 
     def around(self, app: ASGIApp) -> ASGIApp:

@@ -56,12 +56,12 @@ class RobotFeed:
         return source in self._ids
 
     def subscribe(self, source: TopicSource, subscription: int, signal: Signal | None) -> None:
-        """Start collecting messages; the newest known value is the first message.
+        """Add a subscription; its first message contains the newest known value.
 
         Args:
             source: origin of the messages.
             subscription: the client's subscription id.
-            signal: the signal, if the source is a signal.
+            signal: the signal's declaration; None unless the source is a signal.
         """
         self._ids[source] = subscription
         if source.kind in ("signal", "place"):

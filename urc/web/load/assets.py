@@ -1,7 +1,8 @@
 """Tables of the files that pages may load; no request can reach a path outside these tables.
 
-Layer 5. The tables contain files from URC's own folders and from widget folders. A request only
-looks up its URL in a table. Changed files are read again, so edits are visible immediately.
+Layer 5. The tables contain files from URC's own folders and from widget folders. The URL of a
+request is only a key in a table, never a path. Changed files are read again, so edits are visible
+immediately.
 """
 
 import hashlib

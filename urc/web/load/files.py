@@ -35,7 +35,7 @@ MEDIA_TYPES = {
     ".ogg": "audio/ogg",
     **dict.fromkeys((".md", ".txt", ".csv"), "text/plain; charset=utf-8"),
 }
-"""Media types by file suffix; files with other suffixes are sent as plain bytes."""
+"""Media types, keyed by file suffix; files with other suffixes are sent as plain bytes."""
 
 TILE_TYPES = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 DEEPEST_ZOOM = 25

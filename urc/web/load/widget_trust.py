@@ -21,7 +21,7 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Names of URC's own widgets. Other folders next to these widgets are not trusted."""
+"""Names of URC's own widgets. Widgets in all other folders are not trusted."""
 
 
 @dataclass(frozen=True, slots=True)

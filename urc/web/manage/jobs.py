@@ -36,7 +36,7 @@ _WIRE_MOST: Final = 100
 """Maximum number of reported changes to the frames that are sent to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Maximum number of abandoned threads that are still waiting for a server."""
+"""Maximum number of cancelled jobs' threads that may still be waiting for a server."""
 
 
 Wanted = PackageRequirement | Path | FileSource | Lock
@@ -45,7 +45,7 @@ package to update."""
 
 
 class Busy(UrcError):
-    """Refusal of a job or change that is currently impossible."""
+    """A job or a change is refused, because it is currently impossible."""
 
 
 class _Planned(NamedTuple):
@@ -357,6 +357,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure as one line of text, limited to the first problem."""
+    """Return the first problem of a failure as one line of text."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

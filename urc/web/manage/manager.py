@@ -147,7 +147,7 @@ class Manager:
                 log.warning("%s: %s", name, error)
 
     async def apply_settings(self, name: str, robot: Robot, version: str) -> None:
-        """Switch a robot to new settings; raise `UrcError` if widgets conflict."""
+        """Switch a robot to new settings; raise `UrcError` if widget names conflict."""
         if name in self.fleet.robots:
             self._renew(name, robot)
         else:
@@ -242,7 +242,7 @@ class Manager:
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
         """Remove a package and its unneeded dependencies; return the names of the removed packages.
 
-        If `forgets` is true, the robot's settings are deleted as well.
+        If `forgets` is true, the settings of the package's robot are deleted as well.
 
         Raises:
             PackageError: the package is not installed.
@@ -405,7 +405,7 @@ class Manager:
         )
 
     def _block_of(self, lock: Lock) -> str:
-        """Return why a package is blocked; "" for other packages."""
+        """Return why a package is blocked; "" if the package is not blocked."""
         try:
             return "; ".join(self.factory.store.blocked(lock))
         except UrcError as error:

@@ -58,7 +58,7 @@ class ManagePage:
     nav: Nav
     title: str
     about: str
-    """A short description of the packages on the page."""
+    """A short explanation of the kind of package that the page lists."""
     kinds: str
     """Kinds of packages, separated by commas."""
     may_manage: bool
@@ -201,7 +201,7 @@ class ManageRoutes:
 
     @_api
     async def refresh(self, request: Request) -> Response:
-        """Start a refresh from the repositories; ``force`` ignores the age of the lists.
+        """Start a refresh from the repositories; ``force`` refreshes even recent lists.
 
         Any visitor may start a refresh, at most once per `FRESH_S` seconds.
         """

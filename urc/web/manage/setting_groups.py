@@ -37,7 +37,7 @@ _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
 
 
 def groups_of(profile: Profile) -> dict[str, list[Setting]]:
-    """Return the settings of a robot by group, `CONNECTION` first and `FURTHER` last.
+    """Return a robot's settings, keyed by group, `CONNECTION` first and `FURTHER` last.
 
     Settings without a declared group belong to `CONNECTION` if they are hosts or ports, are used by
     a transport, or must be filled in.
@@ -64,7 +64,7 @@ def groups_of(profile: Profile) -> dict[str, list[Setting]]:
 
 
 def failed_field(profile: Profile, transport: str, cause: Cause) -> str:
-    """Return the setting that most likely caused a failure; "" if there is no such setting.
+    """Return the setting that most likely caused a failed connection; "" if unknown.
 
     Args:
         profile: profile of the robot.
@@ -90,7 +90,7 @@ def _first_of(spec: TransportSpec, options: Sequence[str]) -> str:
 
 
 def _used(option: object) -> Iterator[str]:
-    """Yield the names of all settings in an option."""
+    """Yield the names of all settings that a transport option uses."""
     if isinstance(option, Template):
         yield from option.settings
     elif isinstance(option, Mapping):

@@ -27,8 +27,8 @@ _INPUTS: Final = {
     "number": ("text", "decimal"),
     "path": ("text", ""),
 }
-"""Field type and on-screen keyboard for each setting type. Numbers have text fields, because
-browsers drop invalid input from number fields."""
+"""Type and on-screen keyboard of the form field, keyed by the setting's type. Numbers have text
+fields, because browsers drop invalid input from number fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,5 +249,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value as text, as a user would enter it."""
+    """Return a setting's value as the text that a user would enter."""
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -55,7 +55,7 @@ class SettingsRoutes:
 
         Args:
             manager: the operations on packages and robots.
-            ways: the pages of this server, for the navigation links.
+            ways: the optional pages of this server, for the navigation links.
             recorder: receives an entry for each change.
         """
         self._manager = manager
@@ -68,7 +68,7 @@ class SettingsRoutes:
         return [ProtectedRoute("/robots/{name}/settings", self.page, WATCH)]
 
     def endpoints(self) -> dict[str, Endpoint]:
-        """Return the form's endpoint, keyed by call name."""
+        """Return the endpoint that stores the settings, keyed by the name of its API call."""
         return {"settings": self.save}
 
     async def page(self, request: Request) -> Response:

@@ -200,7 +200,7 @@ class PackageList(ManageMessage, frozen=True):
 
 
 class ResultLine(ManageMessage, frozen=True):
-    """Result of a request, as one line of text."""
+    """The result of a request, as one line of text for the user."""
 
     line: str
 
@@ -239,7 +239,7 @@ class ControlState(ManageMessage, frozen=True):
     latched: str
     """Name of the operator who pressed STOP; "" while STOP is not latched."""
     emulated: bool
-    """Whether the robot is emulated or a playback."""
+    """Whether the robot is emulated, or is the playback of a recording."""
 
 
 class PlaybackRequest(ManageMessage, frozen=True):
@@ -292,7 +292,7 @@ class SettingsAsked(ManageMessage, frozen=True):
     anyway: bool = False
     """Whether to save the settings even if the connection test fails."""
     monitors_alarms: bool | None = None
-    """Whether the robot stays connected to monitor its alarms; null for the server's default."""
+    """Whether the robot stays connected for its alarms; null for the server's default."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):

@@ -180,7 +180,7 @@ class AccountRoutes:
         return answer(ResultLine(t("the sign-in has ended")))
 
     def _own(self, who: Identity) -> set[str]:
-        """Return the ids of a person and their devices; for other visitors, only their own id."""
+        """Return the ids of a person and the person's devices; for other visitors, one id."""
         if not who.principal or not _is_person(who):
             return {who.principal}
         principals = self._control.directory.principals.values()

@@ -244,7 +244,7 @@ class AdminRoutes:
 
     @answers_changes
     async def end(self, request: Request) -> Response:
-        """End one sign-in; a device must be paired again afterwards."""
+        """End one sign-in; a device whose sign-in has ended must be paired again."""
         said = await body_of(request, SignInChoice)
         found = self._control.directory.sign_ins.get(said.id)
         if found is None:

@@ -146,11 +146,12 @@ class BrowserSignIns:
         """Open a sign-in for a person, and store its secret in the browser.
 
         Args:
-            request: the request that proved the person's identity.
+            request: the request in which the person proved their identity.
             response: response to which the cookie is added.
             person: the person.
             way: the sign-in method.
-            ends_at: UTC end time, in seconds since 1970; None for the usual end.
+            ends_at: UTC time at which the sign-in ends, in seconds since 1970; None for the usual
+                time.
 
         Raises:
             AccessError: the person was removed, or has no role.

@@ -49,7 +49,7 @@ class LinkMaker:
             request: the administrator's request.
             page: page that the link opens, such as ``join``.
             secret: the secret, which only the fragment contains.
-            ends_at: UTC end time, in seconds since 1970.
+            ends_at: UTC time at which the link expires, in seconds since 1970.
         """
         address = _public_address(request, self._data, self._sign_ins.access.instance)
         text = f"{address}/{page}#{secret}"
@@ -100,7 +100,7 @@ def _public_address(request: Request, data: Path | None, instance: str) -> str:
 
 
 def _is_reachable(address: str) -> bool:
-    """Return whether other devices can use an address."""
+    """Return whether other devices can reach the server at an address."""
     host = urlsplit(address).hostname or ""
     if host == "localhost" or host.endswith(".localhost"):
         return False

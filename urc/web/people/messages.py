@@ -55,7 +55,7 @@ class SignInRequest(PeopleMessage, frozen=True):
 
 
 class SignInResult(PeopleMessage, frozen=True):
-    """A browser's identity after a sign-in or a sign-out."""
+    """The identity that a browser has after a sign-in or a sign-out."""
 
     name: str
     """Name of the person or device; "" after a sign-out."""
@@ -202,7 +202,7 @@ class SignInInfo(PeopleMessage, frozen=True):
     created_at: float
     """Time of the sign-in, in seconds since 1970 (UTC)."""
     used_at: float
-    """Time of the last request, in seconds since 1970 (UTC)."""
+    """Time of the last request with this sign-in, in seconds since 1970 (UTC)."""
     ends_at: float | None
     """UTC end time without further use, in seconds since 1970; null if the sign-in never ends."""
     is_own: bool

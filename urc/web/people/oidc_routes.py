@@ -1,8 +1,8 @@
-"""Routes for signing in with an identity provider: to the provider's page and back.
+"""Routes for signing in with an identity provider: the redirect to the provider, and the return.
 
 Layer 5. A sign-in begins with a POST request from one of URC's pages. The provider redirects the
-browser to `CALLBACK`. The response to `CALLBACK` is a page, because browsers send strict cookies
-only after navigation from one of URC's pages.
+browser to `CALLBACK`. The response to `CALLBACK` is a page, because browsers send
+``SameSite=Strict`` cookies only after navigation from a page of URC.
 """
 
 import asyncio

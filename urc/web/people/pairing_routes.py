@@ -70,7 +70,7 @@ class PairingRoutes:
 
     @answers_refusals
     async def look(self, request: Request) -> Response:
-        """Return the rights granted by a code; the code stays valid."""
+        """Return the rights that a code grants; the code stays valid."""
         said = await body_of(request, CodeRequest)
         found = await self._invitation(request, said.code)
         directory = self._sign_ins.control.directory

@@ -35,7 +35,7 @@ OLD_COOKIES: Final = 8
 """Maximum number of cookies from earlier server starts in one browser. Above the limit, all such
 cookies are deleted."""
 COOKIE_S: Final = 400 * 24 * 3600
-"""Lifetime of sign-in cookies, in seconds; the server decides when a sign-in ends."""
+"""Lifetime of sign-in cookies, in seconds; the sign-in itself may end earlier."""
 CLOCK_S: Final = 60.0
 """Interval between checks of the clock, in seconds."""
 _Headers = Iterable[tuple[bytes, bytes]]
@@ -273,7 +273,7 @@ def _unheard(place: str) -> None:
 
 
 def _right_clock() -> str:
-    """Return "" because no clock check is configured."""
+    """Return "" for no warning, because no clock check is configured."""
     return ""
 
 

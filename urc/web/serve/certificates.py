@@ -37,7 +37,7 @@ class LoadedCertificate(NamedTuple):
     file: Path
     """PEM file that local programs use to verify the server."""
     name: str
-    """A host name or address from the certificate."""
+    """One host name or address for which the certificate is valid."""
     authority: bytes
     """The local authority's certificate in PEM format; b"" for a given certificate."""
     notes: tuple[str, ...] = ()

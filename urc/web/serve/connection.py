@@ -32,7 +32,7 @@ time starts when the connection opens; for later requests, with the first byte."
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
-    """Return a complete response with one line of plain text, which closes the connection."""
+    """Return a complete response with one line of plain text, for a connection that then closes."""
     body = text.encode() + b"\n"
     headers = [
         (b"content-type", b"text/plain; charset=utf-8"),
@@ -90,7 +90,7 @@ class HttpConnection(H11Protocol):
         """Time at which the connection opened, on the event loop's clock."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Store the transport and wait for a request."""
+        """Store the transport, and start the time limit for the first request."""
         super().connection_made(transport)
         self.made_s = self.loop.time()
         if len(self.connections) > self._most and not self._make_room():

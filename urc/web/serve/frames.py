@@ -27,7 +27,7 @@ class WebSocketFrames:
         self._is_between = True
         """Whether the next byte starts a new message."""
         self._left = 0
-        """Number of bytes still missing from the current frame."""
+        """Number of bytes of the current frame that have not arrived yet."""
         self._head = b""
         """Received bytes of an incomplete frame header."""
         self._is_inside = False
@@ -87,7 +87,7 @@ def _is_text(data: bytes, at: int) -> bool:
 
 
 def _size(data: bytes, at: int) -> int | None:
-    """Return the size of the frame at `at` with its header, in bytes; None if not yet known."""
+    """Return the size of the frame at `at` and its header, in bytes; None if not yet known."""
     if len(data) < at + _HEAD:
         return None
     size, head = data[at + 1] & 0x7F, _HEAD

@@ -119,7 +119,7 @@ def parse_host(text: str) -> Authority | None:
 def is_host_allowed(
     authority: Authority, names: frozenset[str], *, is_loopback: bool = False
 ) -> bool:
-    """Return whether the server accepts requests for a host.
+    """Return whether the server accepts requests to the host in `authority`.
 
     A foreign name server cannot use literal addresses or ``localhost`` for DNS rebinding. Any other
     name must be in `names`, because every device on the network can claim a name under ``.local``.

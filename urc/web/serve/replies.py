@@ -79,7 +79,7 @@ async def body_of(request: Request, kind: type[_T]) -> _T:
     """Return a request's JSON body, decoded as `kind`.
 
     Raises:
-        ApiError: the body does not have this type.
+        ApiError: the body is not JSON, or does not match the type `kind`.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip() != _JSON:
         raise ApiError(415, f"expected a body of type {_JSON}")

@@ -55,7 +55,7 @@ class Right(NamedTuple):
 
     @property
     def refusal(self) -> str:
-        """The message for visitors who lack the right."""
+        """The refusal message for visitors without the right."""
         if self.is_local:
             return t("This needs the start key: open the address that URC printed.")
         if self.scope == "server":

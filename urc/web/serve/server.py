@@ -321,7 +321,7 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
 
 
 async def _follow(server: _UvicornServer, running: "asyncio.Future[None]") -> None:
-    """Wait until the server ends; if cancelled, close the server gracefully."""
+    """Wait until the server has ended; on cancellation, close the server gracefully first."""
     try:
         await asyncio.shield(running)
     except asyncio.CancelledError:

@@ -22,7 +22,7 @@ HANDSHAKE_BYTES = 64 * 1024
 
 
 class TlsConnection(asyncio.Transport, asyncio.Protocol):
-    """A protocol for the TCP transport, and a transport for the upper protocol."""
+    """Acts as the protocol of the TCP transport, and as the transport of the upper protocol."""
 
     def __init__(
         self,

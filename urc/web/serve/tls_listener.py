@@ -58,7 +58,7 @@ class Handshakes:
         return len(self._open)
 
     def add(self, one: "FirstBytes") -> None:
-        """Set the time limit for a new connection; if there are too many connections, close one."""
+        """Set the time limit for a new connection; above the limit of connections, close one."""
         loop = asyncio.get_running_loop()
         self._open[one] = loop.call_later(self._limit_s, one.abort)
         if len(self._open) > self._most:

@@ -48,8 +48,8 @@ class Visitor:
         Args:
             rights: source of the current rights.
             identity: the proven identity; `NOBODY` for an unknown visitor.
-            is_program: whether the request contains a token, valid or not. Pages from other sites
-                cannot send such requests.
+            is_program: whether the request contains a token, even an invalid token. Pages from
+                other sites cannot send such requests.
         """
         self._rights = rights
         self.identity = identity

@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One slot of the grid, with its widget's markup."""
+    """One filled slot of an interface's grid, with the markup of its widget."""
 
     index: int
     """Number of the cell on the page, used in the grid's CSS rules."""
@@ -93,7 +93,7 @@ def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust
     """Render the markup of all third-party widgets on a page in one step, to save time.
 
     Args:
-        uses: for each cell, in cell order, the `WidgetUse` and the robot's profile.
+        uses: the widget and the robot's profile for each cell, in the order of the cells.
         trust: rule that identifies third-party widgets.
     """
     wanted = []

@@ -53,7 +53,7 @@ class FrameDocuments:
         self._place = place
 
     async def frame(self, request: Request) -> Response:
-        """Return the document for one widget; raise status 404 for an unknown name."""
+        """Return the frame document of a widget; raise status 404 for an unknown widget."""
         name, place = request.path_params["widget"], self._place
         if not self._has(name):
             raise HTTPException(404)

@@ -179,7 +179,7 @@ class DemoPage:
     stamp_url: str
     """URL that returns the newest `stamp`, for reloads after an edit; "" to disable reloading."""
     stamp: str
-    """Stamp of the widget files, computed before the files were read."""
+    """Value that identifies the version of the widget files, computed before reading the files."""
 
 
 class Gallery:
@@ -265,7 +265,7 @@ class Gallery:
         )
 
     async def stamp(self, request: Request) -> Response:
-        """Return a stamp that changes whenever a widget file is saved."""
+        """Return a value that changes whenever a widget file is saved."""
         if not self._is_dev:
             raise HTTPException(404)
         stamp = await asyncio.to_thread(self._stamp, self._names(request))

@@ -1,4 +1,4 @@
-"""Selection of a robot's interface and its pages.
+"""Selection of the interface, and of the interface's page, that a robot's page shows.
 
 Layer 5. Pure. Each robot also has a generated debug interface.
 """

@@ -246,7 +246,7 @@ def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[s
 
 
 def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
-    """Return the row and column sizes as CSS."""
+    """Return a grid's row sizes and column sizes as CSS values."""
     row = _LOW_ROW if screen == SHORT else _USED_ROW
     column, empty_row, empty_column = _USED_COLUMN, _MARGIN, _MARGIN
     if canvas.background:

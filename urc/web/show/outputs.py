@@ -131,7 +131,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 
 
 def opens_on_demand(transport: str, driver: Driver) -> bool:
-    """Return whether the transport is opened only by commands.
+    """Return whether only commands open the transport.
 
     The loss of such a transport disables no controls, because the next command reopens the
     transport.

@@ -74,7 +74,7 @@ class RobotPage:
     head: PageHead
     title: str
     url: str
-    """Path of the page, for returning from the sign-in page."""
+    """Path of the page, to which the browser returns after a sign-in."""
     socket: str
     """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]

@@ -130,7 +130,7 @@ class TrustPage:
 
     head: PageHead
     fingerprint: tuple[str, ...]
-    """Fingerprint of the certificate to trust, in groups of digits; empty for plain HTTP."""
+    """Fingerprint of the certificate to trust, in groups of hex digits; empty for plain HTTP."""
     has_authority: bool
     """Whether the server has a local authority for devices to trust."""
     certificate_url: str

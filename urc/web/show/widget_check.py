@@ -127,7 +127,7 @@ class _TemplateCheck:
         return sorted(dict.fromkeys(found), key=lambda one: (one.line, one.column))
 
     def fault(self, error: Exception, where: str) -> Problem:
-        """Return a rendering exception as a problem with its line."""
+        """Convert an exception from rendering to a problem with the line in the template."""
         text = str(error).partition("\n")[0] or type(error).__name__
         return self._problem("bad-template", f"{text}{where}", fault_line(error))
 

@@ -149,7 +149,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Indexes of signal names, with a cache of the last look-up."""
+    """Converts signal names to indexes, and caches the result of the last conversion."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
@@ -157,7 +157,7 @@ class Indexes:
         self._found = msgspec.Raw(b"[]")
 
     def keyed(self, numbers: Mapping[str, int]) -> dict[int, int]:
-        """Return the mapping with indexes in place of signal names."""
+        """Return the mapping with each signal name replaced by its index."""
         return {self._index[name]: number for name, number in numbers.items()}
 
     def of(self, names: tuple[str, ...]) -> msgspec.Raw:

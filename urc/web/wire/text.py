@@ -35,7 +35,7 @@ def encoded_bytes(message: msgspec.Struct) -> bytes:
 
 
 def repaired(tree: object) -> object:
-    """Return a tree of values with each lone surrogate replaced by a question mark."""
+    """Return nested values in which a question mark replaces each lone surrogate."""
     if isinstance(tree, str):
         return tree.encode("utf-8", "replace").decode()
     if isinstance(tree, (list, tuple)):
