@@ -329,7 +329,7 @@ class LeaseAnswer(ApiMessage, frozen=True):
 
 
 class MotionAsked(ApiMessage, frozen=True):
-    """The newest input for a held command. Without input for longer than the lease, the robot stops."""
+    """The newest input for a held command. A pause longer than the lease stops the robot."""
 
     session: _Word
     """Session secret from the lease response."""

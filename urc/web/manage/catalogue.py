@@ -55,7 +55,7 @@ class PackageCatalog:
         return Repositories(self._folder, complain)
 
     def refresh(self, *, force: bool = False) -> None:
-        """Start a refresh from all repositories, unless the last began within `FRESH_S` seconds."""
+        """Start a refresh from all repositories, unless the last ended less than `FRESH_S` ago."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
         if self.is_asking or (is_fresh and not force):
             return

@@ -354,7 +354,7 @@ def _has_neighbour(slot: Slot, grid: Layout) -> bool:
 
 
 def _drops(slot: Slot, grid: Layout, canvas: _Canvas) -> bool:
-    """Return whether a slot extends down by STOP's height, because it is in or above a corner."""
+    """Return whether a slot is lowered next to STOP, because it is in or above a corner."""
     if _is_corner(slot, grid, canvas):
         return True
     if not canvas.background or _down(slot, grid) != "end":
