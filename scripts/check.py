@@ -33,7 +33,7 @@ BUILT_SITE = "URC_BUILT_SITE"
 """Environment variable with the folder of the built site; without it, the tests build the site."""
 PROCESSORS = os.cpu_count() or 1
 HANGS_AFTER_S = 3600
-"""Timeout for a step, in seconds. A busy machine takes several times as long as an idle machine."""
+"""Timeout for a step, in seconds, with a wide margin for slow computers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Step:
     command: tuple[str, ...]
     timeout_s: float = HANGS_AFTER_S
     is_yielding: bool = False
-    """Whether the step has a low priority, because it must not delay steps that measure times."""
+    """Whether the step runs at low priority, so that it does not delay steps that measure times."""
     is_measuring: bool = False
     """Whether the step measures times; if so, its session has priority over all other sessions."""
 
@@ -58,7 +58,7 @@ class Outcome:
     """Reason for the failure; "" if the step passed."""
     seconds: float
     failed_tests: tuple[str, ...] = ()
-    """pytest's line for each failed test, with the test's name and error."""
+    """pytest's summary line for each failed test, which contains the test's name and error."""
 
 
 STATIC = (
@@ -107,7 +107,7 @@ SLOW = (
     # These tests measure the time until a robot stops, and the rig has one set of addresses.
     (Step("tests motion", (*PYTEST, "tests/e2e", "-m", "alone"), is_measuring=True),),
 )
-"""Sequences of steps; the sequences run in parallel."""
+"""Sequences of steps; the sequences run in parallel, the steps of a sequence one after another."""
 
 
 def main() -> int:
@@ -141,7 +141,7 @@ def main() -> int:
 
 
 def javascript_step() -> tuple[Step | None, str]:
-    """Return the step that checks the types in URC's JavaScript, or None and the reason."""
+    """Return the step that type-checks URC's JavaScript, or None and why it can't run."""
     node = node_executable()
     if node is None:
         return None, "JavaScript type check: Node is missing"
@@ -243,7 +243,7 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes]) ->
 
 
 def _set_priority(process: int, step: Step) -> None:
-    """Set the priority of a process that has its own session, where the system allows it."""
+    """Set the priority of a step's process and session, as far as the system permits."""
     if step.is_yielding:
         with suppress(AttributeError, OSError):
             os.setpriority(os.PRIO_PROCESS, process, 10)

@@ -4,8 +4,8 @@
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
 
 The old commit's code reads the old commit's documents. This tree's code reads the same documents
-after their migration. Later changes to a document, such as new comments, therefore have no effect.
-The script compares:
+after their migration. Changes made to a document after the old commit, such as new comments, are
+therefore ignored. The script compares:
 
 - reports: file, line, column, severity and code of every problem in the broken documents. A renamed
   key shifts the columns after it, but not the lines;
@@ -109,7 +109,7 @@ def main() -> int:
 
 
 def unpack(commit: str, folder: Path) -> None:
-    """Write the needed files from a commit into a folder."""
+    """Write a commit's code and documents into a folder."""
     packed = subprocess.run(
         ["git", "archive", commit, *CODE, *DOCUMENTS, "pyproject.toml"],
         cwd=ROOT,
@@ -139,7 +139,7 @@ def without_title(text: str) -> str:
 
 
 class Comparison:
-    """The number of differences between an old tree and this tree."""
+    """Compares an old tree with this tree, and counts the differences of each kind."""
 
     def __init__(self, old: Path, tell: Callable[[str], None] | None) -> None:
         self.old = old
@@ -209,7 +209,7 @@ class Comparison:
         return self._migrated[file]
 
     def moved(self, problem: Problem) -> Problem:
-        """Return a problem from the old tree, with its expected new column and code.
+        """Return a problem of the old tree as expected in this tree: with its new column and code.
 
         Renames never change lines.
         """

@@ -32,7 +32,8 @@ def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
 
     Args:
         source: an empty folder.
-        release: the release's folder with wheel, manual page, completions and notices.
+        release: folder of the release, which contains the wheel, manual page, completions and
+            notices.
         wheels: folder with the wheels of all packages that URC needs.
         epoch: release time, in seconds since the epoch.
     """
@@ -58,7 +59,7 @@ def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
 
 
 def packaged_service() -> str:
-    """Return the systemd unit with the package's path, without the manual installation steps."""
+    """Return the systemd unit for the packaged `urc`, without the manual installation steps."""
     text = SERVICE.read_text("utf-8")
     text = re.sub(r"(?m)^ExecStart=\S+", f"ExecStart={IN_PACKAGE}", text)
     return text[text.index("[Unit]") :]
@@ -72,7 +73,7 @@ def build_package(release: Path, wheels: Path, epoch: int) -> Path:
     """
     if shutil.which("dpkg-buildpackage") is None or shutil.which("dh") is None:
         raise SystemExit(
-            "release: building the Debian package needs two programs;"
+            "release: building the Debian package needs debhelper and dpkg-dev;"
             " run 'apt-get install debhelper dpkg-dev'"
         )
     with TemporaryDirectory(prefix="urc-debian-") as folder:

@@ -22,22 +22,22 @@ The wheel contains the same lists with hashes, as [CycloneDX](https://cyclonedx.
 The path in the wheel is `urc-*.dist-info/sboms/urc.cdx.json` ([PEP 770](https://peps.python.org/pep-0770/)).
 
 URC itself is under the MIT licence; see [LICENSE](../LICENSE). \
-The shipped robots, widgets, templates and schemas are parts of URC.
+The licence also covers the shipped robots, widgets, templates and schemas.
 """
 _MODULES = "The wheel contains files of these packages in `urc_vendor/`, with their licence texts."
 _PACKAGES = """\
-The wheel does not contain these packages. \
-An installation of URC needs them; `./dev demo` installs exactly these versions. \
+The wheel does not contain the packages in this table. \
+An installation of URC needs these packages; `./dev demo` installs exactly the listed versions. \
 Packages marked with “extra” are needed only for cameras and laser scanners of emulated robots.
 """
 _PLAYGROUND = """\
 The site's playground contains these packages in addition to the browser modules above. \
-Its folder `playground/licences/` contains their licence texts and notices.
+The playground's folder `playground/licences/` contains the packages' licence texts and notices.
 """
 
 
 def page() -> str:
-    """Return the page's text."""
+    """Return the text of docs/licences.md."""
     modules = hatch_sbom.npm_packages(ROOT, sorted(hatch_build.VENDORED))
     packages = hatch_sbom.python_packages(ROOT)
     parts = [
@@ -69,14 +69,14 @@ def _named(one: hatch_sbom.LockedPackage) -> str:
 
 
 def _version(one: hatch_sbom.LockedPackage) -> str:
-    """Return the version, with its range of Python versions if the lock has several versions."""
+    """Return a package's version; add the Python versions if the lock file has several versions."""
     if not one.marker.startswith("python_full_version") or " and " in one.marker:
         return one.version
     return f"{one.version} (Python {one.marker.removeprefix('python_full_version ')})"
 
 
 def main(arguments: list[str]) -> int:
-    """Write or check the page; return the exit code."""
+    """Write docs/licences.md, or check it with `--check`; return the exit code."""
     if "--check" in arguments:
         is_new = PAGE.is_file() and PAGE.read_text("utf-8") == page()
         if not is_new:

@@ -1,4 +1,4 @@
-"""Lock the dependencies of `./dev` with hashes, for all systems.
+"""Lock the dependencies of `./dev`, with hashes, for all operating systems and Python versions.
 
     python -m scripts.lock            keep the locked versions; add and remove dependencies
     python -m scripts.lock --upgrade  lock the newest versions
@@ -23,13 +23,13 @@ LOCKS: dict[str, tuple[str, ...]] = {
     "dev": ("pyproject.toml", "--group", "build", "--group", "dev"),
     "node": ("--group", "node"),
 }
-"""Arguments for each lock file.
+"""Arguments for `uv pip compile`, by lock file.
 
 `demo` and `build` are for `./dev demo`, `dev` is for `./dev test`, and `node` is for machines
 without npm.
 """
 SYSTEMS = "platform_python_implementation == 'CPython' and sys_platform != 'emscripten'"
-"""The environments of ``[tool.uv]`` in pyproject.toml."""
+"""Marker of the environments to lock, the same as in ``[tool.uv]`` of pyproject.toml."""
 _HEADER = """\
 # Made by `python -m scripts.lock` from pyproject.toml: exact versions with hashes.
 """

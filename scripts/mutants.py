@@ -31,7 +31,7 @@ _STATUS = {
 """Status of a mutant, by mutmut's exit code; other exit codes mean `odd`."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
-"""Statuses of detected mutants, for which a test failed or timed out."""
+"""Statuses of detected mutants: at least one test failed or timed out."""
 _COMMENT = re.compile(r"  # .*")
 Change = tuple[str, str]
 """The removed and inserted code of a mutant."""
@@ -119,7 +119,7 @@ class Explained(NamedTuple):
 
 
 def explained_in(path: Path) -> Explained:
-    """Read the file of explanations.
+    """Read the explanations for harmless mutants from a TOML file.
 
     Raises:
         KeyError, TypeError, ValueError: an entry is invalid.
@@ -135,7 +135,7 @@ def explained_in(path: Path) -> Explained:
 
 
 def mutants_in(copy: Path, settings: Settings) -> list[Mutant]:
-    """Return all generated mutants."""
+    """Return all mutants that mutmut has generated in `copy`, with their statuses."""
     folder = copy / "mutants"
     found = []
     for path in sorted(folder.rglob("*.py.meta")):

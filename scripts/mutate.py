@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 COPY = ROOT / ".mutate"
 EXPLAINED = ROOT / "tests" / "mutants.toml"
 WANTED = 0.9
-"""Minimum share of killed mutants."""
+"""Minimum number of killed mutants, as a fraction of all mutants."""
 UNFINISHED = 3
 _END_S = 30
 _TEST_S = 20
@@ -58,7 +58,12 @@ def _options() -> argparse.Namespace:
         metavar="NAME",
         help="retest the mutants with these names, such as 'urc.guard.motion_scheduler.*'",
     )
-    add("--minutes", type=float, metavar="N", help="time limit in minutes; the next run continues")
+    add(
+        "--minutes",
+        type=float,
+        metavar="N",
+        help="time limit in minutes; the next run tests the rest",
+    )
     add("--workers", type=int, default=2, metavar="N", help="number of workers, 2 by default")
     add("--timeouts", action="store_true", help="retest mutants that timed out")
     add("--report", action="store_true", help="show the stored results without testing mutants")
@@ -83,7 +88,7 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
     try:
         return process.wait(minutes * 60 if minutes is not None else None) == 0
     except (subprocess.TimeoutExpired, KeyboardInterrupt):
-        print("\nstopped; the next run continues here", flush=True)
+        print("\nstopped; the next run tests the remaining mutants", flush=True)
         process.send_signal(signal.SIGINT)
         try:
             process.wait(_END_S)
@@ -94,7 +99,7 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
 
 
 def hung(mutants: list[Mutant]) -> list[str]:
-    """Return the names of mutants with a timeout; a busy machine may have caused the timeout."""
+    """Return the names of mutants that timed out, perhaps only because the computer was slow."""
     return [one.name for one in mutants if one.status == "timeout"]
 
 

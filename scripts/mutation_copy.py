@@ -30,12 +30,12 @@ SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
 
 
 class Settings(NamedTuple):
-    """The settings in `[tool.mutmut]`."""
+    """Settings from `[tool.mutmut]` in pyproject.toml that determine the copy."""
 
     mutated: tuple[str, ...]
-    """Patterns of files to mutate."""
+    """Path patterns of the files to mutate."""
     spared: tuple[str, ...]
-    """Patterns of files to exclude from mutation."""
+    """Path patterns of files that are copied without mutants."""
     copied: tuple[str, ...]
     """Files and folders to copy because the tests need them."""
 
@@ -93,7 +93,7 @@ def _files(root: Path, named: tuple[str, ...]) -> Iterator[str]:
 def forget_open_questions(copy: Path) -> None:
     """Mark all surviving mutants as untested, because a new test may kill them.
 
-    A killed mutant stays killed until its function changes, which mutmut detects.
+    A killed mutant keeps its status until mutmut detects a change in its function.
     """
     (copy / "mutants" / "mutmut-stats.json").unlink(missing_ok=True)
     for path in (copy / "mutants").rglob("*.meta"):

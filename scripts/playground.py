@@ -1,7 +1,7 @@
 """Build the playground as one folder of static files: `python -m scripts.playground FOLDER`.
 
-Any static web server can serve the folder, under any path. The pages contact no other hosts. The
-folder contains:
+Any static web server can serve the folder, under any path. The playground's pages contact no other
+hosts. The folder contains:
 
 - the interpreter: Pyodide from npm, in the version from `package-lock.json`;
 - `python.bin`: URC, its documents and templates, and the packages that they need, compiled, as a
@@ -47,7 +47,7 @@ PYTHON = "3.14"
 DATA = ("schemas", "robots", "widgets", "templates")
 SKIPPED = ("__pycache__", "tests", "test", "static", "cli/new_widget")
 CACHE = ROOT / "build" / "playground"
-"""Folder with the last build's compiled files, in an archive named after the sources' hash."""
+"""Folder with an archive of the last build's bytecode, named after the sources' hash."""
 WHEELS = CACHE / "wheels"
 """Downloaded browser builds; with them, a later build needs no network."""
 BUILD_TIMEOUT_S = 1800
@@ -56,7 +56,7 @@ _DATED = (1980, 1, 1, 0, 0, 0)
 
 
 class BuildError(Exception):
-    """The build failed; the message is one line."""
+    """Raised if the build fails; its message has only one line."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -252,7 +252,7 @@ def _zip(folder: Path, archive: Path, pattern: str = "*") -> None:
 
 
 def _write_dashboard(folder: Path) -> None:
-    """Copy the files that pages load from a server, at the same paths."""
+    """Copy the files that pages load, to the paths at which a server serves them."""
     web = ("js", "mjs", "css", "svg", "png", "jpg", "webp", "json", "stl", "dae", "urdf")
     _copy_tree_of(ROOT / "urc" / "web" / "static", folder / "static", web)
     _copy_tree_of(ROOT / "widgets", folder / "widgets", web)
@@ -284,7 +284,7 @@ def write_list(folder: Path) -> str:
     build = json.dumps({"version": version, "files": files}, indent=0)
     text, count = _BUILD.subn(lambda _: f"const BUILD = {build};", worker.read_text("utf-8"))
     if count != 1:
-        raise BuildError("sw.js has no line for the list of files")
+        raise BuildError("sw.js has no line 'const BUILD = ...;' for the list of files")
     worker.write_text(text, "utf-8")
     return version
 

@@ -29,7 +29,7 @@ PACKAGES = (
     "jsonschema-specifications", "markdown-it-py", "markupsafe", "mdurl", "msgspec", "pyyaml",
     "referencing", "semver", "starlette", "typing-extensions",
 )  # fmt: skip
-"""Python packages of the playground."""
+"""Names of the Python packages that the playground contains."""
 _PAGE = """\
 <!doctype html>
 <html lang="en">
@@ -64,13 +64,13 @@ class Part(NamedTuple):
 
     name: str
     version: str
-    """"" if the files do not contain the version."""
+    """"" if Pyodide's files do not state the version."""
     licence: str
     """SPDX expression, or `NO_TEXT`."""
     notice: str
     """Copyright notice."""
     marks: tuple[str, ...]
-    """Strings that identify the software in the files."""
+    """Strings in Pyodide's files that identify the software."""
 
 
 class Shipped(NamedTuple):
@@ -148,7 +148,7 @@ def _row(one: Shipped) -> str:
 
 
 def _parts_text(listed: Sequence[Part]) -> str:
-    """Return the notice of each part, followed by the text of each licence once."""
+    """Return each part's notice, then each licence text, without repetition."""
     lines = ["Other software in Pyodide's files:", ""]
     for one in listed:
         lines += [

@@ -41,7 +41,7 @@ RULES: Mapping[str, re.Pattern[str]] = {
     "who-subject": re.compile(r"^[(\"“*]*(?:Who|What|Whose|Of which|Of whom)\s(?!.*\?)"),
     "what-clause": re.compile(rf"(?<!^)\bwhat (?:{_VERBS})\b(?!.*\?)"),
 }
-"""Pattern that finds a rule's hits; the rules `long` and `glossary` have no pattern."""
+"""Pattern for the hits of each rule, except the rules `long` and `glossary`."""
 
 _CODE = re.compile(r"(`+).+?\1")
 _LETTER = re.compile(r"[A-Za-z0-9{]")
@@ -140,12 +140,12 @@ def update(found: list[Hit], allowed: Counter[tuple[str, str]] | None) -> int:
 
 
 def counts(found: Iterable[Hit]) -> Counter[tuple[str, str]]:
-    """Count the hits by file and rule."""
+    """Return the number of hits for each file and rule."""
     return Counter((hit.sentence.path, hit.rule) for hit in found)
 
 
 def counts_in(baseline: str) -> Counter[tuple[str, str]]:
-    """Return the counts in a baseline.
+    """Return the number of hits that a baseline allows for each file and rule.
 
     If a merge left two rows for the same file and rule, use the larger count.
     """

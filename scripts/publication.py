@@ -22,8 +22,8 @@ def missing_values(root: Path, version: str) -> Iterator[str]:
     """Yield a line for each missing value, with its file and the reason.
 
     Args:
-        root: folder of the sources.
-        version: version to be published.
+        root: root folder of the source tree.
+        version: URC version to be published.
     """
     project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
     if names := [name for name in URLS if name not in project.get("urls", {})]:
@@ -36,4 +36,4 @@ def missing_values(root: Path, version: str) -> Iterator[str]:
     if not re.search(heading, changelog, re.MULTILINE):
         yield f"CHANGELOG.md: the heading of {version} has no date; write '- YYYY-MM-DD' after it"
     if _NOT_IN_INDEX in (root / _INSTALL).read_text("utf-8"):
-        yield f"{_INSTALL}: states that URC is {_NOT_IN_INDEX}"
+        yield f"{_INSTALL}: still states that URC is {_NOT_IN_INDEX}"

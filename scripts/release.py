@@ -4,7 +4,7 @@
     ./dev release --debian WHEELS      also the Debian package, from a folder of wheels
 
 The command publishes nothing. Each build runs twice, in different folders; the results must have
-the same bytes. All files have the time of the last commit, so other people's builds produce the
+the same bytes. All files carry the time of the last commit, so builds on other machines produce the
 same bytes.
 """
 
@@ -37,12 +37,12 @@ DIST = ROOT / "dist"
 NOTICES = "THIRD-PARTY-NOTICES.txt"
 SUMS = "SHA256SUMS"
 SHELLS = {"bash": "urc", "zsh": "_urc", "fish": "urc.fish"}
-"""File names by which the shells find their completion scripts."""
+"""File name of each shell's completion script, as the shell expects it."""
 _BUILD_S = 600
 
 
 class ReleaseError(Exception):
-    """A release check failed; the message is one line."""
+    """Raised if a release check fails; its message has only one line."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -96,7 +96,7 @@ def release(out: Path, wheels: Path | None) -> None:
 
 
 def say(text: str) -> None:
-    """Print the current step."""
+    """Print the step that begins now to standard error."""
     print(f"release: {text} ...", file=sys.stderr, flush=True)
 
 

@@ -70,7 +70,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def pictures(names: list[str]) -> None:
-    """Take pictures of all robots, one after another."""
+    """Take pictures of the named robots, one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:  # without the user's latched stop
         await pictures_of(names, {"URC_DATA_DIR": folder})

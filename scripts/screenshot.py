@@ -38,7 +38,7 @@ def main() -> int:
 
 
 async def take(address: str) -> None:
-    """Open the page, wait for the charge, and write the picture."""
+    """Open the robot's page, wait for the battery charge, and write the picture."""
     async with running_browser() as browser:
         context = await browser.new_context(
             viewport={"width": 1280, "height": 800}, locale=LOCALE, reduced_motion="reduce"

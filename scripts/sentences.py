@@ -3,7 +3,7 @@
     python -m scripts.sentences             60 sentences of HEAD
     python -m scripts.sentences COMMIT      of another commit
 
-The seed is the commit's hash. The same commit therefore produces the same sentences on every
+The random seed is the commit's hash. The same commit therefore produces the same sentences on every
 machine, and no one can select favourable sentences. Each sentence of at least four words has the
 same probability; identical sentences count once. `scripts/passages.py` defines prose.
 """
@@ -26,7 +26,7 @@ def main() -> int:
     """Print the sampled sentences with path and line; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m scripts.sentences", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("commit", nargs="?", default="HEAD", help="the commit with the sentences")
+    parser.add_argument("commit", nargs="?", default="HEAD", help="commit with the prose to sample")
     commit = _git("rev-parse", "--verify", f"{parser.parse_args().commit}^{{commit}}")
     name = commit.decode().strip()
     found = candidates(files_of(name))

@@ -1,9 +1,9 @@
 """Build the documentation site: `python -m scripts.site`, part of `./dev docs`.
 
 Sphinx reads docs/ and writes .site/html. Warnings are errors: for example, a broken reference, a
-page without a table of contents entry, or a heading that skips a level. Sphinx needs no network.
-If npm has installed Pyodide, the site contains the playground; its first build downloads one
-package and caches it.
+page that no table of contents lists, or a heading that skips a level. Sphinx needs no network. If
+npm has installed Pyodide, the site contains the playground; the first build downloads and caches
+one package for it.
 """
 
 import shutil

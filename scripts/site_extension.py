@@ -49,7 +49,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def mark_documents(_: Sphinx, tree: nodes.document) -> None:
-    """Add the class to each fenced block with a whole document."""
+    """Add the class `DOCUMENT` to each fenced block that contains a whole document."""
     texts = [block.astext() for block in tree.findall(nodes.literal_block)]
     for block in tree.findall(nodes.literal_block):
         text = block.astext()
@@ -89,7 +89,7 @@ def link_names(app: Sphinx, tree: nodes.document, name: str) -> None:
 
 
 def is_within(node: nodes.Node, *kinds: type[nodes.Node]) -> bool:
-    """Return whether any of a node's ancestors is of one of these kinds."""
+    """Return whether a node has an ancestor of one of these kinds."""
     while (node := node.parent) is not None:
         if isinstance(node, kinds):
             return True
@@ -123,7 +123,7 @@ def shorten_navigation(
 
 
 def source_line(context: dict[str, Any], name: str) -> str:
-    """Return the page's last line, which explains where the page can be corrected."""
+    """Return the page's last line: the file to edit, or the command that generated the page."""
     for starts, command in MADE_BY:
         if name.startswith(starts):
             return f'<p class="urc-source">Made by <code>{command}</code> from the code.</p>'

@@ -1,4 +1,4 @@
-"""The names in code style that link to the reference: commands, variables, codes, keys."""
+"""Links to the reference from names in code style: commands, variables, codes and keys."""
 
 import re
 from collections import Counter
@@ -22,7 +22,7 @@ _COMMAND = re.compile(r"urc ([a-z-]+)\b")
 
 
 class Place(NamedTuple):
-    """A page of the site, without its extension, and the anchor on the page."""
+    """The target of a link: a page's path without its extension, and an anchor on that page."""
 
     page: str
     anchor: str
@@ -38,7 +38,7 @@ def place_of(literal: str) -> Place | None:
 
 @cache
 def names() -> Mapping[str, Place]:
-    """Return each name's place. A key has no place if several definitions share it."""
+    """Return each name's place in the reference; a key of several definitions has no place."""
     found: dict[str, Place] = {}
     for page in ("cli", "environment", "codes"):
         found |= {one: Place(f"reference/{page}", make_id(one)) for one in headings(page, "##+")}

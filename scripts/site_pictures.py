@@ -79,7 +79,7 @@ async def served(*words: str) -> Any:
 
 
 async def opened(browser: Browser, address: str, path: str, size: tuple[int, int]) -> Page:
-    """Return a page of the dashboard, in the light theme, without hints."""
+    """Open a dashboard page in the light theme, with hints disabled; return the page."""
     context = await browser.new_context(
         viewport={"width": size[0], "height": size[1]}, locale=LOCALE, color_scheme="light"
     )
@@ -119,7 +119,7 @@ async def tap(page: Page) -> None:
 
 
 async def shoot(page: Page, frames: list[tuple[float, bytes]]) -> CDPSession:
-    """Collect each painted picture, with its time, until the session ends."""
+    """Append painted frames with their times to `frames` until the returned session ends."""
     session = await page.context.new_cdp_session(page)
     waiting = set()
 
@@ -209,7 +209,7 @@ async def tutorials() -> None:
 
 
 def write_blocks(page: Path, folder: Path) -> None:
-    """Write a page's documents, and the files of its widgets."""
+    """Write a tutorial page's documents and widget files into `folder`."""
     for block in blocks(page):
         if block.file:
             file = folder / "widgets" / block.file

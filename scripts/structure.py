@@ -9,10 +9,10 @@ Use the metrics to compare the code before and after a change. No metric is a go
 - modules with one importer: modules of `urc` that exactly one other module uses. A use is an import
   at any level, or an entry `"urc.module:name"` in a table. Packages and `__main__` do not count;
 - class names used more than once: names that `urc` defines in two or more places;
-- functions over 60 lines: lines include the docstring, but not decorators;
+- functions over 60 lines: the line count includes the docstring, but not the decorators;
 - repeated lines: lines of four or more consecutive statements that also occur in an earlier
-  function. Variable names and constants are ignored. Only the header of a compound statement is
-  compared. Each line counts once.
+  function. The comparison ignores variable names and constants. Only the header of a compound
+  statement is compared. Each repeated line counts once.
 """
 
 import argparse
@@ -235,7 +235,7 @@ def classes(found: list[Module]) -> Iterator[tuple[str, str]]:
 
 
 def repeated_names(found: list[Module]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return public and private class names with several definitions, and their locations."""
+    """Return the public and the private class names defined twice or more, with locations."""
     places: dict[str, list[str]] = defaultdict(list)
     for name, place in classes(found):
         places[name].append(place)

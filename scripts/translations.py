@@ -3,9 +3,9 @@
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps
 
-The text is in the page templates, the pages' modules, and the widgets' templates, modules, titles
-and summaries. A message is the text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext
-PO files, which any translation program can open.
+The translatable text comes from the pages' templates and modules, and from the widgets' templates,
+modules, titles and summaries. A message is the text in ``t("...")`` or ``ctx.t("...")``. The
+catalogues are gettext PO files, which any translation program can open.
 """
 
 import argparse
@@ -33,7 +33,7 @@ IDLE_HEADERS = tuple(
     f'"{name}'
     for name in ("POT-", "PO-", "Project-", "Report-", "Last-", "Language-Team", "Generated-")
 )
-"""PO file headers to remove, because they change with the date or the program."""
+"""PO file headers to remove, because they depend on the date or on the writing program."""
 HOLE = re.compile(r"\{[a-z_]+\}")
 
 
@@ -54,7 +54,7 @@ def sources() -> Iterator[tuple[str, Path]]:
 
 @cache
 def messages() -> Mapping[str, list[str]]:
-    """Return a mapping of messages to their files, in order of appearance."""
+    """Return each message with the files that contain it, in order of appearance."""
     found: dict[str, list[str]] = {}
     for method, path in sources():
         with path.open("rb") as stream:

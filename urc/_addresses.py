@@ -1,8 +1,8 @@
 """Addresses of this machine's network interfaces, determined without sending a packet.
 
 Name servers and the host name are unreliable: on many machines, the host name resolves only to
-127.0.1.1. Linux, macOS and the BSDs have getifaddrs in the C library. On systems without
-getifaddrs, the routing table determines the source address of an outgoing packet.
+127.0.1.1. On Linux, macOS and the BSDs, getifaddrs in the C library returns the addresses. On
+systems without getifaddrs, the routing table determines the source address of an outgoing packet.
 """
 
 import ctypes
@@ -97,7 +97,7 @@ def _decoded(place: int) -> Iterator[Address]:
 
 
 def _of_routes() -> Iterator[Address]:
-    """Yield the source addresses of routes, using UDP sockets that send no packet."""
+    """Yield the source addresses of outgoing routes, from UDP sockets that send no packet."""
     for target in _ROUTED_TO:
         family = socket.AF_INET6 if ":" in target else socket.AF_INET
         with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asker:

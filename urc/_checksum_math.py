@@ -122,7 +122,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
 
     Args:
         spec: parameters or name of the checksum algorithm.
-        is_big: whether numbers are big-endian; matters only for numbers wider than one byte.
+        is_big: whether numbers are big-endian; without effect on numbers of one byte.
     """
     if isinstance(spec, str):
         return NAMED[spec]
@@ -195,7 +195,7 @@ NAMED: Final[Mapping[str, Compute]] = {
     "fletcher32": _fletcher(65535, 16, 2),
     "internet": _internet,
 }
-"""Functions that compute the checksums without parameters, by algorithm name."""
+"""Functions for the checksum algorithms without parameters, by algorithm name."""
 
 _BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
     CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,

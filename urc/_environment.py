@@ -17,10 +17,9 @@ SETTING: Final = "URC_SET_"
 VARIABLES: Final[Mapping[str, str]] = {
     DATA_DIR: "Data folder with people, keys, packages, settings and logs. `--data-dir` overrides"
     " the variable.",
-    f"{SETTING}NAME": "Value of the robot setting `name`. The variable contains the setting's name"
-    " in upper case, with `_` in place of `-`. `--set` overrides the variable.",
-    TOKEN: "Token for a robot of a server, for `urc watch`, `urc send` and `urc record` with"
-    " `--server`.",
+    f"{SETTING}NAME": "Value of the robot setting `name`. The variable's name ends with the"
+    " setting's name in upper case, with `_` in place of `-`. `--set` overrides the variable.",
+    TOKEN: "Token with which `urc watch`, `urc send` and `urc record` sign in to a server.",
     REAL_TIME: "`no` disables the real-time priority of the guard.",
 }
 """Meaning of each URC variable, by name."""
@@ -33,4 +32,4 @@ SYSTEM: Final[Mapping[str, str]] = {
     "SSH_AUTH_SOCK": "Socket of the SSH agent with the keys for transports with `agent: true`.",
     "XDG_DATA_HOME": "On Linux, the folder that contains the default data folder.",
 }
-"""Effects on URC of variables that other programs also use, by name."""
+"""URC's use of each variable that other programs also read, by name."""

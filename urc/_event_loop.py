@@ -11,7 +11,7 @@ _Result = TypeVar("_Result")
 
 
 def run(work: Coroutine[Any, Any, _Result]) -> _Result:
-    """Run `work` to completion, like `asyncio.run`."""
+    """Run `work` to completion, like `asyncio.run`, but on the fastest available event loop."""
     with asyncio.Runner(loop_factory=_fastest()) as runner:
         return runner.run(work)
 

@@ -20,7 +20,7 @@ def missing(feature: str, package: str, extra: str) -> str:
     """Return a message that names a feature's missing package and the command to install it.
 
     Args:
-        feature: subject and verb, such as ``mqtt needs``.
+        feature: beginning of the message, such as ``mqtt needs``.
         package: distribution name of the package.
         extra: URC extra that contains the package.
     """

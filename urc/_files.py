@@ -36,7 +36,9 @@ def read_bytes(path: str, most: int) -> bytes:
     except FileNotFoundError:
         raise refused(path, "no-such-file", "there is no such file", _similar(path)) from None
     except NotADirectoryError:
-        raise refused(path, "no-such-file", "a part of this path is not a directory") from None
+        raise refused(
+            path, "no-such-file", "part of this path is a file, not a directory"
+        ) from None
     except PermissionError:
         raise refused(
             path,
@@ -60,7 +62,7 @@ def too_large(most: int) -> str:
 
 
 def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:
-    """Return an error that rejects a whole file."""
+    """Return the error that rejects a file as a whole, without a line number."""
     return ProblemsError([Problem(code, message, file, hint=hint)])
 
 
@@ -69,7 +71,11 @@ def _documents_in(folder: str) -> str:
         names = sorted(name for name in os.listdir(folder) if name.endswith((".yaml", ".yml")))
     except OSError:
         return ""
-    return f"pass one of its documents, such as {os.path.join(folder, names[0])}" if names else ""
+    return (
+        f"pass a document in this directory, such as {os.path.join(folder, names[0])}"
+        if names
+        else ""
+    )
 
 
 def similar_file(path: str) -> str:

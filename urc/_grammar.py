@@ -99,7 +99,7 @@ class _ExpressionParser:
         self._names = names
         self._settings = settings
         self.allows_bytes = False
-        """Whether the last filter may return bytes."""
+        """Whether the last filter in the expression may return bytes."""
 
     def expression(self) -> str:
         """Parse ``a if test else b``, and all operators with higher precedence."""
@@ -311,7 +311,7 @@ class _ExpressionParser:
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
     def _nonce(self, token: Token) -> str:
-        """Parse ``nonce()`` or ``nonce(8)``: a nonce of 16 bytes or the given number."""
+        """Parse ``nonce()`` or ``nonce(8)``; the argument is a number of bytes, by default 16."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._accept(")"):
             raise ExpressionSyntaxError(
@@ -351,7 +351,7 @@ class _ExpressionParser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """Parse and compile the argument ``('regular expression')`` of a test."""
+        """Parse and compile the pattern in ``match('...')`` or ``search('...')``."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":

@@ -48,7 +48,7 @@ class UnfilledText(NamedTuple):
 
     text: str
     edits: tuple[tuple[int, int, int], ...]
-    """For each substituted name: start offset, length, and length of its replacement."""
+    """For each substituted name: its offset and length in `text`, and its replacement's length."""
 
     def offset(self, offset: int) -> int:
         """Return the offset in the original text that corresponds to `offset` in the final text."""

@@ -30,7 +30,7 @@ class Number(NamedTuple):
     """Whether the 16-bit words are in reverse order; `endian` is the byte order within each word.
     """
     is_by_seven: bool = False
-    """Whether each byte contains a zero bit and seven bits of the number."""
+    """Whether each byte contains seven bits of the number below a zero bit."""
 
     @property
     def size(self) -> int:
@@ -84,7 +84,7 @@ def number_of(name: str) -> Number | None:
 
 
 def _odd_number(name: str) -> Number | None:
-    """Return the number type of a name such as ``f32cdab`` or ``u14by7le``; otherwise None."""
+    """Return the number type for a name such as ``f32cdab`` or ``u14by7le``; None for others."""
     found = _SWAPPED.fullmatch(name)
     if found is not None:
         letters: str = found[2] or found[3]
@@ -101,7 +101,7 @@ def _odd_number(name: str) -> Number | None:
 
 
 def width_of(name: str) -> Number | None:
-    """Return the number type of a packed array, such as ``u11``; None for an unknown name."""
+    """Return the type of a packed array's numbers, such as ``u11``; None for an unknown name."""
     found = _WIDTH.fullmatch(name)
     return None if found is None else Number("integer", int(found[2]), found[1] == "i")
 

@@ -11,7 +11,7 @@ match the same characters in many ways. Every proven pattern has a start anchor,
 alternatives start with different characters. Every repeat in a proven pattern matches a single set
 of characters, and the set excludes every character that may follow the repeat.
 
-The run time of RE2 is proportional to the text size and to the program size. A program contains
+The run time of RE2 is proportional to the text size times the program size. A program contains
 every repeat ``{n}`` in expanded form. A size limit for unproven patterns therefore limits the run
 time. This module computes the size of a pattern from its source, independently of RE2.
 """
@@ -77,7 +77,9 @@ _REFUSED: dict[Any, str] = {
 
 
 _INSTEAD: dict[Any, str] = dict.fromkeys(_REFUSED, "")
-_INSTEAD[_constants.ASSERT] = "; match the text itself, and capture the part with a named group"
+_INSTEAD[_constants.ASSERT] = (
+    "; match the whole text, and capture the wanted part with a named group"
+)
 _INSTEAD[_constants.ASSERT_NOT] = "; match the allowed text instead, or exclude frames with 'when'"
 _INSTEAD[_constants.GROUPREF] = "; name both groups and compare them with 'when: a == b'"
 
@@ -110,7 +112,7 @@ class Pattern:
 
     @property
     def places(self) -> Mapping[str, int]:
-        """Numbers of the groups, by name."""
+        """Number of each named group, by group name."""
         tree = _parser.parse(self.source, re.ASCII)
         return dict(tree.state.groupdict)
 
@@ -184,9 +186,9 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
     Args:
         pattern: pattern to match.
         groups: text of each named group, by name.
-        variant: number of the variant to return. Variant 0 omits optional parts that contain none
-            of `groups`, and uses the first alternatives and the first printable characters. Other
-            variants use other alternatives, characters and numbers of repeats.
+        variant: number of the example to return, from 0. Variant 0 omits optional parts that
+            contain none of `groups`, and uses the first alternatives and the first printable
+            characters. Other variants use other alternatives, characters and numbers of repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
@@ -194,7 +196,7 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
 
 
 def literal_prefix(pattern: Pattern) -> str:
-    """Return the literal prefix of all matches of a proven pattern; "" for other patterns."""
+    """Return the literal start of every match of a proven pattern; "" for other patterns."""
     if not pattern.is_proven:
         return ""
     prefix = ""
@@ -219,7 +221,7 @@ def can_be_empty(pattern: Pattern, name: str) -> bool:
 
 
 def _least_width(tree: Any, number: int) -> int | None:
-    """Return the minimum length of the group; None for a group outside `tree`."""
+    """Return the group's minimum length in characters; None for a group outside `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return int(argument[3].getwidth()[0])
@@ -318,7 +320,7 @@ def _parts(operation: Any, argument: Any) -> list[Any]:
 
 
 def cost_of(source: str) -> int:
-    """Return the size of a pattern with expanded repeats."""
+    """Return the size of a pattern with expanded repeats, approximately in RE2 instructions."""
     return _cost(_parser.parse(source, re.ASCII))
 
 

@@ -1,4 +1,4 @@
-"""Splits expressions into tokens, and converts tokens to constants.
+"""Splits expressions into tokens, and converts number and text tokens to constants.
 
 Private to `urc._grammar`.
 """

@@ -1,4 +1,4 @@
-"""Translatable text for people.
+"""Text for people, written in English and translated later.
 
 A phrase stores the English text and the values, for later translation by `urc.web.words`.
 `scripts.translations` collects the translatable text from calls to `phrase`.
@@ -18,7 +18,7 @@ class Phrase(str):
     """English text with a placeholder ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """Parts of a joined phrase; a joined phrase has an empty `text`."""
+    """Phrases that a joined phrase consists of; the `text` of a joined phrase is empty."""
     between: str
 
 

@@ -40,7 +40,7 @@ class SyntaxFault(NamedTuple):
 
 
 class _Clue(NamedTuple):
-    """A parser message, with the text at its position."""
+    """A YAML parser's message and position, with the lines of the document."""
 
     said: str
     context: str
@@ -63,7 +63,7 @@ class _Clue(NamedTuple):
 
 
 def explain(error: yaml.YAMLError, lines: Sequence[str]) -> SyntaxFault:
-    """Translate `error` into a syntax error at the most useful position."""
+    """Translate a parser error into a message and a hint, at the position of the probable cause."""
     mark = getattr(error, "problem_mark", None)
     opened = getattr(error, "context_mark", None) or mark
     said = str(getattr(error, "problem", None) or error).splitlines()[0]

@@ -50,7 +50,7 @@ def item_hint(text: str) -> str:
 
 
 def column_hint(lines: Sequence[str], number: int) -> str:
-    """Return a hint with the probable column of a line; "" if the line's column is possible."""
+    """Return a hint with the probable column of a line; "" if the line can start where it does."""
     own = _columns(lines[number])[-1]
     blocks = _open_blocks(lines, number)
     if own in blocks or not blocks:
@@ -78,18 +78,18 @@ def _open_blocks(lines: Sequence[str], number: int) -> dict[int, int]:
 
 
 def _columns(text: str) -> tuple[int, ...]:
-    """Return the column of a line's key, followed by the columns of its dashes."""
+    """Return the column of a line's key, then the columns of its list dashes, right to left."""
     found = _START.match(text)
     start = found[0] if found else ""
     return (len(start), *(at for at in range(len(start) - 1, -1, -1) if start[at] == "-"))
 
 
 def runaway_quote(lines: Sequence[str], number: int, column: int) -> tuple[int, int, str] | None:
-    """Return the position of a quoted text that lacks its closing quote.
+    """Return where the quoted text begins whose missing closing quote caused an error.
 
     Args:
         lines: lines of the document.
-        number: line of the error, which contains the quote that ended the text.
+        number: index of the line with the error; a quote in this line ended the text.
         column: column of the error.
 
     Returns:

@@ -14,7 +14,7 @@ from yaml.scanner import Scanner, ScannerError
 __all__ = ["PureParser"]
 
 _LETTER: Final = "\ufffc"
-"""Character without a meaning in YAML; it replaces each ``?`` that the scanner must not see."""
+"""Character without a meaning in YAML, which `peek` returns for each ``?`` in unquoted text."""
 _BLANK: Final = "\0 \t\r\n\x85\u2028\u2029"
 
 
@@ -30,7 +30,7 @@ class PureParser(Reader, Scanner, Parser):
         Parser.__init__(self)
 
     def scan_plain(self) -> Any:
-        """Return the token for unquoted text."""
+        """Scan unquoted text, with libyaml's rules inside braces, and return its token."""
         self._is_plain = self.flow_level > 0
         try:
             return super().scan_plain()
@@ -38,7 +38,7 @@ class PureParser(Reader, Scanner, Parser):
             self._is_plain = False
 
     def peek(self, index: int = 0) -> str:
-        """Return the character at `index` from the current position."""
+        """Return the character at `index` from the current position, as libyaml would treat it."""
         found: str = super().peek(index)
         if not self._is_plain:
             return found

@@ -26,7 +26,7 @@ long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 _OPENING: Final = ("“", "„", "‘", "‚", "«", "»", "”", "’")
 _CLOSING: Final = ("”", "“", "’", "‘", "»", "«")
-"""Typographic quotes of several languages; word processors use them for straight quotes."""
+"""Typographic quotes of several languages, which word processors substitute for straight quotes."""
 
 
 class DocumentLimits(NamedTuple):
@@ -62,7 +62,7 @@ class TreeReader:
         self._nodes = 0
         self._path: list[str] = []
         self._anchors: dict[str, _Built | None] = {}
-        """Anchored nodes by anchor name; None for an incomplete node."""
+        """Anchored nodes by anchor name; None while a node is being read."""
 
     def read(self) -> tuple[object, Mark] | None:
         """Return the data and marks of the document; None for text without a document.
@@ -180,7 +180,7 @@ class TreeReader:
         return items, height + 1
 
     def _key(self, event: Any, start: Any, depth: int) -> str | None:
-        """Return the key; report an invalid key, skip its value and return None."""
+        """Return the next key; report an invalid key, skip the key's value and return None."""
         if type(event) is not yaml.ScalarEvent:
             self._node(event, depth + 1)
             self._report_complex_key(event, start)

@@ -59,7 +59,7 @@ _INSTEAD: Final = {
 
 
 class ExpressionError(UrcError):
-    """An error in compiling or evaluating a template.
+    """Raised if a template cannot be compiled or evaluated.
 
     `offset` is the 0-based character position of the error in the template.
     """
@@ -251,7 +251,7 @@ def last_filter(template: Template) -> str:
 
 
 def defaulted_names(template: Template) -> frozenset[str]:
-    """Return the root names of an expression that always have a ``default``."""
+    """Return the root names for which an expression always states a ``default``."""
     if "_filter_default(" not in template.python:
         return frozenset()
     needed, spare = set[str](), set[str]()
@@ -283,7 +283,7 @@ def digested_settings(template: Template) -> frozenset[str]:
 
 
 def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bool) -> None:
-    """Add the settings under `node` to the visible or the hashed settings."""
+    """Add each setting under `node` to `digested` inside a hash or test, otherwise to `shown`."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id in _HASHES:
             roots = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}

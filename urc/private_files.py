@@ -13,7 +13,7 @@ __all__ = ["make_private", "put_private", "remove_incomplete"]
 
 _OWN = 0o700
 _INCOMPLETE_S = 3600.0
-"""Age, in seconds, beyond which no process can still be writing a file."""
+"""Age of an incomplete file, in seconds, after which no process can still be writing it."""
 
 
 def make_private(folder: Path) -> None:
@@ -61,7 +61,7 @@ def put_private(file: Path, data: bytes) -> None:
 def remove_incomplete(folder: Path) -> None:
     """Delete the files that killed processes left incomplete in a folder and its direct subfolders.
 
-    Files that another process may be writing remain, as do files that cannot be deleted.
+    Files that cannot be deleted are kept, as are files that another process may still be writing.
     """
     oldest_s = time.time() - _INCOMPLETE_S
     for pattern in (".*.new", "*/.*.new"):

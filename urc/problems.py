@@ -39,7 +39,7 @@ class UrcError(Exception):
 
 
 class ProblemsError(UrcError):
-    """An invalid document, with all problems from the pass that rejected it."""
+    """Raised for an invalid document, with all problems from the pass that rejected it."""
 
     def __init__(self, problems: Sequence["Problem"]) -> None:
         self.problems = tuple(problems)
@@ -65,11 +65,11 @@ class Problem(NamedTuple):
     """End column of the underlined text on the same line, 1-based and exclusive; 0 if unknown.
     """
     path: str = ""
-    """Path in the document, such as ``transports.wire.port``."""
+    """Path of the value in the document, such as ``transports.wire.port``."""
     hint: str = ""
     """Suggested correction; "" if there is no suggestion."""
     source: str = ""
-    """Source line, shown above the caret."""
+    """Source line of the problem, shown above the caret line."""
     severity: Severity = "error"
 
     @property

@@ -36,7 +36,7 @@ _LIMITS: Final = DocumentLimits()
 # Unicode patterns take milliseconds to compile, so they are compiled only for text that needs them.
 _LINE_END = re.compile("\r\n|[\r\n]")
 _NESTING: Final = "exceeded maximum nesting depth"
-"""Message of libyaml, since PyYAML 6.0.4, at 1,000 levels."""
+"""Error message of libyaml at 1,000 levels of nesting, since PyYAML 6.0.4."""
 _LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _UNPRINTABLE_UNICODE: Final = "[^\t\r\n\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
@@ -135,7 +135,7 @@ class Document:
         )
 
     def _nearest(self, path: Path) -> tuple["Document", Mark, int]:
-        """Return the document, mark and depth of `path` or its nearest parent."""
+        """Return the document, mark and depth of the value at `path`, or of its nearest parent."""
         home: Document = self.mark.origin or self
         mark, depth = self.mark, 0
         for part in path:

@@ -1,8 +1,9 @@
 """Install Chromium from npm, for Linux x64 machines without a browser and without root access.
 
-The npm package is intended for cloud functions. The package contains brotli archives of the
-browser, its libraries, fonts and a software renderer. The archives are unpacked once into the
-user's cache, together with a launcher that sets the library and font paths.
+The npm package targets cloud functions, whose systems lack a browser's libraries. The package
+contains brotli archives of the browser, its libraries, fonts and a software renderer. The archives
+are unpacked once into the user's cache, together with a launcher that sets the library and font
+paths.
 """
 
 import hashlib
@@ -53,13 +54,13 @@ FONTS_CONF = """<?xml version="1.0"?>
 
 
 class BringError(Exception):
-    """The browser could not be installed from npm; the message fits on one line."""
+    """Raised if the browser cannot be installed from npm; its message has only one line."""
 
 
 def bring_chromium() -> str:
     """Return Chromium's launcher in the user's cache; the first call installs Chromium."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        raise BringError("the package exists for Linux x64 only")
+        raise BringError("the npm package of Chromium exists only for Linux x64")
     folder = cache_folder()
     launcher = folder / "chromium"
     if not launcher.exists():
@@ -126,7 +127,7 @@ def unpack(archive: Path, folder: Path) -> None:
 
 
 def write_launcher(folder: Path) -> None:
-    """Write the launcher and the font configuration, with the final paths of the cache folder."""
+    """Write the launcher and the font configuration, with the paths of the cache folder."""
     final = cache_folder()
     (folder / "fonts.conf").write_text(FONTS_CONF.format(folder=final), encoding="utf-8")
     launcher = folder / "chromium"

@@ -1,6 +1,7 @@
 """Generate the reference: `python -m scripts.reference` writes docs/reference/.
 
-A test fails if a page is outdated. The same code and schemas produce the same bytes everywhere.
+A test fails if a page is outdated. The same code and schemas produce the same bytes on every
+machine.
 """
 
 import sys
@@ -39,7 +40,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "gallery/robots.md": gallery.robots,
     "gallery/widgets.md": gallery.widgets,
 }
-"""Each generated page below docs/, with the function that returns its text."""
+"""Functions that return the text of the generated pages, by path below docs/."""
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""The families of keys, which determine the reference page for each definition in the schemas."""
+"""Families of keys: each family is one reference page, and lists the definitions on that page."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -7,7 +7,7 @@ __all__ = ["FAMILIES", "Family"]
 
 
 class Family(NamedTuple):
-    """One page of the reference of keys."""
+    """A family of keys, described on one page of the reference."""
 
     title: str
     summary: str
@@ -136,7 +136,7 @@ FAMILIES: Mapping[str, Family] = {
     ),
     "signals": Family(
         "Keys of signals",
-        "Keys of named values: type, unit, range, conversion and age.",
+        "Keys of signals: type, unit, range, conversion and age.",
         _driver(
             "signals signal conversion base scale offset polynomial points states notAvailable"
         ),
@@ -195,13 +195,13 @@ FAMILIES: Mapping[str, Family] = {
     ),
     "polls": Family(
         "Keys of polls",
-        "Keys of repeated requests.",
+        "Keys of polls, the requests that URC repeats periodically.",
         _driver("polls poll offline"),
         {"language/flow.md": "Requests, replies and sequences"},
     ),
     "sequences": Family(
         "Keys of sequences",
-        "Keys of ordered steps: logins, start-up, arming.",
+        "Keys of sequences and their steps, for example for a login, a start-up or arming.",
         _driver("sequences sequence steps step waitUntil"),
         {"language/flow.md": "Requests, replies and sequences"},
     ),
@@ -245,7 +245,7 @@ FAMILIES: Mapping[str, Family] = {
     ),
     "world": Family(
         "Keys of the world",
-        "Keys of the small world of an emulated robot: body, sensors and fail-safe.",
+        "Keys of an emulated robot's world: body, sensors and fail-safe.",
         _driver("world worldBody worldFailsafe worldMap worldLaser worldCamera worldBattery"),
         {"language/world.md": "The world"},
     ),

@@ -19,7 +19,7 @@ class _Card(NamedTuple):
 
 
 def robots() -> str:
-    """Return the page with a card for each robot."""
+    """Return the gallery page with a card for each shipped robot."""
     found = []
     for file in sorted((ROOT / "robots").glob("*.yaml")):
         data = yaml.safe_load(file.read_text("utf-8"))
@@ -32,15 +32,15 @@ def robots() -> str:
 
 
 def widgets() -> str:
-    """Return the page with a card for each widget."""
+    """Return the gallery page with a card for each shipped widget."""
     found = []
     for file in sorted((ROOT / "widgets").glob("*/widget.yaml")):
         data = yaml.safe_load(file.read_text("utf-8"))
         name = file.parent.name
         found.append(_Card(f"`{name}`", data["summary"], f"widgets/{name}.png", f"widgets/{name}"))
     text = (
-        "Every widget in its first demo states. Each widget's page lists its inputs, outputs and"
-        " options."
+        "Every shipped widget, in the first states of its demo. Each widget's page lists its"
+        " inputs, outputs and options."
     )
     return _page("Widgets", text, found)
 

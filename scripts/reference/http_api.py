@@ -14,7 +14,7 @@ _REF = "#/components/schemas/"
 
 
 def page() -> str:
-    """Return the page: one section for each call and each shape."""
+    """Return the page of the HTTP API: one section for each call and each named schema."""
     document = json.loads(api_document())
     lines = [
         "# HTTP API reference",
@@ -70,7 +70,7 @@ def _text(schema: Schema) -> str:
 
 
 def _type(schema: Schema) -> str:
-    """Return the type in words, with links to shapes."""
+    """Return a schema's type in words, with links to named schemas."""
     if "$ref" in schema:
         name = schema["$ref"].removeprefix(_REF)
         return f"[{name}](#{name.lower()})"

@@ -77,7 +77,7 @@ def page(name: str) -> str:
 
 @cache
 def page_of() -> dict[str, str]:
-    """Return each definition's page."""
+    """Return the name of the reference page for each definition."""
     return {one: name for name, family in FAMILIES.items() for one in family.definitions}
 
 
@@ -95,7 +95,7 @@ def _definition(file: str, name: str, schema: Schema) -> Iterator[str]:
 
 
 def _shared(file: str, name: str, schema: Schema) -> list[str]:
-    """Return the transport's keys that are identical for every transport."""
+    """Return the keys of a transport that have the same schema in every transport."""
     common = definitions()[COMMON]
     if schema is common or "type" not in schema.get("properties", {}):
         return []
@@ -147,7 +147,7 @@ def _required_when_whole(schema: Schema) -> list[str]:
 
 
 def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
-    """Yield the description, type, allowed values and example of one value."""
+    """Yield the description, type, allowed values and example of the value in a schema."""
     whole = _whole(file, schema)
     yield from _paragraph(whole.get("description", ""))
     facts = [("type", _type(file, schema))]
@@ -221,7 +221,7 @@ def _type(file: str, schema: Any) -> str:
 
 
 def _kinds(file: str, schema: Schema) -> list[str]:
-    """Return the types that the branches of `if` allow."""
+    """Return the types allowed by the `then` and `else` branches of a schema's `if`."""
     if "if" not in schema or ("properties" in schema and not _refers(schema)):
         return []
     found: list[str] = []

@@ -28,7 +28,7 @@ class Limit(NamedTuple):
 
 
 def page() -> str:
-    """Return the page: one table for each package of the code."""
+    """Return the page: one table of limits for each package of `urc`."""
     lines = ["# Limits", "", "Fixed limits of URC, which bound its use of memory and time.", ""]
     every = list(limits())
     for part in sorted({one.part for one in every}):

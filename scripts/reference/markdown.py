@@ -9,7 +9,7 @@ _ROLE = re.compile(r"``([^`]+)``|`([^`]+)`")
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """Return the lines of a table, followed by an empty line."""
+    """Return the lines of a Markdown table, followed by an empty line."""
     titles = list(head)
     lines = [f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}"]
     lines += [f"| {' | '.join(map(cell, row))} |" for row in rows]
@@ -17,12 +17,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
 
 
 def cell(text: str) -> str:
-    """Return text for one cell of a table."""
+    """Return the text as one table cell: on one line, with escaped vertical bars."""
     return " ".join(text.split()).replace("|", "\\|")
 
 
 def fence(text: str, language: str = "text") -> list[str]:
-    """Return a fenced block, followed by an empty line."""
+    """Return the lines of a fenced code block, followed by an empty line."""
     return [f"```{language}", *text.rstrip("\n").split("\n"), "```", ""]
 
 

@@ -14,7 +14,7 @@ _SECTION = re.compile(r"^(Args|Raises|Returns|Yields):$", re.MULTILINE)
 
 
 def page() -> str:
-    """Return the page: functions, the interface of a robot, other classes."""
+    """Return the page: the functions first, then the classes."""
     lines = [
         "# Python client reference",
         "",
@@ -52,7 +52,7 @@ def _signature(value: Any) -> str:
 
 
 def _text(value: Any) -> Iterator[str]:
-    """Yield a docstring as Markdown: its sections become lists."""
+    """Yield the lines of a docstring in Markdown; sections such as `Raises:` become lists."""
     text = inspect.getdoc(value) or ""
     main, *rest = _SECTION.split(text)
     yield from (*plain(main).strip().splitlines(), "")

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
-"""Sign-in methods of devices and programs."""
+"""Sign-in methods whose secret is a device's key or a program's token."""
 
 
 class PrincipalStatus(NamedTuple):
@@ -50,7 +50,7 @@ class PrincipalStatus(NamedTuple):
     sign_ins: int = 0
     """Number of active sign-ins."""
     used_at: float | None = None
-    """UTC time of the last use, in seconds; None if unused."""
+    """UTC time of the last use, in seconds since 1970; None if never used."""
 
 
 def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStatus]:
@@ -162,8 +162,8 @@ def invite_person(
 def replace_passphrase(store: AccessStore, person: str, kept: str) -> int:
     """Set a person's passphrase; return the number of ended sign-ins.
 
-    The person's browser sign-ins and invitations end, because they may be the reason for the
-    change. Paired devices stay signed in.
+    The person's browser sign-ins and invitations end, because a stolen sign-in or invitation may be
+    the reason for the change. Paired devices stay signed in.
 
     Args:
         store: the store.
@@ -253,10 +253,10 @@ def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bo
 
 
 def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
-    """End restored codes and sign-ins that are unsafe to keep; return the number of sign-ins ended.
+    """End restored codes and browser sign-ins; return the number of ended sign-ins.
 
-    Since the backup, codes may have been used and browser sign-ins revoked. All codes and browser
-    sign-ins therefore end. People keep their passphrases.
+    After the backup was made, codes may have been used and browser sign-ins revoked. All codes and
+    browser sign-ins therefore end. People keep their passphrases.
 
     Args:
         store: the restored store.
@@ -271,7 +271,7 @@ def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
 
 
 def newest_time(store: AccessStore) -> float:
-    """Return the UTC time of the store's newest event, in seconds; 0 for an empty store."""
+    """Return the newest UTC time in the store, in seconds since 1970; 0 for an empty store."""
     directory = store.directory()
     people = (one.created_at for one in directory.principals.values())
     return max([0.0, *people, *(one.used_at for one in directory.sign_ins.values())])

@@ -61,11 +61,11 @@ class ServerCertificate(NamedTuple):
     ends: datetime
     """Time after which browsers reject the certificate."""
     is_new: bool
-    """Whether this call issued the certificate."""
+    """Whether the certificate is newly issued, not read from a file."""
 
 
 class CertificateAuthority:
-    """The certificate authority in one folder; only the owner can read its two keys."""
+    """A certificate authority in one folder; only the folder's owner can read its two keys."""
 
     def __init__(
         self, folder: Path, names: Sequence[str], now: datetime, *, optional: Sequence[str] = ()
@@ -74,11 +74,12 @@ class CertificateAuthority:
 
         Args:
             folder: folder for certificates and keys.
-            names: required names and addresses for the certificate. A name outside the limits of
-                the existing authority requires a new authority, which every device must then trust.
+            names: host names and addresses that the server's certificate must contain. A name
+                outside the limits of the existing authority requires a new authority, which every
+                device must then trust.
             now: time on this machine's clock, with a time zone.
-            optional: additional names and addresses. Names that the existing authority does not
-                permit are omitted and listed in `left_out`.
+            optional: names and addresses to add if the authority permits them. Names that the
+                existing authority does not permit are omitted and listed in `left_out`.
 
         Raises:
             AccessError: a file cannot be read or written, or a name is invalid.

@@ -1,4 +1,4 @@
-"""Access control for one server: identify requests, and check rights at each command.
+"""Identifies the senders of requests to one server, and checks their rights at each command.
 
 Layer 4. Each server has one local user in addition to the people, devices and programs in the
 store. The local user holds the start key and administers the server. The server prints an address
@@ -71,7 +71,7 @@ class AccessControl:
         self._program = program
         self.directory = Directory()
         self._used: dict[str, float] = {}
-        """UTC time of the last unrecorded use, by sign-in id."""
+        """UTC time of the last use that the store does not contain yet, by sign-in id."""
         self.load()
 
     # Identities
@@ -117,7 +117,7 @@ class AccessControl:
         return secret
 
     def best_role(self, who: Identity) -> Role | None:
-        """Return the highest current role of `who` for any robot, or None."""
+        """Return the highest current role of `who` for any robot; None if `who` has no role."""
         return self.directory.best_role(who, self.now())
 
     # Changes
@@ -142,7 +142,7 @@ class AccessControl:
                 log.warning("%s", error)
 
     async def reload(self) -> None:
-        """Read the store again and report the change."""
+        """Read the store again, and run the callbacks in `on_change`."""
         if self.store is not None:
             self._stored = await asyncio.to_thread(self.store.directory)
         self._merge()
@@ -153,7 +153,7 @@ class AccessControl:
         self._merge()
 
     async def end_sign_in(self, sign_in: str) -> None:
-        """End any sign-in; raise `AccessError` if it is unknown."""
+        """End a sign-in of any kind; raise `AccessError` if the sign-in is unknown."""
         if self._local.pop(sign_in, None) is None and self.store is not None:
             await asyncio.to_thread(self.store.close_sign_in, sign_in)
         await self.reload()

@@ -69,12 +69,12 @@ class SignIn(NamedTuple):
 
 
 class Identity(NamedTuple):
-    """The proven identity of a request, without any rights."""
+    """The proven identity of a request's sender, without the sender's rights."""
 
     principal: str = ""
     """The principal's id; "" for an unknown visitor."""
     sign_in: str = ""
-    """Id of the sign-in."""
+    """Id of the sign-in; "" for an unknown visitor."""
     name: str = ""
     kind: Kind | Literal[""] = ""
     way: Way | Literal[""] = ""
@@ -120,7 +120,7 @@ class Directory:
     def role(
         self, who: Identity, now: float, robot: str = "", tags: Collection[str] = ()
     ) -> Role | None:
-        """Return the current role of `who` for a robot, or None.
+        """Return the current role of `who` for a robot; None if `who` has no role.
 
         Args:
             who: the identity, possibly from an earlier directory.
@@ -131,7 +131,7 @@ class Directory:
         return role_at(self._grants(who, now), robot, tags)
 
     def best_role(self, who: Identity, now: float) -> Role | None:
-        """Return the highest current role of `who` for any robot, or None."""
+        """Return the highest current role of `who` for any robot; None if `who` has no role."""
         return highest(grant.role for grant in self._grants(who, now))
 
     def _grants(self, who: Identity, now: float) -> tuple[Grant, ...]:

@@ -31,13 +31,13 @@ class ExternalAccount(NamedTuple):
     """An account that its issuer has confirmed for one sign-in."""
 
     issuer: str
-    """Address of the provider."""
+    """Address of the identity provider that manages the account."""
     subject: str
     """The account's identifier at its issuer; never reused for another account."""
     name: str
     """Display name."""
     grants: tuple[Grant, ...]
-    """Grants derived from the current claims."""
+    """Grants that the claims of this sign-in give to the account."""
     ends_at: float
     """Latest UTC time at which the sign-in ends, in seconds since 1970."""
 
@@ -51,8 +51,8 @@ def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> P
         now: UTC time in seconds since 1970.
 
     Raises:
-        AccessError: the account has no grants. Grants from its earlier sign-ins are removed even in
-            this case.
+        AccessError: the account has no grants. Even then, grants from the account's earlier
+            sign-ins are removed.
     """
     with store.transaction() as base:
         row = base.execute(
@@ -124,7 +124,7 @@ def _renewed(
 
 
 def _extended(base: sqlite3.Connection, person: Principal, ends_at: float) -> Principal:
-    """Extend a person's rights to `ends_at`, unless they already end later."""
+    """Extend a person's rights to `ends_at`, unless the rights already end later."""
     ends_at = max(ends_at, person.ends_at or 0.0)
     base.execute("UPDATE principals SET ends_at = ? WHERE id = ?", (ends_at, person.id))
     return person._replace(ends_at=ends_at)

@@ -27,11 +27,11 @@ _TAG: Final = "#"
 
 
 class AccessError(UrcError):
-    """A failed request about people, devices or tokens."""
+    """Raised if a request about people, devices, programs or their credentials fails."""
 
 
 class Grant(NamedTuple):
-    """One role within one scope."""
+    """A role for all robots, for the robots with a tag, or for one robot."""
 
     role: Role
     scope: str = ALL

@@ -11,7 +11,7 @@ _DAY_S: Final = 24 * 3600.0
 
 
 class Lifetime(NamedTuple):
-    """Limits for one kind of sign-in."""
+    """Time limits for one kind of sign-in: in total, and without use."""
 
     longest_s: float | None
     """Maximum duration, in seconds; None for no limit."""

@@ -55,7 +55,7 @@ class _Flow(NamedTuple):
 
 
 class OidcSignIn:
-    """One server's sign-ins through its provider."""
+    """Signs people in to one server through its identity provider."""
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class OidcSignIn:
         return OidcRedirect(f"{metadata.authorization}{joint}{urlencode(query)}", binding)
 
     async def finish(self, answer: Mapping[str, str], binding: str, now: float) -> ExternalAccount:
-        """Return the account of a browser that the provider has sent back.
+        """Return the account with which the person signed in at the provider.
 
         Args:
             answer: the redirect's query parameters.
@@ -140,7 +140,7 @@ class OidcSignIn:
         )
 
     async def _claims(self, response: Mapping[str, Any], nonce: str, now: float) -> dict[str, Any]:
-        """Return the ID token's claims; add the account's claims if the rules need them."""
+        """Return the ID token's claims; if the rules need more claims, request and add them."""
         token = response.get("id_token")
         if not isinstance(token, str):
             raise AccessError("the provider sent no ID token: is the scope 'openid' allowed?")

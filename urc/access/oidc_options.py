@@ -55,9 +55,9 @@ class OidcOptions:
     issuer: str
     """The provider's address, exactly as written in its tokens."""
     client_id: str
-    """This server's identifier at the provider."""
+    """Client ID that the provider has assigned to this server."""
     client_secret: str = field(default="", repr=False)
-    """This server's secret at the provider; "" for a public client."""
+    """Client secret that the provider has assigned to this server; "" for a public client."""
     title: str = ""
     """Text on the sign-in button, such as the school's name."""
     address: str = ""

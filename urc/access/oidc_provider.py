@@ -42,7 +42,7 @@ class ProviderMetadata(NamedTuple):
     token: str
     """Address for exchanging codes for tokens."""
     keys: str
-    """Address of the keys."""
+    """Address of the provider's public keys (``jwks_uri``)."""
     userinfo: str = ""
     """Address for requesting more claims; "" if the provider has no such address."""
     is_secret_posted: bool = False
@@ -161,7 +161,7 @@ class OidcProvider:
         headers: Mapping[str, str] | None = None,
         credentials: httpx2.BasicAuth | None = None,
     ) -> dict[str, Any]:
-        """Return the JSON object in the response to a request."""
+        """Send a request to the provider, and return the JSON object in the response."""
         if self._trust is None:
             # Run in a thread, because reading the certificate authorities takes tens of
             # milliseconds.

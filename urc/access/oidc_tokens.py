@@ -24,7 +24,7 @@ _LONGEST_TOKEN: Final = 65536
 
 
 class UnknownKey(AccessError):
-    """The error for a token that was signed with an unknown key."""
+    """Raised for a token that was signed with an unknown key."""
 
 
 def verified_claims(
@@ -113,7 +113,7 @@ def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _key(data: Mapping[str, Any]) -> Any:
-    """Return a key for checking signatures; raise `ValueError` for an unsuitable key."""
+    """Return the key in `data` for checking signatures; raise `ValueError` if it is unsuitable."""
     from joserfc.jwk import ECKey, OKPKey, RSAKey
 
     kinds: dict[object, type[RSAKey | ECKey | OKPKey]] = {"RSA": RSAKey, "EC": ECKey, "OKP": OKPKey}

@@ -23,7 +23,7 @@ _READABLE_BY_OTHERS: Final = stat.S_IRWXO
 
 
 class OptionsFile:
-    """The content of one file."""
+    """The content of a YAML file with sign-in options, and the positions of its values."""
 
     def __init__(self, file: str, keys: Collection[str]) -> None:
         """Read the file.
@@ -47,7 +47,7 @@ class OptionsFile:
     def fault(
         self, path: DocumentPath, message: str, code: str = "wrong-value", *, is_key: bool = False
     ) -> ProblemsError:
-        """Return the error for the value at `path`."""
+        """Return the error for the value or key at `path`, with its line number."""
         return ProblemsError([self._document.problem(path, code, message, key=is_key)])
 
     def check_keys(self, path: DocumentPath, data: Collection[str], keys: Collection[str]) -> None:

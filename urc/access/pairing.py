@@ -32,14 +32,14 @@ class Origin(NamedTuple):
     place: str = ""
     """Network address."""
     agent: str = ""
-    """Names of the browser and system."""
+    """Names of the browser and the operating system."""
 
 
 UNKNOWN_ORIGIN: Final = Origin()
 
 
 class NewSignIn(NamedTuple):
-    """A new sign-in with its secret."""
+    """A new sign-in with its principal, and with its secret, which the store does not contain."""
 
     principal: Principal
     sign_in: SignIn
@@ -49,7 +49,7 @@ class NewSignIn(NamedTuple):
 def pair(
     store: AccessStore, code: str, name: str, *, now: float, origin: Origin = UNKNOWN_ORIGIN
 ) -> NewSignIn:
-    """Add a device with an invitation's code; return its sign-in, which serves as its key.
+    """Add a device with an invitation's code; return the sign-in that is the device's key.
 
     Args:
         store: the store.

@@ -21,7 +21,7 @@ class Passkey(NamedTuple):
     id: str
     """Credential id in base64url; unique, but not secret."""
     principal: str
-    """Id of the owner."""
+    """Id of the person who owns the passkey."""
     name: str
     """Display name, such as “Ann's phone”."""
     host: str
@@ -43,14 +43,14 @@ def check_number(count: int) -> None:
 
 
 class PasskeyTable:
-    """Access to the passkeys in the store."""
+    """Reads and changes the passkeys in the store."""
 
     def __init__(self, store: AccessStore) -> None:
         """Use the table in `store`."""
         self._store = store
 
     def add(self, passkey: Passkey) -> Passkey:
-        """Add a passkey; return it with its normalized name.
+        """Add a passkey; return the passkey as stored, with normalized spaces in its name.
 
         Raises:
             AccessError: the name is invalid, the passkey is already registered, or the owner is not

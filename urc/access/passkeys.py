@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 
 class RelyingParty(NamedTuple):
-    """This server as seen by browsers."""
+    """The host name and the origins under which browsers reach this server."""
 
     host: str
     """Host name to which passkeys belong (the RP ID)."""
@@ -239,7 +239,7 @@ class Passkeys:
             return self._pending.begin(ceremony, place, self._clock())
 
     def _finish(self, answer: Mapping[str, Any], expected: _Ceremony) -> str:
-        """End and return the challenge in a response; raise `AccessError` if it is unknown."""
+        """Use up and return the challenge in a response; raise `AccessError` if it is unknown."""
         challenge = _challenge_of(answer)
         with self._lock:
             found = self._pending.finish(challenge, self._clock())

@@ -31,9 +31,9 @@ LONGEST: Final = 256
 WRONG: Final = "the name or the passphrase is wrong"
 _FEWEST_DIFFERENT: Final = 4
 _JUDGED: Final = 16
-"""Number of characters used to estimate guesses; 16 characters take at most 0.1 s."""
+"""Number of first characters that zxcvbn rates; rating 16 characters takes at most 0.1 s."""
 _FEWEST_POINTS: Final = 2
-"""Minimum score of the estimate; 2 of 4 means more than a million guesses."""
+"""Minimum score from zxcvbn, 0 to 4; a score of 2 means more than a million guesses."""
 _OWN_WORDS: Final = ("urc", "robot", "robots", "controller")
 _HASHER: Final = argon2.PasswordHasher()
 _NEVER: Final = (
@@ -98,8 +98,8 @@ def is_stale(kept: str) -> bool:
 def person_by_passphrase(store: AccessStore, name: str, passphrase: str) -> str:
     """Return the id of the person with this name and passphrase; "" if either is wrong.
 
-    Checking takes equally long for an unknown name and for a wrong passphrase. A hash with outdated
-    parameters is replaced. The call blocks for about 50 ms.
+    The check takes the same time for an unknown name as for a wrong passphrase. A hash with
+    outdated parameters is replaced. The call blocks for about 50 ms.
 
     Raises:
         AccessError: the store cannot be used.

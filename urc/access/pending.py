@@ -1,8 +1,8 @@
-"""Pending sign-ins, which briefly wait for their second request and can be used only once.
+"""Pending sign-ins, which wait some minutes for their second request and can be used only once.
 
 Layer 4. Pure. A passkey signs a challenge from the server. An OpenID Connect provider sends the
-browser back with a state from the server. The limits restrict the memory that unknown visitors can
-occupy.
+browser back with a state from the server. The limits bound the memory that visitors who have not
+signed in can occupy.
 """
 
 import ipaddress

@@ -17,7 +17,7 @@ from urc.access.options_file import OptionsFile
 __all__ = ["KEYS", "ProxiedRequest", "TrustedProxy", "read_proxy_options", "without_proxy_headers"]
 
 SHORTEST_SECRET: Final = 32
-"""Minimum length of the secret; 32 random letters cannot be guessed."""
+"""Minimum length of the secret, in characters; 32 random letters cannot be guessed."""
 KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
 """All permitted keys of the file."""
 _HEADER: Final = re.compile(r"[A-Za-z0-9-]{1,64}")
@@ -48,7 +48,7 @@ class ProxiedRequest(NamedTuple):
     """One request's headers after the proxy check."""
 
     headers: list[tuple[bytes, bytes]]
-    """The headers without proxy headers."""
+    """The request's headers, without those that contain a proxy's secret or a user name."""
     proxy: TrustedProxy | None = None
     """The proxy whose secret was correct, or None."""
     user: str = ""

@@ -36,11 +36,11 @@ __all__ = [
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
 """Maximum number of sign-ins, not counting tokens; a new sign-in closes the least recently used
-one."""
+sign-in."""
 MOST_PRINCIPALS: Final = 5000
 MOST_INVITATIONS: Final = 1000
 MOST_SIGN_INS_OF_ONE: Final = 100
-"""Maximum number of sign-ins per person; a new sign-in closes the least recently used one. One
+"""Maximum number of sign-ins per person; a new sign-in closes the least recently used sign-in. One
 person therefore cannot end the sign-ins of others."""
 MOST_CODES_OF_ONE: Final = 8
 """Maximum number of valid pairing codes per person; above the limit, the oldest code ends."""
@@ -150,7 +150,7 @@ class AccessStore:
         return str(instance)
 
     def directory(self) -> Directory:
-        """Return the current directory."""
+        """Return a snapshot of all principals and sign-ins in the store."""
         with self._lock, self._readable():
             principals = {row[0]: _principal(row) for row in self._rows("principals")}
             sign_ins = {row[0]: SignIn(*row) for row in self._rows("sign_ins")}
@@ -170,7 +170,7 @@ class AccessStore:
         commands: Iterable[str] = (),
         ends_at: float | None = None,
     ) -> Principal:
-        """Add a principal and return it.
+        """Add a principal with a new id, and return the principal.
 
         Args:
             kind: the principal's kind.
@@ -303,7 +303,7 @@ class AccessStore:
         return sign_in, secret
 
     def touch_all(self, used: Mapping[str, float]) -> None:
-        """Record the last use of sign-ins by id, and ignore removed sign-ins."""
+        """Record the last use of each sign-in in `used`, by id; ignore removed sign-ins."""
         with self._change():
             self._base.executemany(
                 "UPDATE sign_ins SET used_at = max(used_at, ?) WHERE id = ?",
@@ -433,7 +433,7 @@ class AccessStore:
 
 
 def parse_name(name: str) -> str:
-    """Return a name with normalized spaces.
+    """Return a name with single spaces between its words, and no other spaces.
 
     Raises:
         AccessError: the name is empty or too long, or contains invisible characters.

@@ -12,13 +12,13 @@ from typing import Final, NamedTuple
 __all__ = ["FREE", "LONGEST_S", "MOST", "Throttle"]
 
 FREE: Final = 5
-"""Number of failures that cause no wait."""
+"""Number of failures before the first wait."""
 LONGEST_S: Final = 30.0
 """Longest wait between two attempts, in seconds."""
 FORGET_S: Final = 900.0
 """Time after which failures are forgotten, in seconds."""
 MOST: Final = 4096
-"""Maximum number of counts; above the limit, the least recently used is dropped."""
+"""Maximum number of counts; above the limit, the least recently used count is dropped."""
 
 
 class _Bucket(NamedTuple):

@@ -18,7 +18,7 @@ _SLACK_S: Final = 120.0
 
 
 class KnownTime(NamedTuple):
-    """The time of a past event."""
+    """A past event and its time; a correct clock shows a later time."""
 
     at: float
     """UTC time in seconds since 1970."""

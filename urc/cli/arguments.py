@@ -40,7 +40,7 @@ _SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
 
 
 class _Exit(Exception):
-    """An exception that ends parsing after help text or an error message has been printed."""
+    """Raised to end parsing after help text or an error message has been printed."""
 
 
 class _ArgumentParser(argparse.ArgumentParser):
@@ -97,7 +97,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         "--settings",
         dest="settings_file",
         metavar="FILE",
-        help="YAML file with lines of the form NAME: VALUE",
+        help="YAML file of settings, one NAME: VALUE on each line",
     )
 
 

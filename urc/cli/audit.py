@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print, export or check the entries; return 1 if they cannot be trusted."""
+    """Print, export or check the audit log; return 1 if its entries cannot be trusted."""
     from urc.runtime.audit_check import check
 
     if arguments.check:

@@ -19,7 +19,7 @@ _WAIT_S = 2.0
 
 
 def audit_access(data: Path, command: str, **about: object) -> None:
-    """Record a command's change to people, devices, programs or roles.
+    """Write an audit entry for a command that has changed people, devices, programs or roles.
 
     Args:
         data: the data folder.
@@ -30,7 +30,7 @@ def audit_access(data: Path, command: str, **about: object) -> None:
 
 
 def audit_packages(command: str, packages: Iterable[object]) -> None:
-    """Record a command's change to packages or repositories.
+    """Write an audit entry for a command that has changed packages or repositories.
 
     Args:
         command: the change, such as ``install``.

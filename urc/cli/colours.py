@@ -1,6 +1,6 @@
 """Colours of terminal output, according to https://no-color.org and the type of terminal.
 
-Layer 6. Colours never add information: the coloured words themselves carry the meaning.
+Layer 6. Colours never add information, because the coloured words already state it.
 """
 
 import os
@@ -20,7 +20,7 @@ _CODES: dict[str, str] = {
     "quiet": "2",
     "title": "1",
 }
-"""Parameters of SGR control sequences (ECMA-48, 8.3.117)."""
+"""SGR parameters of each style, for control sequences (ECMA-48, 8.3.117)."""
 
 
 def is_terminal(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:
@@ -43,7 +43,7 @@ def has_colours(stream: TextIO, environment: Mapping[str, str] = os.environ) -> 
 
 
 def painted(text: str, style: Style, stream: TextIO | None = None) -> str:
-    """Return the text in a style; return it unchanged if the stream has no colours.
+    """Return the text in a style, or unchanged if the stream has no colours.
 
     The default stream is standard output.
     """

@@ -44,7 +44,7 @@ from urc.web.serve.service_manager import ServiceManager, answers
 __all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""Function that returns a profile's command-line settings.
+"""Function that returns the settings of a profile from the command line.
 
 The function raises `UrcError` if the settings are invalid.
 """
@@ -79,7 +79,7 @@ class DashboardAddress:
     recordings: Path | None = None
     """Folder for recordings of all sessions; None disables recording."""
     recorder: ServerRecorder | None = None
-    """Recorder that writes audit entries about recordings."""
+    """Object that writes audit entries about recordings; None to write no entries."""
     tls: TlsOptions = PLAIN
     """HTTPS certificate, and public names of a web server in front of this server."""
     sign_in: SignInOptions = field(default_factory=SignInOptions)
@@ -108,7 +108,7 @@ def run_dashboard(
         profiles: profiles of the initial robots.
         place: address, folders and options of the dashboard.
         is_simulated: whether emulated robots replace the real robots.
-        on_ready: callback, called once with the start addresses.
+        on_ready: function that is called once, with the start addresses, when the server is ready.
         given: function that returns a profile's command-line settings.
         is_dev: whether to serve developer pages and reload changed documents.
         faults: faults to inject into emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
@@ -191,14 +191,14 @@ async def _serve(
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:
-    """Open the audit log until `stack` closes; return the log, and a `place` that records to it."""
+    """Open the audit log until `stack` closes; return it and a `place` with its recorder."""
     audit = AuditLog(own_folder(place.data) / FILE)
     stack.callback(audit.close)
     return audit, replace(place, recorder=ServerRecorder(audit.add))
 
 
 def _options(place: DashboardAddress) -> DashboardOptions:
-    """Return the application options that are set on the command line."""
+    """Return the dashboard's options that the command line determines."""
     return DashboardOptions(
         allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
         tiles=place.tiles,
@@ -231,7 +231,7 @@ async def _robot_at_start(
     profile: Profile,
     faulty: FaultInjector | None,
 ) -> Robot:
-    """Return a profile's robot; with `faulty`, emulate it from the start, even without a page."""
+    """Return a profile's robot; with `faulty`, emulate the robot even before a page opens."""
     robot = _first(factory, profile)
     if faulty is None:
         return robot
@@ -339,7 +339,7 @@ async def _session(
 async def _kept(
     folder: Path, audit: ServerRecorder | None, session: Session
 ) -> AsyncIterator[None]:
-    """Record a session. Report a failed recording and continue without it."""
+    """Record a session; if the recording fails, report the failure and keep the session open."""
     from urc.runtime.recording.recorder import recorded  # rarely needed
 
     profile = session.profile

@@ -98,7 +98,7 @@ def _invite_phone(address: str) -> None:
 
 
 def _port(arguments: argparse.Namespace) -> int:
-    """Return the given port, otherwise the default port if it is free, otherwise 0 for any port."""
+    """Return the given port, else the default port if it is free, else 0 for any free port."""
     if arguments.port is not None:
         return int(arguments.port)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET

@@ -97,7 +97,9 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
         for one in devices
     ]
     head = ("NAME", "ROLES", "LAST USE")
-    return show(rows, [head, *table], arguments, "no devices yet: 'urc devices pair' pairs one")
+    return show(
+        rows, [head, *table], arguments, "no devices yet: 'urc devices pair' pairs a device"
+    )
 
 
 def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
@@ -131,7 +133,7 @@ def invite_device(
 
     Args:
         store: the open store.
-        address: address of the server for other devices; "" if no server is running.
+        address: address at which devices reach the server; "" if no server is running.
         roles: roles of the device; empty if the device has an owner.
         name: suggested name; "" lets the user choose a name on the device.
         owner: person who owns the device.

@@ -133,7 +133,7 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
 async def _nearby(
     profiles: Sequence["Profile"], settings: Sequence[Mapping[str, "Value"]], typed: set[str]
 ) -> tuple[list[Row], str]:
-    """Return the open ports of shipped robots on this machine or on the given hosts.
+    """Return the shipped robots whose ports are open, on this machine or on the given hosts.
 
     Settings without a given value have their default values.
 

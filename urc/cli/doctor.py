@@ -41,7 +41,7 @@ EXTRAS = {
     "mcap": ("record", "recordings of sessions"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
-"""Maps each optional package to the extra that installs it, and to the package's purpose."""
+"""Extra and purpose of each optional package, by package name."""
 OPTIONAL = {
     "google-re2": "patterns without provably linear run time; without this package, URC refuses"
     " them",
@@ -157,7 +157,7 @@ def _authority(data: Path) -> str:
     try:
         root = x509.load_pem_x509_certificate(file.read_bytes())
     except FileNotFoundError:
-        return "not needed yet: URC creates it for the first server that other machines can reach"
+        return "not needed yet: created for the first server that other machines can reach"
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
         raise UrcError(f"{file} cannot be used: {reason}") from error

@@ -7,7 +7,7 @@ __all__ = ["Misuse", "explain"]
 
 
 class Misuse(UrcError):
-    """Invalid use of the command line, with exit code 2."""
+    """Raised for invalid use of the command line; the exit code is 2."""
 
 
 def explain(error: Exception, program: str) -> int:
@@ -32,7 +32,7 @@ def explain(error: Exception, program: str) -> int:
 
 
 def _mistake(bug: Exception) -> str:
-    """Return one line about a bug in URC, for developers."""
+    """Return a one-line message that asks the user to report a bug in URC."""
     from traceback import extract_tb  # slow to load, and needed only here
 
     frames = extract_tb(bug.__traceback__)

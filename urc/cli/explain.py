@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the help page for a code, or one line for each code."""
+    """Print the help page for a problem code; without a code, list all codes."""
     every = pages()
     if arguments.code is None:
         width = max(map(len, every))

@@ -24,9 +24,9 @@ __all__ = ["FaultInjector", "add_faults"]
 
 
 _LONGEST: Final = 4096
-"""Maximum length of a line, in bytes; longer lines are dropped."""
+"""Maximum length of a typed command, in bytes; longer commands are dropped."""
 _MOST_WAITING: Final = 64
-"""Maximum number of unread lines; additional lines are dropped."""
+"""Maximum number of typed commands in the queue; additional commands are dropped."""
 
 
 async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
@@ -198,7 +198,7 @@ class FaultInjector:
         return f"faults: {'; '.join(found) or 'none'}"
 
     def obey(self, line: str) -> None:
-        """Execute a typed command and print the injected faults."""
+        """Execute a typed fault command, then print all injected faults."""
         verb, _, rest = line.strip().partition(" ")
         try:
             if verb == "fault" and rest:

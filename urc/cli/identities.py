@@ -105,7 +105,7 @@ def opened(data: Path | None) -> Iterator["AccessStore"]:
 
 
 def words_of(arguments: argparse.Namespace, verb: str, *names: str) -> list[str]:
-    """Return the words after the action; raise `Misuse` unless there is one word for each name."""
+    """Return the arguments after the action; raise `Misuse` unless there is one for each name."""
     words: list[str] = arguments.words
     if len(words) != len(names):
         wanted = " ".join(("urc", verb, arguments.action, *names))
@@ -218,7 +218,7 @@ def ends_at(text: str) -> float | None:
 
 
 def local_time(at: float | None, without: str = "never") -> str:
-    """Return a UTC time, given in seconds, as local time to the minute."""
+    """Return a UTC time, given in seconds since 1970, as local time without seconds."""
     return without if at is None else time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
 
 
@@ -242,10 +242,10 @@ def show(
     arguments: argparse.Namespace,
     empty: str,
 ) -> int:
-    """Print a list, and return 0.
+    """Print a list as a table or as JSON lines, and return 0.
 
     Args:
-        rows: one object for each entry, for JSON.
+        rows: one JSON object for each entry.
         table: the header row, followed by one row of strings for each entry.
         arguments: parsed arguments, including `--format`.
         empty: message for an empty list.

@@ -16,13 +16,13 @@ from urc.cli.output import complain
 __all__ = ["print_link", "qr_lines", "server_address"]
 
 _BORDER = 4
-"""Width of the quiet zone in modules (ISO/IEC 18004, 6.3.8)."""
+"""Width of a QR code's empty border (quiet zone), in modules (ISO/IEC 18004, 6.3.8)."""
 _DARK, _LIGHT = "16", "231"
 """Black and white of the 256-colour palette, which terminal themes do not change."""
 
 
 def server_address(data: Path, address: str | None) -> str:
-    """Return the server's address for other devices, without a trailing slash.
+    """Return the address at which other devices reach the server, without a trailing slash.
 
     Args:
         data: data folder that contains the addresses of running servers.
@@ -63,8 +63,8 @@ def print_link(data: Path, address: str, page: str, code: str) -> None:
 def qr_lines(text: str, columns: int) -> Iterator[str]:
     """Yield the lines of a QR code, black on white on any background.
 
-    Each line shows two rows of modules. If the terminal is too narrow or cannot show half blocks,
-    the function yields nothing.
+    Each line of text shows two rows of the QR code's modules. If the terminal is too narrow or
+    cannot show half blocks, the function yields nothing.
     """
     import segno
 

@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the requested packages and their dependencies."""
+    """Print the packages that the user has installed, with their dependencies."""
     from urc.cli.output import json_text
     from urc.cli.packages import known_entries, open_store
     from urc.packages.install import withdrawn_lines

@@ -14,12 +14,12 @@ __all__ = ["GROUPS", "VERBS", "main", "module_of"]
 
 _FIRST_STEPS: dict[str, str] = {
     "urc demo": "drive emulated robots in the browser",
-    "urc demo --phone": "the same, with a QR code for a phone on this network",
+    "urc demo --phone": "drive emulated robots on a phone, with a QR code",
     "urc serve FILE": "drive your robot, described in a YAML file",
     "urc validate FILE": "check this file, without the robot",
     "urc doctor": "check this machine",
 }
-"""Commands for new users."""
+"""Example commands for new users, with descriptions."""
 
 _INTERRUPTED = 130
 """A shell's exit code after SIGINT: 128 + 2."""
@@ -89,7 +89,7 @@ def _first_steps() -> str:
             "",
             *lines,
             "",
-            "'urc --help' lists all subcommands. 'urc SUBCOMMAND --help' explains one.",
+            "'urc --help' lists all subcommands. 'urc SUBCOMMAND --help' explains a subcommand.",
         )
     )
 

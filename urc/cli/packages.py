@@ -136,7 +136,7 @@ def _working(title: str) -> Iterator[Callable[[str], None]]:
 
 
 def known_entries() -> "list[IndexEntry]":
-    """Return the entries of all stored indexes, without network requests."""
+    """Return all package versions in the stored indexes, without network requests."""
     from urc.packages.names import PackageError
 
     try:
@@ -199,7 +199,7 @@ def is_agreed_to(
     arguments: argparse.Namespace,
     question: str,
 ) -> bool:
-    """Ask the user, unless `--yes` is given. New permissions require an additional option.
+    """Ask the user; with `--yes`, check instead that the options accept all new permissions.
 
     Args:
         difference: changes from the version in use; None if there is no version to compare.
@@ -234,7 +234,7 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
 
 
 def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
-    """Return the version in use of an installed package, or None.
+    """Return the version of a package that dashboards use; None if no version is installed.
 
     If a robot and a driver have the same name, the result may have a different kind from `key`.
     """

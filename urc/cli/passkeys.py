@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["list_passkeys", "remove_passkey"]
 
 _SHOWN: int = 8
-"""Number of characters of an id that a table shows."""
+"""Number of first characters of a passkey's id that the list shows."""
 
 
 def list_passkeys(store: "AccessStore", arguments: argparse.Namespace) -> int:

@@ -107,7 +107,7 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
         rows,
         [head, *table],
         arguments,
-        "no people yet: 'urc people add NAME --role drive' adds one",
+        "no people yet: 'urc people add NAME --role drive' adds a person",
     )
 
 
@@ -119,7 +119,7 @@ def _credentials(one: "PrincipalStatus") -> str:
 
 
 def _add(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """Add a person with roles."""
+    """Add a person with the roles from `--role`, and print the next step."""
     (name,) = words_of(arguments, "people", "NAME")
     roles = roles_in(arguments.roles)
     if not roles:

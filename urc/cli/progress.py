@@ -23,7 +23,7 @@ _ERASE = "\r\x1b[K"
 
 
 class Progress:
-    """A context manager with a status line; `step` sets the line's text.
+    """Shows a status line while the context is active; `step` sets the line's text.
 
     A thread prints the line, because the work may block. The command must not print other output
     before the context ends.
@@ -61,7 +61,7 @@ class Progress:
             self._thread.join()
 
     def step(self, detail: str = "") -> None:
-        """Start the next step; `detail` names it, for example ``puppet`` for a robot."""
+        """Begin the next step; `detail` is its name, such as ``puppet`` for a robot."""
         self._done += 1
         self._detail = detail
 

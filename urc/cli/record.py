@@ -94,7 +94,7 @@ async def _record_server(arguments: argparse.Namespace) -> int:
 
 
 async def _until_begun(recorder: "Recorder") -> None:
-    """Wait until the file exists, and print its name."""
+    """Wait until the file of the recording exists, and print its name."""
     while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread sets them
         await asyncio.sleep(_SOON_S)
     if recorder.fault:

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Remove the package; keep the dependencies of other packages."""
+    """Remove the package with its dependencies, except those that other packages need."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_requirement

@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIME",
         help="start at 90s, 2m …",
     )
-    parser.add_argument("--loop", action="store_true", help="restart playback at the end")
+    parser.add_argument(
+        "--loop", action="store_true", help="when the recording ends, play it again from the start"
+    )
     add_host(parser)
     add_port(parser)
     add_foxglove(parser)

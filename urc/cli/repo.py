@@ -92,7 +92,7 @@ def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
         "--tokens",
         metavar="FILE",
         type=Path,
-        help="serve: file of the upload tokens; token: file to change",
+        help="serve: file with the upload tokens; token: token file to change",
     )
     parser.add_argument(
         "--may",
@@ -128,7 +128,7 @@ def _add_publisher_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _days(text: str) -> int:
-    """Parse a number of days; raise an argparse error with a one-line message."""
+    """Return a number of days from 1 to 365; raise an argparse error for other text."""
     if text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 365:
         return int(text)
     raise argparse.ArgumentTypeError(f"expected 1 to 365 days, found {text[:20]!r}")
@@ -206,7 +206,7 @@ def _index(arguments: argparse.Namespace) -> int:
 
 
 def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
-    """Return the index's signer; None if there is no key."""
+    """Return the signer of the index; None if the maintainer has no key."""
     from urc.cli.packages import signer
     from urc.packages.index_head import IndexSigner
 
@@ -215,7 +215,7 @@ def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
 
 
 def _withdraw(arguments: argparse.Namespace) -> int:
-    """Withdraw a version, with a reason."""
+    """Withdraw a version of a package, with a reason for its users."""
     if not (arguments.why or "").strip():
         raise Misuse("'urc repo withdraw' requires --why with a reason for users of the version")
     return _note(arguments, arguments.why.strip())

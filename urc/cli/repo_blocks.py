@@ -19,7 +19,7 @@ __all__ = ["block", "blocks", "unblock"]
 
 
 def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """Add an entry to a repository's block list."""
+    """Block packages: add an entry to a repository's block list."""
     from urc.packages import block_builder
 
     if not (arguments.why or "").strip():
@@ -31,7 +31,7 @@ def block(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
 
 def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
-    """Remove an entry from a repository's block list."""
+    """Unblock packages: remove an entry from a repository's block list."""
     from urc.packages import block_builder
 
     folder, entry = _entry(arguments)
@@ -41,7 +41,7 @@ def unblock(arguments: argparse.Namespace, codec: "IndexSigner | None") -> int:
 
 
 def _entry(arguments: argparse.Namespace) -> "tuple[Path, Block]":
-    """Return the folder and the entry from DIR PACKAGE [RANGE]; raise `Misuse` on failure."""
+    """Return the folder and the entry from DIR PACKAGE [RANGE]; raise `Misuse` if invalid."""
     import msgspec
 
     from urc.packages.blocks import Block

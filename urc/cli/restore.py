@@ -13,9 +13,9 @@ EXAMPLE = "urc restore urc-backup.zip"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: file, data folder and options."""
-    parser.add_argument("file", metavar="FILE", type=Path, help="file of 'urc backup'")
+    parser.add_argument("file", metavar="FILE", type=Path, help="backup file from 'urc backup'")
     parser.add_argument(
-        "--replace", action="store_true", help="replace the existing data of the folder"
+        "--replace", action="store_true", help="replace the data that the folder already contains"
     )
     parser.add_argument(
         "--people-only",

@@ -58,7 +58,7 @@ def _bundled(folder: Path, name: str) -> Any:
 
 
 def _relinked(node: Any, here: str, root: str) -> Any:
-    """Return a schema whose references point to the definitions in the bundle of `root`."""
+    """Return a schema with references that are valid inside the bundle of the schema `root`."""
     if isinstance(node, list):
         return [_relinked(item, here, root) for item in node]
     if not isinstance(node, dict):

@@ -38,7 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line arguments: profile, command and the command's arguments."""
     add_profile(parser)
     add_server(parser)
-    parser.add_argument("command", metavar="COMMAND", help="a command of the robot's driver")
+    parser.add_argument(
+        "command", metavar="COMMAND", help="name of a command in the robot's driver"
+    )
     parser.add_argument("words", metavar="ARG=VALUE", nargs="*", default=[], help="its arguments")
     parser.add_argument(
         "--hold",
@@ -218,7 +220,7 @@ async def _given(
     hold_s: float | None,
     interlock: "MotionInterlock | None",
 ) -> dict[str, "Reading"]:
-    """Send or hold the command; return the values in its reply."""
+    """Send the command, or hold it for the given time; return the values in the reply."""
     if hold_s is None:
         return dict((await session.command(command.name, values)).values)
     from urc.protocol.requests.encode import BadArgument, check_arguments

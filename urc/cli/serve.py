@@ -41,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_host(parser)
     add_port(parser)
     add_foxglove(parser)
-    _add_names(parser, "--allow-host", "additional host name of this machine")
+    _add_names(
+        parser, "--allow-host", "additional host name under which clients reach this machine"
+    )
     add_tls(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting to them"
@@ -161,7 +163,8 @@ def _add_sign_in(parser: argparse.ArgumentParser) -> None:
         "--without-sign-in",
         dest="is_open",
         action="store_true",
-        help="let everyone on the network watch and drive; each page shows a red warning",
+        help="let everyone on the network watch and drive without a sign-in; each page shows a red"
+        " warning",
     )
 
 

@@ -52,8 +52,8 @@ def refuse_local_options(arguments: argparse.Namespace, options: Sequence[str]) 
 
     Args:
         arguments: the parsed arguments.
-        options: options that work only without a server, such as ``--wire``. The name of each
-            attribute is derived from its option.
+        options: options that work only without a server, such as ``--wire``. The attribute of an
+            option has the option's name, with ``_`` in place of ``-``.
     """
     if arguments.server is None:
         for option in ("--token-file", "--authority", "--allow-unencrypted"):

@@ -18,7 +18,7 @@ __all__ = ["complete_settings", "settings_given"]
 def settings_given(
     profiles: Sequence[Profile], arguments: argparse.Namespace, *, allows_any_port: bool = False
 ) -> list[tuple[dict[str, Value], tuple[str, ...]]]:
-    """Return the settings of each profile, and the names of settings without a value.
+    """Return each profile's settings, and the names of its settings without a value.
 
     The order of precedence is `--set`, the environment, the settings file, and the profile's
     defaults. With several profiles, a setting applies to each profile that declares it.
@@ -74,7 +74,7 @@ def _warn_of_secrets(profiles: Sequence[Profile], arguments: argparse.Namespace)
 
 
 def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[str, Value]:
-    """Return the values of all settings; raise `Misuse` with the names of missing settings."""
+    """Return a value for every setting; raise `Misuse` with the names of missing settings."""
     ((values, missing),) = settings_given([profile], arguments)
     if missing:
         words = " ".join(f"--set {name}=…" for name in missing)

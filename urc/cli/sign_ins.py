@@ -99,7 +99,7 @@ def _end(one: "SignIn") -> float | None:
 
 
 def _close(store: "AccessStore", arguments: argparse.Namespace) -> int:
-    """End the selected sign-ins."""
+    """End the sign-ins selected by id, by name or with `--all`."""
     from urc.access.administration import KEYS, end_sign_ins
 
     chosen = (bool(arguments.words), arguments.of is not None, arguments.all)

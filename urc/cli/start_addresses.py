@@ -126,7 +126,7 @@ def access_for(data: Path | None = None, *, is_open: bool = False) -> "Access":
 def announce(
     stack: ExitStack | AsyncExitStack, data: Path, ready_dashboard: ReadyDashboard
 ) -> None:
-    """Register the dashboard for this user's other programs until `stack` closes."""
+    """Until `stack` closes, register the dashboard, so that `urc send` finds it."""
     from urc.runtime.running_servers import RunningServer, announced
 
     found = ready_dashboard.certificate

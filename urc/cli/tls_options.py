@@ -28,7 +28,7 @@ class TlsOptions(NamedTuple):
     """Host names, with optional ports, for which another web server provides HTTPS."""
 
     def around(self, app: "ASGIApp") -> "ASGIApp":
-        """Return an application that treats the public names as secure."""
+        """Return an application that treats requests to the public names as HTTPS."""
         from urc.web.serve.tls_port import BehindProxy
 
         return BehindProxy(app, self.public_names) if self.public_names else app
@@ -79,7 +79,7 @@ def add_tls(parser: argparse.ArgumentParser) -> None:
 
 
 def tls_of(arguments: argparse.Namespace) -> TlsOptions:
-    """Return the kind of certificate and the public names.
+    """Return the HTTPS options from the command line.
 
     Raises:
         Misuse: the options contradict each other, or a name is invalid.

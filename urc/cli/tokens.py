@@ -102,7 +102,7 @@ def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
         rows,
         [head, *table],
         arguments,
-        "no tokens yet: 'urc tokens add NAME --role watch' adds one",
+        "no tokens yet: 'urc tokens add NAME --role watch' adds a token",
     )
 
 

@@ -27,13 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "transport",
         metavar="TRANSPORT",
         nargs="?",
-        help="ssh transport, required if the profile has several",
+        help="name of the ssh transport, required if the profile has several",
     )
     parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint without asking")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show the host key and store it after confirmation; return 1 if it is not stored."""
+    """Show the host key, and store the key after confirmation; return 1 if nothing is stored."""
     from urc.cli.event_loop import run_loop
 
     profile = load(arguments.profile)
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _transport(profile: "Profile", named: str | None) -> str:
-    """Return the ssh transport with this name, or the only ssh transport."""
+    """Return the ssh transport with this name; without a name, return the only ssh transport."""
     choices = [name for name, spec in profile.driver.transports.items() if spec.type == "ssh"]
     if not choices:
         raise Misuse(f"{profile.name} has no ssh transport: nothing to trust")

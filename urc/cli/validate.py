@@ -60,9 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", choices=FORMATS, default="text", help="format of the report (default: text)"
     )
     parser.add_argument(
-        "--strict", action="store_true", help="exit with code 1 for warnings, not only for errors"
+        "--strict", action="store_true", help="exit with code 1 even if there are only warnings"
     )
-    parser.add_argument("--no-tests", action="store_true", help="skip the tests of the documents")
+    parser.add_argument(
+        "--no-tests", action="store_true", help="do not run the tests in the documents"
+    )
     parser.add_argument(
         "--coverage", action="store_true", help="list commands, polls and messages without a test"
     )
@@ -89,7 +91,7 @@ def _exit_code(report: _Report, arguments: argparse.Namespace) -> int:
 
 
 def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
-    """Check now and after every change to a document; on Ctrl-C, return the last exit code."""
+    """Check the documents now and after every change; on Ctrl-C, return the last exit code."""
     from urc.runtime.file_watch import FileWatcher, wait_for_change
 
     code = 0
@@ -223,7 +225,7 @@ def _print_coverage(report: _Report) -> None:
         tested = coverage.total - len(coverage.untested)
         print(f"{coverage.file}: {tested} of {coverage.total} commands, polls and messages tested")
         for kind, name in coverage.untested:
-            print(f"  no test of {kind} {name}")
+            print(f"  no test covers {kind} {name}")
 
 
 def _summary(report: _Report) -> str:

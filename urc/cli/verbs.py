@@ -1,4 +1,4 @@
-"""The subcommands of `urc`, by name and by heading of the help text.
+"""The subcommands of `urc` with descriptions, under the headings of the help text.
 
 Layer 6. For a fast start, this module imports nothing.
 """

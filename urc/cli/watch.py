@@ -166,7 +166,7 @@ class _Printer:
                 await self._writer.write(stream, "".join(f"{line}\n" for line in lines))
 
     async def tell_losses(self, dropped: int, *, is_last: bool) -> None:
-        """Print the number of lost updates, at intervals and at the end."""
+        """Print the number of lost updates, at most once per interval, and at the end."""
         now_s = time.monotonic()
         if dropped == self._dropped or not (is_last or now_s >= self._losses_told_s + _LOSSES_S):
             return

@@ -28,12 +28,12 @@ class ServerAddress(NamedTuple):
 
     @property
     def url(self) -> str:
-        """Address without a path."""
+        """Address of the server without a path, such as ``https://robots.lab:8080``."""
         return f"{self.scheme}://{self.netloc}"
 
     @property
     def origin(self) -> str:
-        """Value of the ``Origin`` header of the server's own pages."""
+        """Value of the ``Origin`` header that the server's own pages send."""
         return self.url
 
     def socket(self, robot: str) -> str:
@@ -43,7 +43,7 @@ class ServerAddress(NamedTuple):
         return f"{scheme}://{self.netloc}/ws{query}"
 
     def stop(self, robot: str) -> str:
-        """Return the address of a robot's STOP."""
+        """Return the HTTP address to which a request stops a robot and latches STOP."""
         return f"{self.url}/api/v1/robots/{quote(robot, safe='')}/stop"
 
     def alarms(self, robot: str, verb: str) -> str:

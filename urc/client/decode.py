@@ -48,7 +48,7 @@ def decode_message(text: str | bytes) -> ServerMessage | None:
 
 
 def signals_of(hello: HelloMessage) -> dict[str, Signal]:
-    """Return the robot's signals by name, in index order."""
+    """Return the robot's signals by name, in the order of their indexes in messages."""
     return {row.name: _signal(row) for row in hello.signals}
 
 

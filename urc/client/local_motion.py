@@ -43,7 +43,7 @@ class LocalMotion(ProgramControls):
     """The controls of one connected robot."""
 
     def __init__(self, session: Session) -> None:
-        """Prepare the controls; the robot cannot move before `running`."""
+        """Prepare the controls; the robot cannot move before the context `running` is active."""
         super().__init__()
         self._session = session
         self._clock = LoopClock()
@@ -103,7 +103,7 @@ class LocalMotion(ProgramControls):
     # -- STOP
 
     async def stop(self) -> bool:
-        """Stop the robot and latch; return whether the robot accepted the stop within 2 s."""
+        """Stop the robot and latch STOP; return whether the robot accepted the stop within 2 s."""
         if not self.controller.can_move:
             raise UrcError("this robot has no motion to stop")
         self.controller.stop(_US.name)
@@ -190,7 +190,7 @@ class LocalMotion(ProgramControls):
             self.sticks[command].end(why)
 
     def _interlocked(self, why: str) -> None:
-        """Refuse motion for the reason `why`; "" allows motion again."""
+        """Refuse motion for the reason `why`; if `why` is "", allow motion again."""
         self._session.latch(why or self.controller.lease.latched)
         if why:
             self.end_all(why)

@@ -1,6 +1,7 @@
 """An event loop in a daemon thread, for programs without ``async``.
 
-Layer 5. The thread never prevents the process from exiting. Every call has a time limit.
+Layer 5. The thread never prevents the process from exiting. Every call into the thread has a time
+limit.
 """
 
 import asyncio

@@ -57,7 +57,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
-        """Send one tick; return the reason for ending motion, or ""."""
+        """Send one tick; return the reason why motion must end, or "" if motion may continue."""
 
     @abstractmethod
     def release(self, command: str) -> None:

@@ -1,7 +1,7 @@
 """Readings of a robot from a hub: latest values, waits, streams and the log.
 
-Layer 5. Both openings of a robot share this code. Each has a `urc.runtime.hub.Hub`: the hub of a
-session, or a hub filled by a server's messages.
+Layer 5. Both openings of a robot share this code. Each opening has a `urc.runtime.hub.Hub`: the hub
+of a session, or a hub filled by a server's messages.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ class HubReadings:
         return self.hub.links
 
     def latest(self, name: str, /) -> Sample | None:
-        """Return a signal's newest reading, or None.
+        """Return a signal's newest reading; None before the first reading.
 
         Raises:
             UrcError: the robot has no signal with this name.
@@ -116,7 +116,7 @@ class HubReadings:
                 lines = list(hub.notes)[-new:] if new else []
                 count = hub.notes_count
                 if lost := new - len(lines):
-                    text = f"lines of the log lost, because this program is too slow: {lost}"
+                    text = f"log lines lost, because this program reads the log too slowly: {lost}"
                     yield LogEntry(lines[0].time_s, "warning", "urc", text)
                 for line in lines:
                     yield line

@@ -168,7 +168,7 @@ class RemoteRobot(HubReadings):
 
     @property
     def is_connected(self) -> bool:
-        """Whether the connection to the server is up."""
+        """Whether the connection to the server is open."""
         return self._socket.is_up
 
     @property
@@ -178,7 +178,7 @@ class RemoteRobot(HubReadings):
 
     @property
     def operator(self) -> str:
-        """Name of the page or program that has the controls; "" for none."""
+        """Name of the page or program that has the controls; "" if they are free."""
         lease = self.motion.lease
         return lease.holder.name if lease is not None and lease.holder is not None else ""
 
@@ -193,8 +193,8 @@ class RemoteRobot(HubReadings):
         The server limits the wait, except for sequences.
 
         Raises:
-            CommandFailed: the command failed; the exception has a `code` and a message. With the
-                code ``disconnected``, the robot may have executed the command.
+            CommandFailed: the command failed; the exception has a `code` and a message. After a
+                failure with the code ``disconnected``, the robot may have executed the command.
         """
         try:
             plain = plain_arguments(arguments)

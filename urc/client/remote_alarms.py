@@ -18,7 +18,7 @@ Post = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
 
 
 class RemoteAlarms:
-    """The non-normal alarms of one robot."""
+    """The alarms of one robot, except alarms in the normal state."""
 
     def __init__(self, post: Post) -> None:
         """Begin without alarms.
@@ -71,7 +71,7 @@ class RemoteAlarms:
         return await self._act("unshelve", {"signals": signals})
 
     def update(self, message: AlarmsMessage) -> None:
-        """Apply the changes in a message."""
+        """Update the list with the changes in a server's message."""
         if message.full:
             self.rows.clear()
         for signal in message.gone:

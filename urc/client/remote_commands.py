@@ -51,14 +51,14 @@ class RemoteCommands:
         return reply
 
     def handle(self, message: ReplyMessage | TokenMessage) -> None:
-        """Pass a message to the waiting call."""
+        """Pass a reply or a confirmation token from the server to the call that waits for it."""
         if isinstance(message, ReplyMessage):
             _resolve(self._replies.get(message.id), message)
         else:
             _resolve(self._tokens.get(message.id), message.token)
 
     def lost(self, reason: str) -> None:
-        """Fail all pending commands."""
+        """Make all pending commands fail for the given reason."""
         failed = CommandFailed("disconnected", f"{reason}; the outcome is unknown")
         waiting: list[asyncio.Future[Any]] = [*self._replies.values(), *self._tokens.values()]
         for pending in waiting:

@@ -238,7 +238,7 @@ class RemoteMotion(ProgramControls):
 
 
 def plain_arguments(arguments: Mapping[str, Reading]) -> Arguments:
-    """Return arguments in a form that the server accepts.
+    """Return a held command's arguments as JSON values that the server accepts.
 
     Raises:
         UrcError: an argument is not a number, text, a boolean, None or a list of these.

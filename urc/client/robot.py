@@ -1,9 +1,9 @@
 """A robot's interface for Python programs, with the same behaviour in every opening.
 
 Layer 5. `urc.connect` connects to a robot from this process, and `urc.client.open` uses a server's
-robot. Both return this interface, so a program switches between them by changing one line. The
-tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the same test
-cases against both functions.
+robot. Both functions return this interface, so a change of one line switches a program between
+them. The tests `tests/e2e/test_robot_interface.py` and `tests/e2e/test_robot_driving.py` run the
+same test cases against both functions.
 """
 
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -22,7 +22,7 @@ class ConnectionLost(UrcError):
     """The server is unreachable, or has ended the connection permanently."""
 
     is_final = False
-    """Whether further attempts to connect are useless."""
+    """Whether every further attempt to connect would fail."""
 
 
 class AccessDenied(ConnectionLost):
@@ -50,7 +50,7 @@ class RobotInterface(Protocol):
 
     @property
     def operator(self) -> str:
-        """Name of the page or program that has the controls; "" for none."""
+        """Name of the page or program that has the controls; "" if they are free."""
 
     @property
     def latched_by(self) -> str:
@@ -78,7 +78,7 @@ class RobotInterface(Protocol):
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition; the current reading counts.
+        """Return the first reading that meets the condition, which may be the current reading.
 
         Args:
             name: the signal's name.

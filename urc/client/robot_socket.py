@@ -3,7 +3,7 @@
 Layer 5. Theory of operation. `run` reopens the socket after increasing delays with jitter, so that
 many programs do not reconnect at the same moment. Pings detect a dead connection within 4 s, but
 motion does not rely on pings. The writer sends a message only after the kernel has accepted the
-previous one. Meanwhile, a newer tick of the same command replaces the waiting tick.
+previous message. Meanwhile, a newer tick of the same command replaces the waiting tick.
 """
 
 import asyncio
@@ -85,7 +85,7 @@ class RobotSocket:
     # -- sending
 
     def send(self, message: msgspec.Struct) -> bool:
-        """Send a message; return whether the connection was up."""
+        """Queue a message if the connection is up; return whether the connection is up."""
         if self.is_up:
             self._outbox.append(_encode(message))
             self._filled.set()
@@ -117,7 +117,7 @@ class RobotSocket:
     # -- the connection
 
     async def run(self) -> None:
-        """Keep the connection open until cancelled.
+        """Keep the connection open, and reopen it after each loss, until cancelled.
 
         Raises:
             ConnectionLost: the first attempt failed, or the server ended the connection
@@ -139,7 +139,7 @@ class RobotSocket:
             wait_s = min(wait_s * 2, _LONGEST_WAIT_S)
 
     async def _converse(self) -> ConnectionLost:
-        """Connect, and pass on messages until the connection is lost; return the reason."""
+        """Connect, and pass received messages to the callback until a loss; return the reason."""
         try:
             async with self._connected() as line:
                 self._line = line

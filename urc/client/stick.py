@@ -46,10 +46,10 @@ class MotionEnded(UrcError):
 
 
 class MotionLine(Protocol):
-    """The path of ticks to the robot; each opening has its own implementation."""
+    """Sends the ticks of sticks to the robot; each opening has its own implementation."""
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
-        """Send one tick; return the reason for ending motion, or ""."""
+        """Send one tick; return the reason why motion must end, or "" if motion may continue."""
 
     def release(self, command: str) -> None:
         """Stop the command, because its stick was released."""
@@ -68,10 +68,10 @@ class Stick:
         """Name of the held command."""
         self.valid_s = valid_s
         self.ended = ""
-        """Reason why motion ended; "" while the stick works."""
+        """Reason why motion ended; "" while the stick can move the robot."""
         self._input: tuple[Mapping[str, Reading], float] | None = None
         self._moved_s: float | None = None
-        """Time of the last sample if the stick had input, in seconds; otherwise None."""
+        """Time of the last sample in seconds, if the stick had input then; otherwise None."""
         self._changed = asyncio.Event()
 
     def __call__(self, /, **arguments: Reading) -> None:
@@ -129,7 +129,7 @@ class Stick:
         self._changed.set()
 
     def end(self, reason: str) -> None:
-        """End all motion of this stick; keep the first reason."""
+        """End all motion of this stick; after several calls, the first reason remains."""
         self.ended = self.ended or reason
         self._input = None
         self.wake()
@@ -137,8 +137,8 @@ class Stick:
     def expire(self, reason: str, now_s: float) -> None:
         """End all motion because the guard received no input in time.
 
-        If this program was blocked, the guard's report may be handled before the sampler runs. The
-        block is then the reason.
+        If this program was blocked, the guard's report may be handled before the sampler runs.
+        Motion has then ended because the program was blocked.
 
         Args:
             reason: the reason if this program was not blocked.

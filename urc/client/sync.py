@@ -7,9 +7,9 @@
         with robot.drive() as stick:
             stick.hold(2.0, speed=0.3)
 
-Layer 5. Each robot has its own daemon thread, which runs an event loop. Every call has a time
-limit. Leaving the context, an exception or Ctrl-C releases the stick first, so the robot stops. A
-blocked program does not renew its input, so the robot also stops.
+Layer 5. Each robot has its own daemon thread, which runs an event loop. Every call of a method has
+a time limit. Leaving the context, an exception or Ctrl-C releases the stick first, so the robot
+stops. A blocked program does not renew its input, so the robot also stops.
 """
 
 import asyncio
@@ -128,7 +128,7 @@ class SyncRobot:
 
     @property
     def operator(self) -> str:
-        """Name of the page or program that has the controls; "" for none."""
+        """Name of the page or program that has the controls; "" if they are free."""
         return self._robot.operator
 
     @property
@@ -160,7 +160,7 @@ class SyncRobot:
         *,
         timeout: float | None = None,
     ) -> Sample:
-        """Return the first reading that meets the condition; the current reading counts.
+        """Return the first reading that meets the condition, which may be the current reading.
 
         Args:
             name: the signal's name.
@@ -212,7 +212,8 @@ class SyncRobot:
         The robot stops when the context ends, for any reason.
 
         Raises:
-            UrcError: the robot has no such held command, or it has several and `command` is "".
+            UrcError: the robot has no such held command, or `command` is "" and the robot has
+                several.
             MotionEnded: the controls were refused, or motion ended before the context did.
         """
         driving = partial(self._robot.drive, command, valid_s=valid_s)
@@ -247,7 +248,7 @@ class SyncRobot:
         return SyncAlarms(found, self._thread)
 
     def _here(self, read: Callable[[], _Result]) -> _Result:
-        """Call `read` on the event loop, and return its result."""
+        """Call `read` in the thread of the event loop, and return its result."""
 
         async def call() -> _Result:
             return read()
@@ -286,7 +287,7 @@ class SyncAlarms:
 
     @property
     def rows(self) -> dict[str, AlarmRow]:
-        """All non-normal alarms, by signal."""
+        """All alarms that are not in the normal state, by signal."""
         return self._thread.call(self._read(lambda: dict(self._alarms.rows)))
 
     def acknowledge(self, *signals: str) -> tuple[str, ...]:
@@ -333,7 +334,7 @@ class SyncStick:
 
     @property
     def ended(self) -> str:
-        """Reason why motion ended; "" while the stick works."""
+        """Reason why motion ended; "" while the stick can move the robot."""
         return self._stick.ended
 
     def __call__(self, /, **arguments: Reading) -> None:

@@ -1,9 +1,9 @@
 """The archive format: reproducible ZIP files without compression.
 
 Entries are stored without compression, sorted by path, and with a fixed date in 1980. The same
-files therefore produce the same bytes on every machine, regardless of zlib. No entry can be larger
-than its archive. Archives that differ from this form are rejected. URC uses the module `zipfile`
-only to parse archives, never to extract them.
+files therefore produce the same bytes on every machine, with any version of zlib. No entry can be
+larger than its archive. Archives in any other form are rejected. URC uses the module `zipfile` only
+to parse archives, never to extract them.
 """
 
 import re
@@ -109,7 +109,7 @@ def _folders(path: str) -> Iterable[str]:
 
 
 class ArchiveLimits(NamedTuple):
-    """Limits of an archive."""
+    """Limits of an archive: number of files, bytes in one file, and bytes in all files."""
 
     entries: int
     entry_bytes: int
@@ -169,7 +169,7 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
 
 
 def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
-    """Check the end record and the number of entries before parsing the directory."""
+    """Check a ZIP file's end record and number of entries, before its directory is parsed."""
     if not data.startswith(b"PK"):
         raise PackageError(f"{name}: this is not a package: expected a ZIP archive")
     end = data[-_END_BYTES:]

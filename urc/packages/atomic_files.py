@@ -24,7 +24,7 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
     Args:
         file: the file's path; missing folders are created.
         data: complete content of the file.
-        work: folder on the same file system, for incomplete files.
+        work: folder for incomplete files, on the same file system as `file`.
 
     Raises:
         OSError: the write failed, for example because the disk is full. The file keeps its old
@@ -50,7 +50,7 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
 
 
 def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
-    """Create or replace a folder with these files in one step.
+    """Create a folder with exactly these files, or replace the folder, in one step.
 
     WARNING: the files are not synced to the disk, because their archives remain available. Readers
         must compare the files with their archives.

@@ -1,4 +1,4 @@
-"""The block list in a repository's ``blocks.json``, for the maintainer's commands."""
+"""Changes the block list in a repository's ``blocks.json``, for the maintainer's commands."""
 
 from pathlib import Path
 from secrets import token_hex

@@ -22,7 +22,7 @@ _Text = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class Block(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One entry: a package with a range of versions, an archive, or all of a signer's packages."""
+    """One entry, which blocks versions of a package, one archive, or all packages of a signer."""
 
     why: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
     """Reason shown to users, on one line."""
@@ -47,7 +47,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def subject(self) -> str:
-        """Readable subject of the entry."""
+        """Subject of the entry as text: a package and its versions, an archive or a signer."""
         if self.package:
             return self.package if self.versions == "*" else f"{self.package} {self.versions}"
         return f"archive {self.sha256}" if self.sha256 else f"packages signed by {self.key}"
@@ -58,8 +58,8 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
         Args:
             name: package, such as ``drivers/puppet``.
             version: its version.
-            digest: digest of its archive.
-            signature: signature of its archive, or None.
+            digest: digest of the package's archive.
+            signature: signature of the package's archive, or None.
         """
         if self.package:
             spanned = parse_range(self.versions).spans(parse_version(version))
@@ -78,7 +78,7 @@ class BlockList(msgspec.Struct, frozen=True):
 
 
 class BlockFile(msgspec.Struct, frozen=True):
-    """A signed block list in a separate file."""
+    """A signed block list in a file, for machines without a network."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]

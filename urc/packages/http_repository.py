@@ -27,7 +27,7 @@ class HttpResponse(NamedTuple):
     """A web server's response."""
 
     status: int
-    """Status code; for downloads, 200, 304 for an unchanged file, or 404 for a missing file."""
+    """Status code; a download returns only 200, 304 (unchanged file) or 404 (missing file)."""
     etag: str
     body: bytes
 

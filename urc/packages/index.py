@@ -31,7 +31,7 @@ _Text = Annotated[str, msgspec.Meta(max_length=500)]
 
 
 class IndexEntry(msgspec.Struct, frozen=True):
-    """One version of one package."""
+    """One version of a package, as listed in an index."""
 
     kind: Annotated[str, msgspec.Meta(pattern=rf"\A({'|'.join(KINDS)})\Z")]
     name: Annotated[str, msgspec.Meta(pattern=rf"\A{NAME.pattern}\Z")]
@@ -47,7 +47,7 @@ class IndexEntry(msgspec.Struct, frozen=True):
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
     """Signature, if any."""
     withdrawn: _Text | msgspec.UnsetType = msgspec.UNSET
-    """Reason for the withdrawal."""
+    """Reason for the withdrawal, if the version was withdrawn."""
     provenance: Provenance | msgspec.UnsetType = msgspec.UNSET
     """Origin, if declared."""
 
@@ -139,7 +139,7 @@ def read_index(data: bytes, where: str) -> Index:
 
 
 def in_order(entries: Iterable[IndexEntry]) -> tuple[IndexEntry, ...]:
-    """Return the entries, sorted as in an index."""
+    """Return the entries sorted by package and version, as in an index."""
     return tuple(sorted(entries, key=lambda entry: (entry.key, entry.number)))
 
 

@@ -9,7 +9,7 @@
     DIR/index/head.json                   number and digest of the index, signed by the maintainer
     DIR/drivers/puppet/urcpm.json         the package's description in the form of the URC thesis
 
-Only files in the index are served.
+A repository's server sends only the files that the index lists.
 """
 
 import shutil
@@ -262,7 +262,7 @@ def _blocks(folder: Path) -> BlockList | msgspec.UnsetType:
 
 
 def _before(folder: Path) -> tuple[Index | None, int]:
-    """Return the current index and its number; a damaged index becomes None."""
+    """Return the current index, or None if it is damaged, and the number of the index."""
     data = _content(folder / INDEX, INDEX_BYTES + 1)
     with suppress(PackageError):
         if data is not None:
@@ -366,7 +366,7 @@ def _entry(folder: Path, file: Path, known: Mapping[str, IndexEntry]) -> IndexEn
 
 
 def read_signature(archive: Path) -> Signature | None:
-    """Return an archive's signature, or None; raise `PackageError` for a damaged signature."""
+    """Return an archive's signature; None if unsigned; raise `PackageError` if it is damaged."""
     file = archive.with_suffix(_SIGNED)
     try:
         with open(file, "rb") as opened:

@@ -67,7 +67,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
         return self.signature if isinstance(self.signature, Signature) else None
 
     def left_s(self, now_s: float) -> float:
-        """Return the remaining validity, in seconds."""
+        """Return the time until the head expires, in seconds; negative after the expiry."""
         end = datetime.strptime(self.expires, _TIME).replace(tzinfo=UTC)
         return end.timestamp() - now_s
 

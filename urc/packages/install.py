@@ -185,12 +185,12 @@ def without_blocked(found: Found, store: Store) -> Found:
 
 
 def _blocked(entry: IndexEntry, store: Store) -> list[str]:
-    """Return the reasons for blocking a version, one per line."""
+    """Return one line for each reason why a version is blocked."""
     return store.blocks.lines(lock_of(entry.key, {entry.key: entry}), lambda _: entry.signed)
 
 
 def _remark(entry: IndexEntry) -> str:
-    """Return the repository's remarks on a version."""
+    """Return the repository's remarks on a version: withdrawal and declared origin, or ""."""
     said: list[str] = []
     if entry.why_withdrawn:
         said.append(phrase("WITHDRAWN: {why}", why=entry.why_withdrawn))

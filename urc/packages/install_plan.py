@@ -14,7 +14,7 @@ class InstallPlan(NamedTuple):
 
     lock: Lock
     archives: Mapping[str, bytes]
-    """New archives by digest, for storage."""
+    """Archives that must be added to the store, by digest."""
     origins: Mapping[str, str]
     """Source of each package, by package name, such as ``drivers/puppet``."""
     signatures: Mapping[str, Signature]

@@ -18,7 +18,7 @@ _PACKAGES_MOST: Final = 128
 
 
 class Pin(msgspec.Struct, frozen=True):
-    """One package in a lock."""
+    """The version of one package in a lock, with the digest and the size of its archive."""
 
     version: Annotated[str, msgspec.Meta(max_length=64)]
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
@@ -26,7 +26,7 @@ class Pin(msgspec.Struct, frozen=True):
 
 
 class Lock(msgspec.Struct, frozen=True):
-    """A package with all its dependencies, isolated from other packages."""
+    """A package and all its dependencies, each in exactly one version."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     root: str

@@ -23,7 +23,7 @@ NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
 class PackageError(UrcError):
-    """A failed operation on a package, a repository or the store; the message is one line."""
+    """Raised if an operation on packages or repositories fails; the message is one line."""
 
 
 class PackageId(NamedTuple):
@@ -38,7 +38,7 @@ class PackageId(NamedTuple):
 
 
 class PackageRequirement(NamedTuple):
-    """A requirement from a command line."""
+    """A package name with an optional kind and version range, as typed by the user."""
 
     kind: str
     """The package's kind; "" for any kind."""

@@ -25,7 +25,7 @@ class Package(NamedTuple):
     manifest: Manifest
     files: dict[str, bytes]
     data: bytes
-    """Content of the archive."""
+    """Bytes of the package's archive."""
     digest: str
     """SHA-256 of the archive, as 64 hexadecimal digits."""
 

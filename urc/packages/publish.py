@@ -1,4 +1,4 @@
-"""Uploads of packages to a repository."""
+"""Uploads packages to a repository."""
 
 import base64
 import ipaddress
@@ -21,7 +21,7 @@ class Published(msgspec.Struct, frozen=True):
     """A repository's response to an upload."""
 
     listed: str
-    """Listed version, such as ``drivers/puppet 1.0.0``."""
+    """Package version that the repository lists, such as ``drivers/puppet 1.0.0``."""
     sha256: str
     is_new: bool = True
     """Whether the version is new; False if the repository already listed the version."""

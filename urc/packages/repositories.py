@@ -96,7 +96,7 @@ class Repository:
             if kept is None:
                 raise
             self._trust.check(kept[1].said)
-            self._complain(f"{error}; its last index is used")
+            self._complain(f"{error}; its last stored index is used")
             return kept[0].packages
 
     def refresh(self) -> Index:
@@ -177,7 +177,7 @@ class Repository:
             )
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return an archive from the repository."""
+        """Download the archive of an index entry from the repository."""
         return fetch_archive(self.name, entry)
 
     def forget(self) -> None:

@@ -32,7 +32,7 @@ Entries = Mapping[PackageId, Sequence[IndexEntry]]
 
 
 def choose(entries: Entries, required: PackageRequirement) -> PackageId:
-    """Return the package for a requirement.
+    """Return the only available package that matches a requirement's kind and name.
 
     Raises:
         PackageError: no package has this name, or packages of several kinds have this name.
@@ -55,7 +55,7 @@ def choose(entries: Entries, required: PackageRequirement) -> PackageId:
 
 
 def resolve(root: PackageId, wanted: str, entries: Entries) -> dict[PackageId, IndexEntry]:
-    """Return one version of `root` and of each dependency.
+    """Return a compatible version of `root` and of each direct or indirect dependency.
 
     Args:
         root: the requested package.
@@ -94,7 +94,7 @@ class _Provider(AbstractProvider[_Need, IndexEntry, PackageId]):
         information: Mapping[PackageId, Iterator[Any]],
         backtrack_causes: Sequence[Any],
     ) -> tuple[bool, PackageId]:
-        """Prefer packages that caused an earlier conflict."""
+        """Return a sort key that puts packages with an earlier conflict first."""
         causes = {cause.requirement.key for cause in backtrack_causes}
         return identifier not in causes, identifier
 

@@ -1,7 +1,7 @@
 """HTTP server for a repository's listed files and for the lists in figure B.3 of the URC thesis.
 
-Only files in the index are served. The server reads the index again after each change, so new
-packages need no restart.
+The server sends only the files that the index lists. The server reads the index again after each
+change, so new packages need no restart.
 """
 
 import asyncio

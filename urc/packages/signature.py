@@ -43,7 +43,7 @@ _LONGEST: Final = 100
 
 
 class Signature(msgspec.Struct, frozen=True):
-    """A signature in an index."""
+    """A publisher's or maintainer's signature, with the name and the public key."""
 
     by: Annotated[str, msgspec.Meta(min_length=1, max_length=_LONGEST)]
     """Publisher's name, which URC does not verify; only the key identifies the publisher."""
@@ -94,7 +94,7 @@ SignatureOf = Callable[[str], Signature | None]
 
 
 class Signer:
-    """The holder of a private key."""
+    """A publisher or maintainer who signs with a private key."""
 
     def __init__(self, by: str, private: "Ed25519PrivateKey") -> None:
         self.by = by
@@ -187,7 +187,7 @@ def _no_key(file: Path) -> str:
 
 
 def _statement(package: PackageId, version: str, sha256: str, by: str) -> bytes:
-    """Return the statement to sign.
+    """Return the statement that a publisher signs for a package version.
 
     The statement's parts contain no line ends, so different statements have different bytes.
     """

@@ -17,7 +17,7 @@ _ENDINGS: Final = (".urcof", ".zip")
 
 
 class Source(Protocol):
-    """A source of packages."""
+    """A source of packages, such as a repository, a bundle, an archive or a folder."""
 
     @property
     def name(self) -> str:
@@ -64,7 +64,7 @@ class FileSource:
         return tuple(self._packages.values())
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return an archive from the source."""
+        """Return the archive of an index entry from this source."""
         return self._packages[entry.sha256].data
 
 
@@ -157,7 +157,7 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
 def offered(
     found: Mapping[PackageId, list[tuple[IndexEntry, Source]]],
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
-    """Return all versions except withdrawn versions."""
+    """Return the available packages without their withdrawn versions."""
     kept = {key: [one for one in some if not one[0].why_withdrawn] for key, some in found.items()}
     return {key: some for key, some in kept.items() if some}
 

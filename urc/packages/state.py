@@ -14,7 +14,7 @@ __all__ = ["StoreState"]
 
 
 class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The state of a store, without the archives."""
+    """The state of a store: installed locks, pinned keys, waivers and undo steps."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
@@ -43,7 +43,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
 
     def with_back(self, lock: Lock) -> "StoreState":
-        """Return the state before the update to `lock`. A second call undoes the first call.
+        """Return the state without the update to `lock`. A second call undoes the first call.
 
         Raises:
             PackageError: no update to `lock` is recorded.
@@ -61,7 +61,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next(kept, self.before, None)
 
     def without_key(self, key: PackageId) -> "StoreState":
-        """Return the state without a package's pinned key; raise `PackageError` on failure."""
+        """Return the state without a package's pinned key; raise `PackageError` if it has none."""
         if str(key) not in self.keys:
             known = ", ".join(sorted(self.keys)) or "none"
             raise PackageError(f"no key is pinned for {key}; keys are pinned for: {known}")
@@ -73,7 +73,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return msgspec.structs.replace(self, waived=tuple(sorted({*self.waived, str(key)})))
 
     def without_waiver(self, key: PackageId) -> "StoreState":
-        """Return the state that requires a package's signature; raise `PackageError` on failure."""
+        """Return the state without a package's waiver; raise `PackageError` if it has no waiver."""
         if str(key) not in self.waived:
             known = ", ".join(self.waived) or "none"
             raise PackageError(f"{key} has no waiver; waivers exist for: {known}")
@@ -83,11 +83,11 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def kept(self) -> tuple[Lock, ...]:
-        """All locks with archives that are still needed."""
+        """All installed locks, and the locks that an undo step can restore."""
         return (*self.installed, *self.before.values())
 
     def check(self, plan: InstallPlan) -> None:
-        """Raise `PackageError` for a plan that contradicts the state.
+        """Raise `PackageError` for a plan that contradicts installed packages or pinned keys.
 
         The state rejects different bytes of a known version, invalid signatures, and keys that
         differ from the pinned key. The state also rejects a missing signature, except for the

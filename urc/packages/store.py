@@ -255,7 +255,7 @@ class StoreTransaction:
         self._store.write_state(self._store.state().with_update(old, plan))
 
     def back(self, lock: Lock) -> Lock:
-        """Restore the lock from before the update to `lock`; raise `PackageError` on failure."""
+        """Undo the update to `lock`; raise `PackageError` if no update to `lock` is recorded."""
         state = self._store.state().with_back(lock)
         old = self._store.state().before[lock.digest]
         self._store.check_use(old)
@@ -282,7 +282,7 @@ class StoreTransaction:
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
     def forget_key(self, key: PackageId) -> None:
-        """Delete a package's pinned key; raise `PackageError` on failure.
+        """Delete a package's pinned key; raise `PackageError` if no key is pinned.
 
         The next installation accepts any valid signature of the package.
         """

@@ -23,7 +23,7 @@ __all__ = ["SubmissionRefused", "SubmissionResult", "take"]
 
 
 class SubmissionRefused(PackageError):
-    """A rejected upload, with its HTTP status."""
+    """Raised for a rejected upload, with the HTTP status of the response."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -31,11 +31,11 @@ class SubmissionRefused(PackageError):
 
 
 class SubmissionResult(NamedTuple):
-    """Result of an upload."""
+    """Result of an accepted upload: its index entry, and whether the version is new."""
 
     entry: IndexEntry
     is_new: bool
-    """False if the repository already listed this version."""
+    """Whether the version is new; False if the repository already listed the version."""
 
 
 def take(

@@ -23,7 +23,7 @@ _TOKEN: Final = re.compile(r"urc_[A-Za-z0-9_-]{43}")
 
 
 class UploadToken(msgspec.Struct, frozen=True):
-    """The stored form of a token."""
+    """An upload token as stored: its name, its digest, and the packages that it may publish."""
 
     name: str
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]

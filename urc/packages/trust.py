@@ -32,7 +32,7 @@ class _Pin(msgspec.Struct, frozen=True):
 
 
 class PinnedKey:
-    """One repository's pinned key."""
+    """The pinned key of one repository, stored in a file."""
 
     def __init__(self, url: str, file: Path, now: Callable[[], float] = time.time) -> None:
         """Initialize without reading the file.
@@ -100,7 +100,7 @@ class PinnedKey:
             )
 
     def pin(self, head: IndexHead, work: Path) -> None:
-        """Pin the key of a verified head."""
+        """Pin the key that signed a verified head, and store the head's index number."""
         signature = head.signed
         if signature is None:
             return

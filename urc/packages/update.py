@@ -123,7 +123,7 @@ def plan_update(
         old: the installed package's lock.
         sources: package sources, as for `newer`.
         store: the store with this package.
-        complain: receives warnings for the user.
+        complain: callback that receives warnings for the user.
         wanted: version range; the newest version in this range is installed.
 
     Raises:
@@ -172,7 +172,7 @@ def headline(old: Lock, new: Lock) -> str:
 
 
 def version_lines(old: Lock, new: Lock) -> list[str]:
-    """Return one line for each changed package."""
+    """Return one line for each package whose version differs between two locks."""
     lines: list[str] = []
     for name in sorted({*old.packages, *new.packages}):
         before, after = old.packages.get(name), new.packages.get(name)

@@ -48,7 +48,7 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """All notes on one version."""
+    """A repository's notes on one version of a package."""
 
     withdrawn: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
     """Reason for the withdrawal; "" for an available version."""

@@ -60,7 +60,7 @@ class _Bound(NamedTuple):
 
 
 class Range:
-    """A range of versions."""
+    """A range of versions, such as ``^1.2`` or ``>=1.2, <2``."""
 
     def __init__(self, text: str, bounds: tuple[_Bound, ...]) -> None:
         self.text = text

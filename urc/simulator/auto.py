@@ -57,7 +57,7 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """A failure to build the reply to a declared request; the message is human-readable."""
+    """Raised if no reply to a declared request can be built; the message is for people."""
 
 
 class SimulatedReply(NamedTuple):
@@ -221,7 +221,7 @@ class DefaultConnection:
     def render(
         self, answer: SimulatedReply, now_s: float, known: Mapping[str, object] = NOTHING
     ) -> list[Payload]:
-        """Return the frames of one reply or message, or raise `Unanswered`."""
+        """Return the encoded frames of one reply or message; raise `Unanswered` on failure."""
         if answer.prompt is not None:
             return [example(answer.prompt, {}).encode(self._spec.encoding, "replace")]
         if answer.reader is None or self._robot.values.faults.drops(
@@ -289,7 +289,7 @@ class DefaultConnection:
         return exact or {one.request.label for one in found[:1]}
 
     def _readings(self, frame: Frame) -> Iterator[ReceivedRequest]:
-        """Yield all possible requests for a frame, requests without arguments first."""
+        """Yield all requests that may have produced a frame, requests without arguments first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
@@ -390,7 +390,7 @@ class DefaultConnection:
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:
-        """Return a message period that keeps all of the message's signals fresh."""
+        """Return a message period short enough that none of the message's signals becomes stale."""
         signals = self._robot.driver.signals
         ages = [signals[name].stale_after_s for name in read.fields if name in signals]
         return min(_SLOWEST_S, max(_FASTEST_S, min(ages, default=_SLOWEST_S) / 3))

@@ -64,7 +64,7 @@ MOST_COURSES: Final = 256
 """Maximum number of delayed replies per connection."""
 
 log = logging.getLogger(__name__)
-"""Logger for all faults, with the arguments ``(transport, text)``."""
+"""Logger that receives every fault, with the arguments ``(transport, text)``."""
 
 
 class EmulatedRobot:
@@ -142,7 +142,7 @@ class EmulatedRobot:
         inject(parse_fault(text), self._values, now_s)
 
     def mend(self) -> None:
-        """Remove all faults. The battery remains low after a low-battery fault."""
+        """Remove all faults. This does not recharge the battery after a low-battery fault."""
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
@@ -318,7 +318,7 @@ class EmulatedConnection:
 
     @property
     def has_late(self) -> bool:
-        """Whether delayed frames are queued."""
+        """Whether frames that an injected fault has delayed are still queued."""
         return self._late.due_s < math.inf
 
     @property
@@ -397,7 +397,7 @@ class EmulatedConnection:
         return said or []
 
     def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Run all due reactions and schedule the others."""
+        """Run the reactions that are due, and schedule the remaining reactions."""
         said: list[Payload] = []
         while running_rule.ready_reactions and not self.is_over:
             reaction = running_rule.ready_reactions[0]

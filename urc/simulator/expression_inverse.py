@@ -2,7 +2,7 @@
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
 first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. An
-expression without an inverse results in None.
+expression without an inverse yields None.
 """
 
 import ast

@@ -116,7 +116,7 @@ class Faults:
 
     @property
     def is_silent(self) -> bool:
-        """Whether all replies are lost."""
+        """Whether a fault drops all replies."""
         return "silent" in self.active
 
     def add(self, fault: Fault) -> None:
@@ -143,7 +143,7 @@ class Faults:
         return [] if self.is_silent else [one for one in frames if not self.loses()]
 
     def drops(self, names: Iterable[str]) -> bool:
-        """Return whether any of the signals has dropped out."""
+        """Return whether a dropout fault affects any of the signals."""
         return bool(self.dropped) and not self.dropped.isdisjoint(names)
 
 

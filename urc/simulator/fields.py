@@ -21,7 +21,7 @@ class Fields(NamedTuple):
     """Internal fields of the document whose values are unknown."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
-        """Yield sets of fields to encode, in the order in which to try them."""
+        """Yield possible sets of fields for the frame, in the order in which to try them."""
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own

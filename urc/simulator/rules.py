@@ -71,7 +71,7 @@ class RunningRule:
         self.ready_reactions = ready_reactions
         """Pending reactions."""
         self.names = names
-        """Values from the frame, keyed by name."""
+        """Values that the rule reads from the frame, keyed by name."""
         self.asked = asked
         """The declared request that triggered the rule; None for other frames."""
         self.frame = frame
@@ -91,7 +91,7 @@ class RuleSet:
         spec: the transport.
         framing: framing of data sent and received by the robot.
         auto: source of automatic replies to declared requests.
-        values: values of the robot.
+        values: signal values and state of the robot.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The body of an emulated robot. The robot's state drives the body, and the body provides signals.
+"""The body of an emulated robot, controlled by the robot's state, with sensors for signals.
 
 The module uses no sockets and no clock. The fail-safe works with and without a connection. The
 fail-safe is declared in the document (`failsafe`) or derived from held commands (`watchdog`).
@@ -69,7 +69,7 @@ class SimulatedBody:
 
         Args:
             labels: names of the commands that may have produced the frame.
-            now_s: time of the frame.
+            now_s: time of the frame, in seconds since the epoch.
         """
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False

@@ -26,7 +26,7 @@ __all__ = ["Names", "Unsettable", "Values"]
 _PERIOD_S: Final = 60.0
 """Period of the slow wave in plausible signal values, in seconds."""
 _WIDTH: Final = (0.0, 100.0)
-"""Default range of a number."""
+"""Range of a number whose signal declares no range."""
 _ELEMENTS: Final = 4
 _PIXEL: Final = a2b_base64(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
@@ -95,11 +95,11 @@ _DEEPEST: Final = 16
 
 
 class Unsettable(UrcError):
-    """A value that is invalid for a signal; the message is human-readable."""
+    """Raised for a value that is invalid for its signal; the message is for people."""
 
 
 class Values:
-    """The values of one emulated robot."""
+    """The signal values and state variables of one emulated robot."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class Values:
         self.body: SimulatedBody | None = None
         """The simulated body and its sensors; None if there is no world."""
         self.senses: Mapping[str, object] = NOTHING
-        """Signals that the world provides."""
+        """Signals whose values come from the world."""
         drawn = PLAIN if is_plain else frozenset[str]()
         is_blind = world is not None and not has_rendering()
         missing = rendered_signals(world, drawn) if world and is_blind else frozenset[str]()

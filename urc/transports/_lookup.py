@@ -25,7 +25,7 @@ class AddressLookup:
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Prepare a lookup for sockets of type `kind`, without starting it."""
+        """Prepare a lookup for sockets of type `kind`, without starting the lookup."""
         self._host = host
         self._port = port
         self._kind = kind
@@ -35,8 +35,8 @@ class AddressLookup:
         """Return every address of the host.
 
         Raises:
-            OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller must set
-                one.
+            OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller must set a
+            timeout.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)

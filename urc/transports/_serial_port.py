@@ -22,7 +22,7 @@ from urc.transports.base import PeerClosed
 __all__ = ["FAULTS", "SerialStream", "open_port"]
 
 FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
-"""Exceptions that the library raises; a `LookupError` means that a server sent invalid RFC 2217
+"""Exceptions that serialx raises; a `LookupError` means that a server sent invalid RFC 2217
 data."""
 UNTAKEN_BYTES = 1_048_576
 """Maximum number of unsent bytes to an RFC 2217 server; beyond this limit, the connection ends."""
@@ -46,7 +46,7 @@ async def open_port(
 
     Args:
         port: a device path or name, or an address ``rfc2217://HOST:PORT``.
-        arguments: settings, keyed by the library's names.
+        arguments: port settings, keyed by the names that serialx uses.
         tune: function that configures a network port's socket.
 
     Raises:

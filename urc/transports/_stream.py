@@ -211,7 +211,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
 
 class StreamTransport:
-    """The transport methods that need only an open stream."""
+    """The transport methods that need only an open stream, as a base class for transports."""
 
     def __init__(self) -> None:
         self._stream: ByteStream | None = None
@@ -290,7 +290,7 @@ def as_bytes(payload: Payload) -> bytes:
 
 
 def forget_unsent(line: socket.socket) -> None:
-    """Configure the socket `line` to reset the connection and discard unsent data when closed."""
+    """Make the closing of the socket `line` reset the connection and discard unsent data."""
     with suppress(OSError, ValueError):  # already closed; uvloop raises ValueError
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 

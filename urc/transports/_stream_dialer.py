@@ -15,7 +15,7 @@ __all__ = ["StreamDialer"]
 
 
 class StreamDialer:
-    """A dialer for one host and port; `open` may be called several times."""
+    """Opens connections to one host and port, one with each call of `open`."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class StreamDialer:
         self.host = host
         self.port = port
         self.place = place_of(host, port)
-        """Host and port as display text."""
+        """Host and port as text for messages."""
         self._tunnel = tunnel
         self._tls = tls
         self._read_ahead_bytes = read_ahead_bytes

@@ -210,7 +210,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
 def _load_own(
     where: str, context: ssl.SSLContext, options: Mapping[str, object], *, is_server: bool
 ) -> None:
-    """Load the client or server certificate if the options contain one."""
+    """Load the client's or the server's certificate, if the options contain a certificate."""
     certificate = _options.text(where, options, "cert")
     key = _options.text(where, options, "key")
     if not certificate:
@@ -234,7 +234,7 @@ def _no_password() -> str:
 
 
 def _pem(given: str) -> str:
-    """Return a file's contents, or the given text if it is not a file name."""
+    """Return the content of the named file, or the given text if it is not a file name."""
     return given if _PEM in given else Path(given).expanduser().read_text("ascii")
 
 

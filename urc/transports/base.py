@@ -55,11 +55,11 @@ class TransportError(UrcError):
 
 
 class ConnectFailed(TransportError):
-    """A failed attempt to open a connection."""
+    """Raised if a connection cannot be opened."""
 
 
 class PeerClosed(TransportError):
-    """The end of a connection: closed by the peer, or broken."""
+    """Raised if the peer has closed the connection, or the connection is broken."""
 
 
 class Transport(Protocol):
@@ -70,7 +70,7 @@ class Transport(Protocol):
 
     @property
     def address(self) -> str:
-        """The connection's target as display text, such as ``tcp 192.168.1.5:6789``."""
+        """The connection's target in readable form, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
         """Open the connection within `timeout_s` seconds, or raise `ConnectFailed`."""
@@ -83,7 +83,7 @@ class Transport(Protocol):
         """
 
     async def send(self, data: Payload) -> None:
-        """Wait for space, then send `data`; raise `TransportError` on a broken connection."""
+        """Wait for buffer space, then send `data`; raise `TransportError` on a connection error."""
 
     async def close(self) -> None:
         """Close immediately. The method never raises and may be called twice."""

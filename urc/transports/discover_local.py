@@ -7,7 +7,7 @@ from contextlib import suppress
 __all__ = ["listening"]
 
 CONNECT_S = 1.0
-"""Timeout for one connection, in seconds; short, because this machine replies immediately."""
+"""Timeout for connecting to a port, in seconds; short, because this machine replies at once."""
 _AT_ONCE = 16
 
 

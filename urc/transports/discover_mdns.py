@@ -1,6 +1,6 @@
 """Multicast DNS discovery of announced services.
 
-The library zeroconf (extra ``mdns``) is imported only when needed.
+The library zeroconf (extra ``mdns``) is imported only when a search begins.
 """
 
 import asyncio

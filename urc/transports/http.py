@@ -56,7 +56,7 @@ class HttpTransport:
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``http http://192.168.4.1:80/``."""
+        """The transport's target in readable form, such as ``http http://192.168.4.1:80/``."""
         place = self._place
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 
@@ -139,7 +139,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 class _OpenConnection:
-    """The state of the transport between `open` and `close`."""
+    """The connections, requests and streams of the transport between `open` and `close`."""
 
     def __init__(self, client: HttpClient, most: int, answer_s: float, max_body_bytes: int) -> None:
         self.queue = HttpReceiveQueue()
@@ -284,7 +284,7 @@ class _Handed(httpx2.AsyncByteStream):
 
 
 def _request_of(client: HttpClient, data: Envelope) -> httpx2.Request:
-    """Return the library's request object for an envelope."""
+    """Return the HTTP request of the library `httpx2` for an envelope."""
     attributes = data.attributes
     path, query = str(attributes.get("path", "/")), attributes.get("query")
     if isinstance(query, Mapping):

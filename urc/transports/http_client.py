@@ -32,7 +32,7 @@ MAX_COOKIES = 50
 
 
 class HttpFault(TransportError):
-    """A failed request, with a message to display."""
+    """Raised if a request fails, with a message for people."""
 
     def __init__(
         self, text: str, *, is_unreachable: bool = False, is_unanswered: bool = False
@@ -40,7 +40,7 @@ class HttpFault(TransportError):
         """Initialise the error.
 
         Args:
-            text: message to display.
+            text: message for people.
             is_unreachable: whether no connection could be opened.
             is_unanswered: whether a connection was opened, but no usable response arrived.
         """
@@ -83,7 +83,7 @@ class HttpClient:
 
     @property
     def where(self) -> str:
-        """Host and port as display text."""
+        """Host and port in readable form."""
         return self._place.authority
 
     async def reach(self, timeout_s: float = CONNECT_S) -> None:

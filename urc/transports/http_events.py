@@ -40,7 +40,7 @@ class LineSplitter:
         self._is_skipping = False
         self._was_cr = False
         self.left_out = 0
-        """Number of lines skipped so far."""
+        """Number of lines skipped so far, because they were too long."""
 
     def feed(self, data: bytes) -> list[bytes]:
         """Process the next part of the body and return the completed lines."""
@@ -105,7 +105,7 @@ class EventStreamParser:
         self.last_id = last_id
         """The newest event's id, which a new connection sends in the Last-Event-ID header."""
         self.left_out = 0
-        """Number of events skipped so far."""
+        """Number of events skipped so far, because they were too long."""
         self.retry_s: float | None = None
         """Retry delay requested by the robot, in seconds; None if no delay was requested."""
 

@@ -23,7 +23,7 @@ _LENGTH: Final = re.compile(rb"^content-length[ \t]*:[ \t]*(\d{1,15})[ \t]*$", r
 
 
 class MultipartFault(ValueError):
-    """An invalid multipart stream, or a stream that exceeds a limit."""
+    """Raised for an invalid multipart stream, or for a stream that exceeds a limit."""
 
 
 def boundary_of(content_type: str) -> bytes:
@@ -126,7 +126,7 @@ class MultipartParser:
         return True
 
     def _counted(self, parts: list[bytes]) -> bool:
-        """Extract a part of known length."""
+        """Extract a part whose headers state its length."""
         if len(self._buffer) < self._length:
             return False
         parts.append(bytes(self._buffer[: self._length]))
@@ -134,7 +134,7 @@ class MultipartParser:
         return True
 
     def _open(self, parts: list[bytes]) -> bool:
-        """Extract a part of unknown length, up to the next delimiter."""
+        """Extract a part without a stated length, up to the next delimiter."""
         found = self._strict.search(self._buffer, self._from)
         end = found.start() if found else len(self._buffer) - self._keep
         if end > self._most:

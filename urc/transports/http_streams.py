@@ -117,8 +117,8 @@ class HttpStream:
         Args:
             spec: description of the stream.
             client: HTTP client that makes the requests.
-            queue: destination for the data.
-            pulse: time of the transport's last activity.
+            queue: queue that receives the stream's images, events or lines.
+            pulse: record of the time at which the robot last sent data.
             max_body_bytes: maximum size of one image, in bytes.
         """
         self._spec = spec
@@ -231,7 +231,7 @@ class HttpStream:
 
     @property
     def _shown(self) -> str:
-        """The stream's name as display text."""
+        """The stream's name in readable form."""
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:

@@ -56,7 +56,7 @@ class HostKeys:
         return bool(self._pinned)
 
     def known(self, host: str, port: int) -> HostKeyStatus:
-        """Return a server's known keys.
+        """Return the trusted host keys, certificate authorities and revoked keys of a server.
 
         Raises:
             TransportError: a file cannot be read.

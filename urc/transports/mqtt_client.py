@@ -62,7 +62,7 @@ class MqttTransport:
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``mqtt 192.168.1.5:1883``."""
+        """The transport's target in readable form, such as ``mqtt 192.168.1.5:1883``."""
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -369,7 +369,7 @@ class _PahoClient(Client):
         self._given.close()
 
     def excess(self) -> str:
-        """Return a message about an exceeded limit, or "". The library paho enforces no limits."""
+        """Return a message about an exceeded limit, which paho itself would ignore, or ""."""
         if self._in_packet["remaining_length"] > MAX_BYTES:
             return f"the broker sent a message of more than {MAX_BYTES} bytes"
         if len(self._out_packet) > MAX_UNTAKEN:

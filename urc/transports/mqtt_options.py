@@ -37,14 +37,14 @@ class WillMessage(NamedTuple):
 
 
 class MqttOptions(NamedTuple):
-    """All options of one transport."""
+    """All options of one MQTT transport."""
 
     host: str
     port: int
     is_v5: bool = True
     """Whether to use MQTT 5 instead of 3.1.1."""
     client_id: str = ""
-    """Client ID; "" to let the library generate one."""
+    """Client ID; "" to let the library generate an ID."""
     username: str = ""
     password: str | None = None
     tls: Tls | None = None

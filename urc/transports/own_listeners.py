@@ -16,7 +16,7 @@ __all__ = ["OWN_DOORS", "OwnAddressError", "OwnListeners"]
 
 
 class OwnAddressError(OSError):
-    """An attempted connection to URC's own dashboard."""
+    """Raised for an attempt to connect to URC's own dashboard."""
 
     def __init__(self) -> None:
         super().__init__(None, "this is the address of the dashboard itself, not of a robot")
@@ -45,7 +45,7 @@ class OwnListeners:
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add addresses from another process's `words`; they apply until this process ends."""
+        """Add the addresses in another process's `words`, until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))

@@ -59,7 +59,7 @@ class SerialTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``serial /dev/ttyUSB0``."""
+        """The transport's target in readable form, such as ``serial /dev/ttyUSB0``."""
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:
@@ -87,7 +87,7 @@ class SerialTransport(StreamTransport):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for a document's options.
+    """Return a serial transport for a document's options.
 
     Raises:
         TransportError: an option is missing or invalid, or the extra is not installed.
@@ -175,7 +175,7 @@ def _pin(options: Mapping[str, object], key: str) -> bool | None:
 
 
 def _arguments_of(settings: SerialSettings) -> dict[str, object]:
-    """Return the settings, keyed by the library's names."""
+    """Return the settings, keyed by the names that serialx uses."""
     from serialx import PinState
 
     arguments: dict[str, object] = {

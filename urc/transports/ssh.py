@@ -1,7 +1,7 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
 An SSH transport shares its connection with all transports that name this transport in ``tunnel``.
-The first of these transports opens the connection, and the last closes the connection. A lost
+The connection opens with the first of these transports, and closes with the last. A lost
 connection disconnects all of these transports.
 """
 
@@ -48,7 +48,7 @@ class RemoteProgram(NamedTuple):
 
     mode: Mode = "shell"
     command: str = ""
-    """Command for the mode ``exec``."""
+    """Command that the mode ``exec`` runs on the server."""
     has_pty: bool = True
     """Whether the program runs on a pseudo-terminal and therefore shows prompts and echoes input.
     """
@@ -163,7 +163,7 @@ class SshTransport:
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``ssh 192.168.1.5:22``."""
+        """The transport's target in readable form, such as ``ssh 192.168.1.5:22``."""
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:

@@ -35,7 +35,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         """Initialise a channel.
 
         Args:
-            wire: the SSH connection's socket; `write` waits while the socket is full.
+            wire: the SSH connection's socket; `write` waits while the socket's buffer is full.
             program: the program's name in messages, such as ``the shell``; "" for a forwarded
                 connection.
         """

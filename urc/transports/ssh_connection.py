@@ -162,7 +162,7 @@ class SshConnection:
 
 
 class SharedConnection:
-    """An SSH connection for several transports; the first opens it, and the last closes it."""
+    """An SSH connection for several transports, from the first `join` to the last `leave`."""
 
     def __init__(self, dial: Callable[[float], Awaitable[SshConnection]]) -> None:
         """Initialise without connecting.
@@ -214,7 +214,7 @@ class SharedConnection:
     async def _again(
         self, before: "asyncio.Task[SshConnection] | None", timeout_s: float
     ) -> SshConnection:
-        """Close the dead connection, if there is one, and open a new connection."""
+        """Close the old connection, if it is dead, and open a new connection."""
         if before is not None and not before.cancelled() and before.exception() is None:
             await before.result().close()
         return await self._dial(timeout_s)

@@ -44,7 +44,7 @@ class SshTarget(NamedTuple):
     login: Login
     keys: HostKeys
     keepalive_s: float = 2.0
-    """Silence before a keepalive is sent, in seconds."""
+    """Time without data from the server before a keepalive is sent, in seconds."""
     name: str = ""
     """The transport's name, for the hint about the command ``urc trust``."""
 
@@ -73,7 +73,7 @@ class _SshClient(asyncssh.SSHClient):
 async def dial(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> SshConnection:
-    """Connect to `target` and log in.
+    """Connect to the SSH server `target`, check its host key, and log in.
 
     Args:
         target: the server.

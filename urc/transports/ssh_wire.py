@@ -71,7 +71,7 @@ class SshSocket(asyncio.BufferedProtocol):
         await self._gone.wait()
 
     def end(self, reason: str) -> None:
-        """Record why the connection ended; keep the first reason."""
+        """Record why the connection ended; after several calls, the first reason remains."""
         self.fault = self.fault or reason
         self._room.set()
 

@@ -41,8 +41,8 @@ class TcpListener(StreamTransport):
 
     After a failed `open`, the port keeps listening, so that a robot is not refused between two
     attempts. After a replacement, the first `close` also keeps the port listening. The next `open`
-    within `HANDOVER_S` seconds receives the newer connection. Any other `close` stops listening on
-    the port.
+    within `HANDOVER_S` seconds receives the newer connection. Every other call of `close` stops
+    listening on the port.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
@@ -72,7 +72,7 @@ class TcpListener(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Listening address as display text, such as ``tcp 0.0.0.0:6789 (listening)``."""
+        """Listening address in readable form, such as ``tcp 0.0.0.0:6789 (listening)``."""
         return f"tcp {self._place} (listening)"
 
     @property
@@ -163,7 +163,7 @@ class TcpListener(StreamTransport):
             asyncio.get_running_loop().add_reader(self._listener, self._knock, self._listener)
 
     def _knock(self, listener: socket.socket) -> None:
-        """Accept a connection that the event loop has reported.
+        """Accept a waiting connection that the event loop has reported.
 
         The event loop's own accept function may lose a new connection when cancelled.
         """
@@ -271,7 +271,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``tcp 192.168.1.5:6789``."""
+        """The transport's target in readable form, such as ``tcp 192.168.1.5:6789``."""
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
@@ -303,7 +303,7 @@ class TcpTransport(StreamTransport):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for a document's options.
+    """Return a TCP transport for a document's options.
 
     ``host`` and ``port`` specify the robot's address. With ``mode: listen``, the robot connects to
     ``bind`` (loopback by default) and ``port``. Only ``host`` may connect, unless the options

@@ -63,7 +63,7 @@ class TelnetTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``telnet 192.168.1.5:23``."""
+        """The transport's target in readable form, such as ``telnet 192.168.1.5:23``."""
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -176,7 +176,7 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
 
 
 def _begin(wishes: TelnetOptions) -> tuple[TelnetNegotiation, bytes]:
-    """Return a new negotiation and the first bytes to send."""
+    """Return the state of a new negotiation, and the first bytes to send."""
     binary = (BINARY,) if wishes.binary else ()
     echo = (ECHO,) if wishes.echo else ()
     talk = TelnetNegotiation(

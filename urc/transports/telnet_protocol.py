@@ -2,8 +2,8 @@
 
 Pure. Options are negotiated with the Q method (RFC 1143), which prevents loops: replies are sent
 only for changes. URC never withdraws an agreed option, so the six states of the Q method reduce to
-the three of `_Side`. URC replies with a refusal to every request for an unknown option, because
-servers negotiate in several rounds and wait for the last reply.
+the three states of `_Side`. URC replies with a refusal to every request for an unknown option,
+because servers negotiate in several rounds and wait for the last reply.
 """
 
 import re
@@ -19,9 +19,9 @@ ECHO: Final = 1
 SGA: Final = 3
 """Suppress Go Ahead, which enables full-duplex operation (RFC 858)."""
 TTYPE: Final = 24
-"""Terminal type on request (RFC 1091)."""
+"""Report the terminal type on request (RFC 1091)."""
 NAWS: Final = 31
-"""Window size of the terminal (RFC 1073)."""
+"""Report the window size of the terminal (RFC 1073)."""
 
 _SE, _SB, _WILL, _WONT, _DO, _DONT, _IAC = 240, 250, 251, 252, 253, 254, 255
 _CR: Final = 13

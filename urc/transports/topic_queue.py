@@ -2,7 +2,7 @@
 
 A fast publisher must not fill URC's memory. The publisher must not be blocked either, because one
 stalled reader would freeze a topic for all clients of the bridge. Each topic therefore keeps only
-its newest messages. Responses are queued separately, because they are never repeated.
+its newest messages. Responses are queued separately, because a lost response is never repeated.
 """
 
 import asyncio
@@ -37,12 +37,12 @@ class TopicReceiveQueue:
         self._waiting: dict[int, Envelope] = {}
         """Queued envelopes in order of arrival, keyed by sequence number."""
         self._topics: dict[str, deque[tuple[int, int]]] = {}
-        """Sequence number and size of each queued message, keyed by topic."""
+        """Sequence number and size in bytes of each queued message, keyed by topic."""
         self._sizes: dict[str, int] = {}
         self._bytes = 0
         self._messages = 0
         self._answers: dict[int, int] = {}
-        """Size of each queued response, keyed by sequence number."""
+        """Size of each queued response in bytes, keyed by sequence number."""
         self._answers_bytes = 0
         self._number = 0
         self._arrived = asyncio.Event()
@@ -51,7 +51,7 @@ class TopicReceiveQueue:
         """Number of envelopes dropped so far."""
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
-        """Add a message of `topic`; drop old messages if necessary."""
+        """Add a message of `topic`; drop the oldest messages if a limit is exceeded."""
         queue = self._topics.get(topic)
         if queue is None:
             queue = self._topics[topic] = deque()

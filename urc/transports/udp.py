@@ -26,9 +26,9 @@ from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportE
 __all__ = ["UdpTransport", "from_setup"]
 
 READ_AHEAD = 512
-"""Maximum number of queued datagrams."""
+"""Maximum number of received datagrams in the queue."""
 READ_AHEAD_BYTES = 1_048_576
-"""Maximum number of queued bytes."""
+"""Maximum number of bytes in all queued datagrams."""
 _AT_ONCE = 64
 """Maximum number of datagrams read in one turn of the event loop."""
 _LONGEST = 65_536
@@ -278,7 +278,7 @@ class _Endpoint(asyncio.DatagramProtocol):
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for a document's options.
+    """Return a UDP transport for a document's options.
 
     Raises:
         TransportError: an option is missing or invalid.

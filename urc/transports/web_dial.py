@@ -40,11 +40,11 @@ class Dialer:
         self._address = Address(place.host, place.port) if is_plain else None
         self._bridges: set[asyncio.Task[None]] = set()
         self._carried: ByteStream | None = None
-        """Stream of the newest relay, or None."""
+        """Stream of the newest relayed connection; None without a relay."""
 
     @property
     def place(self) -> str:
-        """The connection's target as display text."""
+        """The connection's target in readable form."""
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:

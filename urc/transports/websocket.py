@@ -2,7 +2,7 @@
 
 Each WebSocket message is one payload. The transport reads only a few messages ahead, so a flooding
 robot must wait. `send` returns after the kernel has accepted every byte. A lost robot is detected
-by missing replies to pings. Unsent data is discarded when a connection ends.
+by missing replies to pings. When a connection ends, its unsent data is discarded.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from urc.transports.web_origin import OptionReader
 __all__ = ["WebSocketTransport", "from_setup"]
 
 READ_AHEAD_MESSAGES = 4
-"""Maximum number of messages that are read ahead."""
+"""Maximum number of received messages in the queue."""
 MAX_MESSAGE_BYTES = 1_048_576
 UNTAKEN_BYTES = 1_048_576
 """Maximum number of unsent bytes in ping replies."""
@@ -70,7 +70,7 @@ class WebSocketTransport:
 
     @property
     def subprotocol(self) -> str | None:
-        """Subprotocol that the server has selected, or None."""
+        """Subprotocol that the server has selected; None without a subprotocol."""
         return None if self._socket is None else self._socket.subprotocol
 
     async def open(self, timeout_s: float) -> None:
@@ -271,7 +271,7 @@ def _refusal(fault: Exception, where: str) -> str:
         status = one_line(f"{response.status_code} {response.reason_phrase}")
         return f"{where} answered {status} instead of opening a WebSocket"
     if isinstance(fault, NegotiationError):
-        return f"{where} requires a feature that was not offered ({one_line(str(fault))})"
+        return f"{where} requires a feature that URC did not offer ({one_line(str(fault))})"
     if isinstance(fault, InvalidMessage | EOFError | ConnectionError):
         return f"the server on {where} does not speak HTTP, or closed the connection"
     return f"the server on {where} is not a WebSocket server ({one_line(str(fault))})"

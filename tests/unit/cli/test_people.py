@@ -142,7 +142,7 @@ def test_roles_are_added_and_taken_away_one_by_one(urc: Run) -> None:
     assert urc("people", "list") == (
         0,
         "",
-        "no people yet: 'urc people add NAME --role drive' adds one\n",
+        "no people yet: 'urc people add NAME --role drive' adds a person\n",
     )
 
 

@@ -33,7 +33,7 @@ class Endpoint(NamedTuple):
     port: int
     """TCP or UDP port; 0 for a server without a port."""
     text: str
-    """Human-readable text, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
+    """Description for people, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
     options: Mapping[str, object] = NOTHING
     """Options for connecting the driver's transport to this server. These options override the
     driver's options.
@@ -76,8 +76,9 @@ class ServerContext(NamedTuple):
     """Host that last sent data, shared by all of the robot's servers; None means that the host is
     not recorded."""
     carried: Mapping[tuple[str, int], Endpoint] = MappingProxyType({})
-    """Targets that clients can reach through this server. The keys are hosts and ports in the
-    driver, and the values are endpoints of the emulated robot."""
+    """Other servers of the robot that clients can reach through this server, as through a tunnel.
+    The keys are hosts and ports in the driver, and the values are endpoints of the emulated
+    robot."""
 
 
 class SimulatedServer(Protocol):

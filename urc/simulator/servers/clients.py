@@ -47,7 +47,7 @@ class Clients:
 
     @property
     def lines(self) -> Sequence[EmulatedConnection]:
-        """The robot's side of every connection."""
+        """The robot's side of each open connection."""
         return [client.line for client in self._talks]
 
     def admit(

@@ -26,7 +26,7 @@ __all__ = ["HttpServer"]
 
 
 _BLOCKS: Final = (20, 15)
-"""Size of a 160 by 120 pixel image in blocks of 8 by 8 pixels."""
+"""Columns and rows of 8 by 8 pixel blocks in an image of 160 by 120 pixels."""
 _PERIOD_S: Final = 12.0
 """Period of the colour cycle, in seconds."""
 
@@ -126,7 +126,7 @@ class HttpServer(UrlServer, StreamServer):
 
 
 class _HttpConversation:
-    """One connection's conversation, request by request. The last request may start a stream."""
+    """Answers the requests of one HTTP connection in turn; the last may start a stream."""
 
     def __init__(
         self,
@@ -225,7 +225,7 @@ class _HttpConversation:
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
     def _kind(self, asked: HttpRequest) -> str:
-        """Return the stream type of the subscription to this path, or "" if none exists."""
+        """Return the stream type of the subscription to this path; "" without a subscription."""
         if asked.method != "GET":
             return ""
         ways = self._context.topics.items()

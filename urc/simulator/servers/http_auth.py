@@ -14,7 +14,7 @@ _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]*))')
 
 
 class HttpAuth:
-    """A checker of requests against the driver's `auth` option."""
+    """Checks the credentials of requests against the driver's `auth` option."""
 
     def __init__(self, auth: object) -> None:
         """Read the option `auth`. Without this option, every request is accepted."""

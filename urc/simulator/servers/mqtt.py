@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 class MqttRobot:
-    """One client of the broker."""
+    """The emulated robot's connection to the broker."""
 
     def __init__(self, context: ServerContext) -> None:
         self._context = context

@@ -163,7 +163,7 @@ class BridgeClient:
             self.write(operation)
 
     def write(self, operation: Mapping[str, object]) -> None:
-        """Send one operation as JSON text."""
+        """Send one rosbridge operation to the client, as JSON text."""
         self._send(_encode(operation).decode())
 
     def _write_pieces(self, text: str, size: int) -> None:
@@ -234,7 +234,7 @@ class BridgeClient:
         self.wanted.pop(_text(operation, "topic"), None)
 
     def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Record the type of a topic."""
+        """Record the type of a topic that the client announces."""
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
@@ -362,7 +362,7 @@ def _text(operation: Mapping[str, Any], name: str) -> str:
 
 
 def _fields(body: object) -> object:
-    """Return a body as an object; parse JSON text if necessary."""
+    """Return the body of a message as an object; parse JSON text if necessary."""
     if not isinstance(body, bytes):
         return body
     try:
@@ -398,7 +398,7 @@ client are dropped."""
 
 
 class RosbridgeServer(MessageServer):
-    """A rosbridge port and its shared bridge."""
+    """A rosbridge server on one port; all clients share one bridge."""
 
     DEFAULT_PORT = 9090
 

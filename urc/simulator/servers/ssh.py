@@ -181,7 +181,7 @@ class _SshServer(asyncssh.SSHServer):
 
 
 class _ShellConversation:
-    """The conversation with one client's shell or command."""
+    """Exchanges data with one client's shell or command."""
 
     def __init__(self, context: ServerContext, process: "asyncssh.SSHServerProcess[bytes]") -> None:
         self._context = context

@@ -28,7 +28,7 @@ class TelnetServer(StreamServer):
 
 
 class _TelnetConversation:
-    """The conversation with one client."""
+    """Exchanges data with one client of the Telnet server."""
 
     def __init__(
         self, context: ServerContext, reader: asyncio.StreamReader, writer: asyncio.StreamWriter

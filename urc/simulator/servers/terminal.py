@@ -36,5 +36,5 @@ class TerminalInput:
 
 
 def echo_of(data: bytes) -> bytes:
-    """Return the echo of typed input."""
+    """Return the bytes that the terminal echoes for typed input."""
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\n", b"\r\n")

@@ -126,7 +126,7 @@ def _reachable(host: str) -> str:
 
 
 def _free_port(host: str) -> int:
-    """Return a free port for the driver."""
+    """Return a free UDP port on which the driver can listen."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_DGRAM) as probe:
         probe.bind((host, 0))

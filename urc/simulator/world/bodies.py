@@ -44,7 +44,7 @@ class Motion:
     steer: float = 0.0
     """Steering angle of the front wheels, in radians."""
     phase: float = 0.0
-    """Phase of the body's wave, in cycles."""
+    """Phase of the wave that travels along a jointed body, in cycles."""
     drive: float = 0.0
     """Amplitude of the body's wave, 0 to 1."""
     bend: float = 0.0

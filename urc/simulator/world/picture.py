@@ -21,7 +21,7 @@ __all__ = ["CameraPose", "camera_picture", "jpeg", "panorama_picture"]
 
 Array = NDArray[np.float32]
 _BINS: Final = 1440
-"""Number of directions around the camera."""
+"""Number of directions in a full circle around the camera."""
 _LAYERS: Final = 4
 """Maximum number of edges drawn per direction. Several edges may be visible in one direction,
 because a low box hides only the bottom of a wall."""
@@ -53,7 +53,7 @@ class CameraPose(NamedTuple):
 def camera_picture(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int], view: float
 ) -> NDArray[np.uint8]:
-    """Return the forward image as an array: rows by columns by RGB.
+    """Return the image in the forward direction, as an array of rows, columns and RGB values.
 
     Args:
         plan: the obstacles.

@@ -1,7 +1,8 @@
 """The laser scanner and the level camera without numpy and Pillow, for browsers and small machines.
 
 Pure. `urc.simulator.world.laser` and `urc.simulator.world.picture` do the same work faster and
-support every camera. The scanner noise differs, because the random number generators differ.
+support every camera. The scanner's noise is not the same, because the random number generators
+differ.
 """
 
 import math
@@ -75,7 +76,7 @@ class _Relative(NamedTuple):
 
 
 class _Column(NamedTuple):
-    """The parts of one image column that do not depend on the pose."""
+    """The data of one image column that do not depend on the camera's pose."""
 
     turn: float
     """Direction of the column, in radians left of the forward direction."""
@@ -179,7 +180,7 @@ def level_picture(
 
 
 def _focus(width: int, view: float) -> float:
-    """Return the focal length in pixels."""
+    """Return the camera's focal length, in pixels."""
     return width / 2 / math.tan(view / 2)
 
 

@@ -58,7 +58,7 @@ A wall with a door divides the room into two halves."""
 
 
 class WorldMap:
-    """A map, prepared for collision tests."""
+    """The world map, prepared for collision tests."""
 
     def __init__(self, spec: PlanSpec) -> None:
         """Prepare the obstacles of `spec`."""
@@ -108,7 +108,7 @@ def _faces(box: Box) -> list[Edge]:
 
 
 def _nearest(edge: Edge, x: float, y: float) -> tuple[float, float]:
-    """Return the nearest point on an edge."""
+    """Return the point on an edge that is nearest to a given point."""
     dx, dy = edge.x2 - edge.x1, edge.y2 - edge.y1
     length = dx * dx + dy * dy
     share = ((x - edge.x1) * dx + (y - edge.y1) * dy) / length if length else 0.0

@@ -55,7 +55,7 @@ def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Number
 
 
 def first_hits(faces: EdgeArrays, x: float, y: float, z: float, angles: Numbers) -> Numbers:
-    """Return each ray's range at height `z` in metres, or ``inf`` if there is no intersection."""
+    """Return the range in metres of each ray at height `z`; ``inf`` without an intersection."""
     if not len(faces.height):
         return np.full(len(angles), np.inf)
     distance, _ = cast(faces, x, y, angles)

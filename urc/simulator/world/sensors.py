@@ -39,7 +39,7 @@ class SensorInput(NamedTuple):
     time_s: float
     """Time, in seconds since the epoch."""
     noise: float = 1.0
-    """Factor applied to the declared noise."""
+    """Factor by which the declared noise is multiplied."""
 
     def gauss(self, name: str) -> float:
         """Return a random error with a standard deviation of 1 for the current time step."""
@@ -71,7 +71,7 @@ class Odometry:
         track = spec.body.track
         self._half_track = spec.body.radius * 0.8 if track is None else track / 2
         self.left = 0.0
-        """Distance travelled by the left wheel, in metres; negative when driving backwards."""
+        """Distance travelled by the left wheel, in metres; backward motion reduces the distance."""
         self.right = 0.0
 
     def advance(self, motion: Motion, dt_s: float, noise: float) -> None:

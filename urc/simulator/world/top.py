@@ -28,7 +28,7 @@ Point = tuple[float, float]
 
 
 class _Map:
-    """The transform from metres to pixels."""
+    """The transform from metres in the world to pixels in the top view."""
 
     def __init__(self, plan: WorldMap, motion: Motion, size: tuple[int, int]) -> None:
         low_x, low_y, high_x, high_y = plan.bounds

@@ -1,7 +1,8 @@
 """The world of an emulated robot: a body with inputs and sensors.
 
 The module does not use clocks or sockets. Time is an argument, and the world advances in steps of
-`STEP_S`. The same commands at the same times produce the same world, however often it is observed.
+`STEP_S`. The same commands at the same times produce the same world, for any number of
+observations.
 """
 
 import math
@@ -91,7 +92,7 @@ class World:
         self.missing = _RENDERED - drawn
         """Names of `READINGS` that require a missing package."""
         self.dropped = set(self.missing)
-        """Names of failed `READINGS`, which have no value."""
+        """Names of the `READINGS` that have no value, because their sensors have failed."""
         self._inputs = inputs
         self._holds = holds
         self._is_busy = False

@@ -71,14 +71,14 @@ class AnyBridgeTransport:
     """A reusable transport to the first bridge that answers."""
 
     def __init__(self, candidates: list[Candidate], where: str) -> None:
-        """Store the candidates, without connecting; `where` is the target as display text."""
+        """Store the candidates, without connecting; `where` is the target in readable form."""
         self._candidates = candidates
         self._where = where
         self._bridge: _Bridge | None = None
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``ros 192.168.1.5``."""
+        """The transport's target in readable form, such as ``ros 192.168.1.5``."""
         return self._bridge.address if self._bridge is not None else f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -102,7 +102,7 @@ class AnyBridgeTransport:
         return await self._open_bridge().receive()
 
     async def send(self, data: Payload) -> None:
-        """Publish or call a service; raise `TransportError` on failure."""
+        """Publish a message or call a service; raise `TransportError` on failure."""
         await self._open_bridge().send(data)
 
     async def close(self) -> None:

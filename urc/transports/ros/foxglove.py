@@ -51,7 +51,7 @@ class FoxgloveTransport:
 
         Args:
             wire: WebSocket transport that offers the subprotocols, owned by this transport.
-            where: target as display text, such as ``192.168.1.5:8765``.
+            where: target in readable form, such as ``192.168.1.5:8765``.
             wishes: topics to subscribe to, without duplicates.
             ros: ROS version declared in the document; None if undeclared.
         """
@@ -71,7 +71,7 @@ class FoxgloveTransport:
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``ros 192.168.1.5:8765``."""
+        """The transport's target in readable form, such as ``ros 192.168.1.5:8765``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -119,7 +119,7 @@ class FoxgloveTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish or call a service; return when the kernel has accepted the data.
+        """Publish a message or call a service; return when the kernel has accepted the data.
 
         Raises:
             PeerClosed: the connection broke.

@@ -52,7 +52,7 @@ class TimeTold(NamedTuple):
 
 
 class ServiceReply(NamedTuple):
-    """The reply to a call."""
+    """The reply to a service call."""
 
     call: int
     encoding: str
@@ -81,7 +81,7 @@ class ServiceType(NamedTuple):
 
 
 class FrameReader:
-    """A decoder of received frames."""
+    """Decodes the frames that a Foxglove server sends."""
 
     def __init__(self) -> None:
         self._operations = OperationReader()

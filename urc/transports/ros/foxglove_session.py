@@ -1,7 +1,7 @@
 """The state of one open Foxglove protocol connection: channels, subscriptions, calls.
 
 The session does no I/O. The session writes frames to a list, and the transport sends these frames.
-Each object serves a single connection, so no state is carried over to the next.
+Each object serves a single connection, so no state is carried over to the next connection.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
 only to the driver's topics. The bridge sends every message at the full rate, so the session drops
@@ -104,7 +104,7 @@ class FoxgloveSession:
         Args:
             queue: queue for messages and replies.
             wishes: topics to subscribe to, without duplicates.
-            graph: object that checks topics.
+            graph: object that reports topics with mistakes.
             call_at: function that schedules a call for a given time on `clock`.
             clock: monotonic clock, in seconds.
             published: type of each published topic, keyed by topic and encoding. The mapping
@@ -351,7 +351,7 @@ class FoxgloveSession:
             self._listeners.pop(str(name), None)
 
     def listeners(self, topic: str) -> list[object] | None:
-        """Return the nodes that subscribe to a topic; None if unknown."""
+        """Return the nodes that subscribe to a topic; None if the nodes are unknown."""
         return list(self._listeners.get(topic, ())) if self.has_graph else None
 
     def _status(self, said: Mapping[str, Any]) -> None:

@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version (1 or 2) that uses this form of type name; None without names."""
+    """Return the ROS version (1 or 2) whose form the type names have; None without names."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None

@@ -7,9 +7,9 @@ data can be sent late. A task reads continuously, even if messages are consumed 
 stalled reader would freeze the topic for every client of the bridge.
 
 A bridge delivers the first message on a topic only after the bridge's publisher has connected to
-the subscribers. If the client disconnects before then, the message is dropped. Clients therefore
-call `settle` before disconnecting: the method queries rosapi and waits for the subscribers. The
-reply from rosapi also shows that the bridge has processed all earlier data.
+the subscribers. If the client disconnects before that moment, the bridge drops the message. Clients
+therefore call `settle` before disconnecting: the method queries rosapi and waits for the
+subscribers. The reply from rosapi also shows that the bridge has processed all earlier data.
 
 The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
 all result in missing messages. The transport therefore requests the list of topics from rosapi when
@@ -72,7 +72,7 @@ class RosbridgeTransport:
 
         Args:
             wire: WebSocket transport to the bridge, owned by this transport.
-            where: target as display text, such as ``192.168.1.5:9090``.
+            where: target in readable form, such as ``192.168.1.5:9090``.
             subscriptions: subscriptions to make whenever the connection opens, one per topic.
             ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
                 bridge's version; None to keep names as written.
@@ -86,7 +86,7 @@ class RosbridgeTransport:
 
     @property
     def address(self) -> str:
-        """The transport's target as display text, such as ``ros 192.168.1.5:9090``."""
+        """The transport's target in readable form, such as ``ros 192.168.1.5:9090``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -118,7 +118,7 @@ class RosbridgeTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call a service, or start or cancel a goal; return once the kernel has the data.
+        """Send a message, a service call or a goal operation; return once the kernel has the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -203,7 +203,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
 
 def merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Merge subscriptions to the same topic; a second would cancel the throttle of the first."""
+    """Merge subscriptions to one topic; a second subscription would replace the first throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)

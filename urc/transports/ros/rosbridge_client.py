@@ -29,7 +29,7 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["RosSubscription", "RosClient"]
 
 MAX_PENDING = 256
-"""Maximum number of pending calls and goals; further calls and goals replace the oldest."""
+"""Maximum number of pending calls and goals; beyond this limit, the oldest is dropped."""
 _NAME_SHOWN = 80
 KNOWN_TOPICS = 256
 """Maximum number of remembered topics, services and actions."""
@@ -46,7 +46,7 @@ class RosSubscription(NamedTuple):
 
 
 class RosClient:
-    """A converter between envelopes and rosbridge operations, for one connection."""
+    """Converts between envelopes and rosbridge operations, for one connection."""
 
     def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
         """Deliver messages to `queue`; `ros` is the ROS version for type names, or None."""

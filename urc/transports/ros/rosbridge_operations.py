@@ -46,7 +46,7 @@ _encode_json = msgspec.json.Encoder().encode
 
 
 class BadOperation(ValueError):
-    """An invalid frame or operation, with a one-line error message."""
+    """Raised for an invalid frame or operation, with a one-line error message."""
 
 
 def encode_operation(operation: Mapping[str, object]) -> bytes:
