@@ -28,7 +28,7 @@ _BUILD_S = 1800
 
 
 def lay_out(source: Path, release: Path, wheels: Path, epoch: int) -> None:
-    """Fill the folder `source` with everything that dpkg-buildpackage needs.
+    """Fill the folder `source` with all files that dpkg-buildpackage needs.
 
     Args:
         source: an empty folder.

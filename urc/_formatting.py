@@ -32,7 +32,7 @@ def spelt(value: object) -> str:
 
 
 def quoted(value: object, most: int = 40) -> str:
-    """Format a value for a message to a person: text in quotes, bytes as hex digits.
+    """Return a value as text for a message to a person: text in quotes, bytes as hex digits.
 
     Each control character is escaped once, so a value cannot control the terminal.
 

@@ -191,7 +191,7 @@ class TreeReader:
                 event,
                 "merge-key",
                 "the merge key '<<' is not part of YAML 1.2",
-                hint="write the keys out, or give the whole value an anchor",
+                hint="write the keys in full, or give the whole value an anchor",
             )
             return None
         key = self._scalar(event, is_key=True)

@@ -26,7 +26,7 @@ class RegistryEntry:
         """Import path ``module:attribute.path`` of the factory, imported by `load`."""
 
     def load(self) -> Any:
-        """Import and return the factory."""
+        """Import the factory's module, and return the factory."""
         module, _, path = self.factory.partition(":")
         return attrgetter(path)(import_module(module))
 
@@ -69,7 +69,7 @@ class Table:
 
 
 class Registries(NamedTuple):
-    """All tables of one URC process."""
+    """The tables of transports and framings of one URC process."""
 
     transports: Table
     framings: Table

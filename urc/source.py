@@ -342,7 +342,7 @@ def _raw_column(raw: str, start: int, style: str, offset: int) -> int:
 def _inside_lines(
     lines: Sequence[str], span: Span, value: str, offset: int, length: int
 ) -> Span | None:
-    """Return the position of a character in a multi-line scalar.
+    """Return the position of part of a multi-line scalar in the document's text.
 
     The function finds the position by searching for each source line in the value. Block scalars,
     plain text, and quoted text without escapes are supported.

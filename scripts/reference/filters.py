@@ -76,7 +76,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "utf8": ("'OK' | utf8", "text encoded as UTF-8 bytes"),
     "yaw": ("[0, 0, 0, 1] | yaw", "yaw of a quaternion [x, y, z, w], in radians"),
 }
-"""An example of each filter, and the filter's meaning."""
+"""For each filter: an example expression, and the meaning of the filter's result."""
 _OPERATORS = (
     ("`+` `-` `*` `/` `//` `%` `**`", "arithmetic; `+` also joins texts or bytes"),
     ("`==` `!=` `<` `<=` `>` `>=`", "comparisons"),

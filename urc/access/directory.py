@@ -30,7 +30,7 @@ class Principal(NamedTuple):
     """Display name, also used in the audit log, such as “Tablet in the lab”."""
     grants: tuple[Grant, ...] = ()
     owner: str = ""
-    """Id of the device's owner. An owned device has its owner's rights."""
+    """Id of the device's owner. A device with an owner has the owner's rights."""
     commands: tuple[str, ...] = ()
     """Commands that a program may send; empty for all commands of its role."""
     created_at: float = 0.0

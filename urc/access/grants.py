@@ -72,7 +72,7 @@ def grants_to_json(grants: Iterable[Grant]) -> str:
 
 
 def grants_from_json(text: str) -> tuple[Grant, ...]:
-    """Return the grants from the output of `grants_to_json`."""
+    """Return the grants in a JSON text from `grants_to_json`."""
     return tuple(parse_grant(each) for each in json.loads(text))
 
 

@@ -26,7 +26,7 @@ __all__ = [
 ANY: Final = "*"
 """Value of a rule that matches every value of its claim."""
 LONGEST_H: Final = 12.0
-"""Longest duration of a sign-in, in hours."""
+"""Longest permitted duration of a sign-in, in hours."""
 KEYS: Final = (
     "issuer", "client_id", "client_secret_file", "title", "address", "scopes", "name",
     "authority_file", "hours", "grants",

@@ -40,11 +40,11 @@ class ProviderMetadata(NamedTuple):
     authorization: str
     """Address of the provider's sign-in page."""
     token: str
-    """Address for exchanging codes for tokens."""
+    """Address at which a code is exchanged for tokens (``token_endpoint``)."""
     keys: str
     """Address of the provider's public keys (``jwks_uri``)."""
     userinfo: str = ""
-    """Address for requesting more claims; "" if the provider has no such address."""
+    """Address for requesting more claims (``userinfo_endpoint``); "" without such an address."""
     is_secret_posted: bool = False
     """Whether the provider accepts this server's secret only in the request body."""
 

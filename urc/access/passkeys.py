@@ -7,7 +7,8 @@ request it.
 Theory of operation. Each ceremony has two requests. The response to the first request contains
 options with a random challenge, which is valid for one use within five minutes. The second request
 contains the authenticator's signature. The methods of `Passkeys` block for a few milliseconds
-(SQLite, signatures), so servers call them in a thread. A lock serializes access to the challenges.
+(SQLite, signatures), so servers call them in a thread. A lock protects the challenges from
+simultaneous changes by several threads.
 """
 
 import ipaddress

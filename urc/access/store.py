@@ -248,7 +248,7 @@ class AccessStore:
                 raise AccessError("that person was removed") from None
 
     def passphrase_of(self, name: str) -> tuple[str, str | None]:
-        """Return the id and hash of the person with this name; "" and None if there is no match."""
+        """Return a person's id and passphrase hash, by name; "" and None for an unknown name."""
         with self._lock, self._readable():
             row = self._base.execute(
                 "SELECT id, hash FROM principals LEFT JOIN passphrases ON principal = id"
@@ -321,7 +321,7 @@ class AccessStore:
 
         Args:
             invitation: the right that the code grants.
-            now: UTC time in seconds since 1970, for deleting expired codes.
+            now: UTC time in seconds since 1970; codes that have expired by then are deleted.
 
         Raises:
             AccessError: too many codes are valid.
@@ -365,7 +365,7 @@ class AccessStore:
         return _invitation(row) if row else None
 
     def redeem(self, code: str, now: float) -> Invitation | None:
-        """Return a code's invitation and end the code; None if the code is unknown or expired."""
+        """Return a code's invitation and invalidate the code; None if it is unknown or expired."""
         with self._change():
             self._base.execute("DELETE FROM invitations WHERE ends_at <= ?", (now,))
             row = self._base.execute(

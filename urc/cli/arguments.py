@@ -91,7 +91,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         type=_assignment,
-        help="value of a setting; alternatively set URC_SET_NAME in the environment",
+        help="value of a setting; the environment variable URC_SET_NAME is an alternative",
     )
     parser.add_argument(
         "--settings",

@@ -148,7 +148,7 @@ def _clock(data: Path) -> _Finding:
 
 
 def _authority(data: Path) -> str:
-    """Return the state of the local certificate authority."""
+    """Return the fingerprint and expiry date of the local certificate authority, if it exists."""
     from cryptography import x509
 
     from urc.access.authority import AUTHORITY_FOLDER, fingerprint

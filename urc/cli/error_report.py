@@ -11,7 +11,7 @@ class Misuse(UrcError):
 
 
 def explain(error: Exception, program: str) -> int:
-    """Print the message for an error in a program such as ``urc watch``; return the exit code."""
+    """Print the message for an error in a `program` such as ``urc watch``; return the exit code."""
     match error:
         case ProblemsError():
             for problem in error.problems:

@@ -68,7 +68,7 @@ def known_repositories() -> "list[Repository]":
 
 
 def installed_document(word: str) -> Path | None:
-    """Return the document of the installed robot or driver called `word`, or None.
+    """Return the document of the robot or driver that `word` names; None if not installed.
 
     If `word` contains no version, return the version in use; see
     `urc.runtime.settings_store.in_use`.
@@ -203,7 +203,7 @@ def is_agreed_to(
 
     Args:
         difference: changes from the version in use; None if there is no version to compare.
-        risks: local resources that the package itself specifies.
+        risks: resources of this machine that the package itself specifies.
         arguments: parsed arguments with ``yes``, ``allow_more`` and ``takes_risks``.
         question: question to the user, such as ``Update it?``.
     """

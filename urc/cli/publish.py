@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
-    """Return the origin of the packages, or None if no origin is given."""
+    """Return the origin of the packages from the options; None without these options."""
     import msgspec
 
     from urc import __version__

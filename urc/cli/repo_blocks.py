@@ -135,7 +135,7 @@ def _check_trust(known: "BlockStore", found: "BlockFile", file: Path, fingerprin
 
 
 def _tell_hits() -> None:
-    """Print the installed packages that are blocked."""
+    """Print a line for each installed package that a block list blocks."""
     from urc.cli.packages import open_store
     from urc.problems import printable
 

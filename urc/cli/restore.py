@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ended(new: Path, people_only: bool) -> list[str]:
-    """End the sign-ins in the extracted files; return a summary of people, devices and tokens."""
+    """End the restored browser sign-ins; return a summary of people, devices and tokens."""
     from contextlib import closing
 
     from urc.access.administration import end_after_restore, overview

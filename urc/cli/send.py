@@ -31,7 +31,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 KNOWN_S = 3.0
 """Timeout for reading the signals that a command requires, in seconds."""
 _WRONG_USE = ("bad-argument", "unknown-command")
-"""Failure codes for wrong arguments."""
+"""Codes of failures that count as invalid use of the command line."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -285,7 +285,7 @@ async def _known(session: "Session", command: "Command") -> None:
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
-    """Return the reason for a failure as text.
+    """Return the reason why a command failed, as text.
 
     If the robot is not connected, the reason includes the state of its links.
     """

@@ -21,7 +21,7 @@ __all__ = ["add_server", "opened_robot", "refuse_local_options"]
 
 
 def add_server(parser: argparse.ArgumentParser) -> None:
-    """Declare the options for a robot that is connected to a server."""
+    """Declare the options that select a robot on a server."""
     parser.add_argument(
         "--server",
         metavar="URL",

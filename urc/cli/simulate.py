@@ -105,7 +105,7 @@ class UnansweredLog(logging.Handler):
         """Number of times that each warning has occurred since it was last printed."""
         self._told_at: dict[str, float] = {}
         self._forgotten = 0
-        """Number of unprinted warnings without a separate count."""
+        """Number of warnings that were neither printed nor counted separately."""
         self._second = float("-inf")
         self._lines = 0
         """Number of lines printed in the current second, which began at `_second`."""

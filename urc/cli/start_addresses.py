@@ -44,7 +44,7 @@ class ReadyDashboard(NamedTuple):
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines of the start message; the first contains the address with all rights."""
+        """Yield the lines of the start message; the first line is the address with all rights."""
         yield f"dashboard {self.address}"
         if self.foxglove_port:
             yield f"foxglove {_viewer_address(self.url, self.foxglove_port, self.access.key)}"

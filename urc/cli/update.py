@@ -109,7 +109,7 @@ def _update(
 def _told(
     old: "Lock", plan: "InstallPlan", difference: "UpdateDiff", origins: list[str]
 ) -> list[str]:
-    """Return an update's changes as text."""
+    """Return the lines that describe an update: versions, origins, permissions and sent bytes."""
     from urc.packages.update import headline
 
     lines = [headline(old, plan.lock)]

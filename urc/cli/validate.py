@@ -28,7 +28,7 @@ FORMATS = ("text", "json", "sarif", "github")
 
 
 class _Report:
-    """The problems in all documents of one run."""
+    """Collects the problems and test results of all documents of one run."""
 
     def __init__(self) -> None:
         self.files = 0
@@ -187,7 +187,7 @@ def _document_in(path: str) -> str:
 
 
 def _widgets_of_package(path: str) -> "WidgetFolder | None":
-    """Return the widgets in a document's folder or package; None if it contains no widgets."""
+    """Return the widgets in a document's folder or package; None without widgets."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):

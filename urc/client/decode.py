@@ -83,7 +83,7 @@ def reading_of(value: object, signal: Signal | None) -> Reading:
 
 
 def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
-    """Yield the state of every transport."""
+    """Yield the state of every transport in a server's message."""
     for row in message.links:
         state: LinkState = row.state if row.state in _STATES else "lost"  # type: ignore[assignment]
         since_s = now_s - row.since / 1000
@@ -106,7 +106,7 @@ def entry_of(row: LogRow, now_s: float) -> LogEntry:
 
 
 def progress_of(message: ProgressMessage) -> Iterator[SequenceProgress]:
-    """Yield the progress of all sequences."""
+    """Yield the progress of every sequence in a server's message."""
     for row in message.sequences:
         yield SequenceProgress(row.command, row.place, row.of, row.state, row.reason)  # type: ignore[arg-type]
 

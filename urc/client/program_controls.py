@@ -61,7 +61,7 @@ class ProgramControls(ABC):
 
     @abstractmethod
     def release(self, command: str) -> None:
-        """Stop the command without waiting."""
+        """Stop the held command at once, without waiting for a confirmation."""
 
     @abstractmethod
     async def take(self, command: str) -> None:

@@ -131,7 +131,7 @@ class HubReadings:
         """Raise `ConnectionLost` if no further reading can arrive."""
 
     def shown(self, names: tuple[str, ...]) -> AbstractContextManager[None]:
-        """Request the image signals among `names` while the context is open."""
+        """Request the images of the image signals in `names` while the context is open."""
         return nullcontext()
 
     def _check(self, name: str) -> None:

@@ -253,7 +253,7 @@ class RemoteRobot(HubReadings):
                 await self._linked.wait()
 
     def over(self, running: "asyncio.Task[None]") -> None:
-        """Record that the connection has ended permanently, and wake all readers."""
+        """Record that the connection has ended permanently, so that waiting calls fail."""
         fault = None if running.cancelled() else running.exception()
         if fault is not None and not isinstance(fault, ConnectionLost):
             log.error("the client of %s failed", self._address.url, exc_info=fault)

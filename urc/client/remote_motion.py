@@ -29,7 +29,7 @@ from urc.wire.server_messages import (
 __all__ = ["ControlMessage", "RemoteMotion", "plain_arguments"]
 
 ControlMessage = LeaseMessage | HeartbeatMessage | StoppedMessage | RefusedMessage
-"""Server messages about the controls."""
+"""Messages from the server about the lease, heartbeats and stops."""
 _ASK_S: Final = 2.0
 """Maximum wait for the answer to a request about the controls, in seconds."""
 STOP_AGAIN_S: Final = 0.3
@@ -73,7 +73,7 @@ class RemoteMotion(ProgramControls):
     # -- messages
 
     def handle(self, message: ControlMessage) -> None:
-        """Handle a message about the controls."""
+        """Process a message from the server about the lease, heartbeats or stops."""
         match message:
             case LeaseMessage():
                 self.lease = message

@@ -80,7 +80,7 @@ def name_fault(path: str) -> str:
 
 
 def names_fault(paths: Sequence[str]) -> str:
-    """Return an error message if some systems cannot distinguish the paths, otherwise ""."""
+    """Return an error message if some operating systems confuse two of the paths, otherwise ""."""
     seen: dict[str, str] = {}
     for path in paths:
         other = seen.setdefault(path.casefold(), path)

@@ -36,7 +36,7 @@ class KeyHolder(Protocol):
 
 
 class KnownBlocks(msgspec.Struct, frozen=True):
-    """A block list with its maintainer and its origin."""
+    """A stored block list, with its maintainer's key and its origin."""
 
     by: str
     """The maintainer's name, which URC does not verify; only the key identifies the maintainer."""
@@ -77,7 +77,7 @@ class BlockStore:
         return found.st_mtime_ns, found.st_size, found.st_ino
 
     def all(self) -> tuple[KnownBlocks, ...]:
-        """Return the stored lists; raise `PackageError` for a damaged file."""
+        """Return all stored block lists; raise `PackageError` for a damaged file."""
         stamp = self.stamp()
         if stamp is None:
             return ()

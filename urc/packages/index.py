@@ -104,7 +104,7 @@ class Index(msgspec.Struct, frozen=True):
 def entry_of(
     package: Package, signature: Signature | None = None, notes: Notes | None = None
 ) -> IndexEntry:
-    """Return a package's index entry."""
+    """Return the index entry for a package with its signature and notes."""
     notes = notes or Notes()
     said = package.manifest
     return IndexEntry(

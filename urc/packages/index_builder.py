@@ -62,7 +62,7 @@ _SIGNED: Final = ".sig"
 
 
 class IndexListing(NamedTuple):
-    """Result of scanning a repository's folder."""
+    """Result of `make_index`: the new index, and the errors in rejected packages."""
 
     listed: Index
     faults: tuple[str, ...]

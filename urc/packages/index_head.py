@@ -42,7 +42,7 @@ class IndexSigner(NamedTuple):
 
 
 class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The head of an index. Clients request the head before the index."""
+    """The summary of an index, which clients request before the index itself."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]

@@ -18,7 +18,7 @@ class InstallPlan(NamedTuple):
     origins: Mapping[str, str]
     """Source of each package, by package name, such as ``drivers/puppet``."""
     signatures: Mapping[str, Signature]
-    """Signatures of signed archives, by digest."""
+    """Signatures of the signed archives, by digest of the archive."""
     own: frozenset[str] = frozenset()
     """Packages from a folder that the user named. The pinned keys of these packages are not
     checked.

@@ -23,7 +23,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""Number of attempts; a repository may change between the requests for the head and the index."""
+"""Number of attempts to read a head and its index, between which the repository may change."""
 
 
 class _RepositoriesFile(msgspec.Struct, frozen=True):
@@ -206,7 +206,7 @@ class Repository:
         try:
             index = read_index(data, str(self._index))
         except PackageError as error:
-            self._complain(f"{error}; it will be downloaded again")
+            self._complain(f"{error}; the index will be downloaded again")
             return None
         try:
             tags = msgspec.json.decode(_content(self._tags, 4096) or b"", type=_Tags)

@@ -280,7 +280,7 @@ class _Shop:
         self._seen = seen
 
     def _head(self) -> tuple[IndexHead | None, tuple[int, ...]]:
-        """Return the stored head and the stamp of its file."""
+        """Return the stored head, and a tuple that changes whenever the head's file changes."""
         try:
             with open(self._folder / HEAD, "rb") as opened:
                 stamp = _stamp(os.fstat(opened.fileno()))
@@ -293,7 +293,7 @@ class _Shop:
 
 
 def _stamp(status: os.stat_result) -> tuple[int, ...]:
-    """Return a stamp that changes whenever the file changes."""
+    """Return a tuple that changes whenever the file changes."""
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 

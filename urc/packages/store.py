@@ -103,7 +103,7 @@ class Store:
         _check_blocks(self.blocked(lock))
 
     def place(self, lock: Lock) -> Path:
-        """Return the folder with a lock's files."""
+        """Return the path of the folder for a lock's files, which may not exist."""
         return self.folder / "ecosystems" / lock.digest
 
     def blob(self, digest: str) -> bytes:

@@ -16,7 +16,7 @@ __all__ = ["PinnedKey", "PinnedSigner"]
 
 
 class PinnedSigner(NamedTuple):
-    """The signer of a repository's index."""
+    """The name and the public key of the signer of a repository's index."""
 
     by: str
     """Name of the signer, which URC does not verify; only the key identifies the signer."""

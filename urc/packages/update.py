@@ -64,7 +64,7 @@ Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
 
 
 class UpdateDiff(NamedTuple):
-    """The changes that an update makes."""
+    """The changes that an update makes to versions, permissions and sent bytes."""
 
     versions: list[str]
     """Changed versions, such as ``widgets/dial 1.0.0 → 1.1.0``."""
@@ -145,7 +145,7 @@ def staged_difference(
     Args:
         old: the installed package's lock.
         plan: install plan for the update.
-        store: store with both versions.
+        store: store that contains both versions.
         staged: result of `StoreTransaction.stage` for the plan.
         look: function that returns the preview of a package's documents.
 

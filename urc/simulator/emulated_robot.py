@@ -181,7 +181,7 @@ class EmulatedRobot:
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
-    """Return the signal for each camera image, keyed by transport and topic."""
+    """Return the signals whose values are camera images, keyed by transport and topic."""
     return {
         (message.transport, topic_of(message.read, settings)): name
         for message in driver.messages.values()
@@ -243,7 +243,7 @@ class EmulatedConnection:
         self.faults = 0
         """Total number of invalid frames, unmatched frames and failed replies."""
         self.last_fault = ""
-        """Text of the latest fault, on one line."""
+        """Description of the latest fault, on one line."""
 
     @property
     def due_in_s(self) -> float | None:

@@ -10,7 +10,7 @@ __all__ = ["Fields"]
 
 
 class Fields(NamedTuple):
-    """The known field values for one frame."""
+    """The known values of one frame's fields, and the fields without known values."""
 
     numbers: dict[str, object]
     others: dict[str, object]

@@ -55,7 +55,7 @@ class ReadyRule(NamedTuple):
 
 
 class RunningRule:
-    """A rule's pending reactions."""
+    """The reactions of a triggered rule that are not complete yet."""
 
     __slots__ = ("asked", "frame", "has_waited", "left_s", "names", "ready_reactions", "sets")
 
@@ -263,7 +263,7 @@ def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
 
 
 def not_taken(frame: Frame) -> str:
-    """Return the fault message for an unexpected frame."""
+    """Return the fault message about a frame that no rule matches."""
     if not isinstance(frame.payload, bytes):
         shown = traffic_of(frame.payload).decode("utf-8", "replace")[:60]
         return f"no rule matches {shown!r}, and the driver never sends it"

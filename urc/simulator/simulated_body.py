@@ -81,7 +81,7 @@ class SimulatedBody:
             import urc.simulator.world.picture  # noqa: F401  # imported only to load it
 
     def view(self, now_s: float) -> SensorView:
-        """Return the sensor view of the world at `now_s`."""
+        """Advance the world to `now_s`, and return its sensor view."""
         return self.world.view(now_s)
 
     def sense(self, name: str, now_s: float) -> object:

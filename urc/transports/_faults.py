@@ -1,4 +1,4 @@
-"""Uniform error messages for all transports."""
+"""Error messages about connections, worded in the same way for all transports."""
 
 import errno
 import socket
@@ -31,7 +31,7 @@ def place_of(host: str, port: int) -> str:
 
 
 def late(place: str, timeout_s: float) -> str:
-    """Return the message for a connection timeout."""
+    """Return the message for a robot at `place` that has not answered within `timeout_s`."""
     return f"no answer from {place} within {timeout_s:g} s"
 
 

@@ -12,7 +12,7 @@ from urc._daemon import in_daemon
 __all__ = ["Address", "AddressLookup"]
 
 Address = tuple[socket.AddressFamily, tuple[str | int, ...] | tuple[int, bytes]]
-"""Address family and socket address."""
+"""An address family, and a socket address of this family."""
 _Connected = TypeVar("_Connected")
 
 

@@ -95,7 +95,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._number = -1 if line is None else line.fileno()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return the free part of the receive buffer."""
+        """Return the free part of the receive buffer, for the event loop to fill."""
         return self._buffer[self._filled :] if self._filled else self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
@@ -279,7 +279,7 @@ def tune(line: socket.socket) -> None:
 
 
 def as_bytes(payload: Payload) -> bytes:
-    """Return `payload` unchanged if it is bytes.
+    """Return a payload that consists of bytes.
 
     Raises:
         TransportError: the payload is an envelope.

@@ -40,7 +40,7 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""The verb for notices, which are messages that the transport itself creates. A notice's body is
+"""The verb of notices, which are envelopes that the transport itself creates. A notice's body is
 one line of text about an error that the robot does not report. Notices are written to the robot's
 log and do not prove that the robot is alive.
 """
@@ -63,9 +63,8 @@ class PeerClosed(TransportError):
 
 
 class Transport(Protocol):
-    """One connection to a robot.
-
-    A transport may be reopened after `close` but has at most one connection at a time.
+    """Carries payloads to and from one robot. A transport may be reopened after `close` but has at
+    most one connection at a time.
     """
 
     @property
@@ -242,7 +241,7 @@ class SupportsReset(Protocol):
 
 @runtime_checkable
 class SupportsEnd(Protocol):
-    """A stream that URC can end with a reason to display."""
+    """A stream that URC can end, with a reason for the user."""
 
     def end(self, why: str) -> None:
         """Make `read` and `write` raise `PeerClosed` with the reason `why` from now on."""

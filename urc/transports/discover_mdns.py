@@ -1,4 +1,4 @@
-"""Multicast DNS discovery of announced services.
+"""Discovers announced services with multicast DNS.
 
 The library zeroconf (extra ``mdns``) is imported only when a search begins.
 """

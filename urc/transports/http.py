@@ -87,7 +87,7 @@ class HttpTransport:
         self._talk = talk
 
     async def receive(self) -> Envelope:
-        """Return the next response, image or event.
+        """Return the next response, image, event or line.
 
         Raises:
             PeerClosed: the robot is no longer reachable.

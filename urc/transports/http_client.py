@@ -321,7 +321,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
 
 
 class _PooledStream(httpcore2.AsyncNetworkStream):
-    """A stream with the interface that the library's pool requires."""
+    """A stream with the interface that the connection pool of httpcore2 requires."""
 
     def __init__(self, stream: ByteStream, ended: Callable[["_PooledStream"], None]) -> None:
         self._stream = stream
@@ -408,7 +408,7 @@ class _PooledStream(httpcore2.AsyncNetworkStream):
 
 
 class _PoolTransport(httpx2.AsyncBaseTransport):
-    """A library transport that uses URC's connection pool and keeps the pool's errors unchanged."""
+    """An httpx2 transport that uses URC's connection pool and keeps the pool's errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

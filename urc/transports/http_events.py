@@ -24,7 +24,7 @@ class Event(NamedTuple):
     name: str
     """Event name; "" for the default, which is called ``message`` in the standard."""
     data: bytes
-    """Data lines, joined by LF characters."""
+    """The event's data lines, joined by LF characters."""
     id: str
     """The stream's newest event id, from which a new connection resumes."""
 

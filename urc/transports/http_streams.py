@@ -115,7 +115,7 @@ class HttpStream:
         """Initialise the stream.
 
         Args:
-            spec: description of the stream.
+            spec: kind, path and topics of the stream.
             client: HTTP client that makes the requests.
             queue: queue that receives the stream's images, events or lines.
             pulse: record of the time at which the robot last sent data.

@@ -37,7 +37,7 @@ considered lost."""
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a received message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
-"""Maximum number of unacknowledged messages."""
+"""Maximum number of published messages that the broker has not acknowledged."""
 MAX_HALF = 64
 """Maximum number of incomplete deliveries with quality of service 2."""
 MAX_UNTAKEN = 4096
@@ -139,7 +139,7 @@ class MqttTransport:
 
 
 class _MqttSession:
-    """One open connection with its paho client."""
+    """One open connection to the broker, with its paho client."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
         self.queue = TopicReceiveQueue()
@@ -240,7 +240,7 @@ class _MqttSession:
             raise PeerClosed(self.queue.ended)
 
     def _forget(self, line: Any) -> None:
-        """Stop watching a socket that is about to be closed."""
+        """Stop waiting for events of a socket that is about to be closed."""
         if line.fileno() >= 0:
             self._loop.remove_reader(line)
             self._loop.remove_writer(line)

@@ -23,7 +23,7 @@ class OwnAddressError(OSError):
 
 
 class OwnListeners:
-    """This program's listening addresses."""
+    """The addresses on which URC's own dashboard listens."""
 
     def __init__(self) -> None:
         """Initialise without listeners."""

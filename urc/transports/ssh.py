@@ -152,7 +152,7 @@ class SshTransport:
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
     ) -> None:
-        """Store the server and the program; `outer` is the tunnelling SSH transport, or None."""
+        """Store the server and the program; `outer` is the tunnel's SSH transport, or None."""
         self.target = target
         self._program = program
         self._outer = outer

@@ -97,7 +97,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._end(self._wire.fault or self._farewell())
 
     def pause_writing(self) -> None:
-        """Block `write` while the other side accepts no data."""
+        """Make `write` wait while the other side accepts no data."""
         self._writable.clear()
 
     def resume_writing(self) -> None:

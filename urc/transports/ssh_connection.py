@@ -135,7 +135,8 @@ class SshConnection:
     ) -> SshChannel:
         """Open `channel`; after a cancellation, close the channel as soon as possible.
 
-        If the opening is cancelled, asyncssh forgets the channel, but the server keeps it open.
+        If the opening of a channel is cancelled, asyncssh forgets the channel, but the server keeps
+        it open.
         """
         task = asyncio.ensure_future(begin(channel))
         try:

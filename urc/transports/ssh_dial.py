@@ -15,7 +15,7 @@ from urc.transports.topic_socket import Address
 __all__ = ["OfferedHostKey", "SshTarget", "dial", "look_at_key"]
 
 ALIVE_COUNT = 2
-"""Maximum number of unanswered keepalives."""
+"""Maximum number of unanswered keepalives before the connection counts as lost."""
 
 
 class OfferedHostKey(NamedTuple):
@@ -38,7 +38,7 @@ class OfferedHostKey(NamedTuple):
 
 
 class SshTarget(NamedTuple):
-    """One SSH server, with its login and trusted keys."""
+    """The address of an SSH server, with the login and the trusted host keys."""
 
     address: Address
     login: Login

@@ -179,7 +179,7 @@ class TunnelAdapter:
 
 
 class _Nested(asyncssh.SSHTCPSession[bytes]):
-    """Another SSH connection's channel, used as a socket."""
+    """A channel of another SSH connection, in the role of a socket."""
 
     def __init__(self, wire: SshSocket) -> None:
         self._wire = wire

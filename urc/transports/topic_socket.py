@@ -14,7 +14,7 @@ __all__ = ["Address", "reason"]
 
 
 class Address:
-    """The host and port of a connection."""
+    """The host and port to which a protocol library needs a connection."""
 
     def __init__(self, host: str, port: int) -> None:
         """Store the host and the port, without an address lookup."""

@@ -37,7 +37,7 @@ class WebOrigin(NamedTuple):
 
 
 class OptionReader:
-    """A reader of one transport's options; an invalid option raises a one-line error."""
+    """Reads one transport's options; an invalid option raises a one-line error."""
 
     def __init__(self, kind: str, options: Mapping[str, object]) -> None:
         """Read the `options` of a transport of type `kind`."""
@@ -176,7 +176,7 @@ class OptionReader:
 
 
 class Credentials(NamedTuple):
-    """The credentials for a web server."""
+    """The credentials with which requests sign in to a web server."""
 
     kind: str
     user: str

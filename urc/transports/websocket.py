@@ -142,7 +142,7 @@ class WebSocketTransport:
             await self._dialer.close()
 
     async def probe(self) -> None:
-        """Send a ping; return as soon as any data has arrived."""
+        """Send a ping; return as soon as the robot has sent any data."""
         connection = self._socket
         if not isinstance(connection, _LimitedConnection):
             raise PeerClosed(CLOSED)
@@ -278,7 +278,7 @@ def _refusal(fault: Exception, where: str) -> str:
 
 
 def _end(ended: ConnectionClosed) -> str:
-    """Return a one-line message that says why the connection ended."""
+    """Return a one-line message that states why the connection ended."""
     theirs, ours, cause = ended.rcvd, ended.sent, ended.__cause__
     if theirs is not None and ended.rcvd_then_sent is not False:
         said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""

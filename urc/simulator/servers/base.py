@@ -26,7 +26,7 @@ __all__ = [
 
 
 class Endpoint(NamedTuple):
-    """The address of a listening server."""
+    """The address at which clients reach a simulated server."""
 
     host: str
     """Network address; "" for a server without an address."""
@@ -51,7 +51,7 @@ class LastPeer:
 
 
 class ServerContext(NamedTuple):
-    """Context of a server: its transport, its address and the emulated robot."""
+    """All that a simulated server needs: its transport, its address and the emulated robot."""
 
     name: str
     """Name of the transport in the driver."""
@@ -113,8 +113,8 @@ SERVERS = Table(
         "mqtt": "urc.simulator.servers.mqtt:MqttRobot",
     },
 )
-"""Server classes by transport type. Each class implements `SimulatedServer` and takes a
-`ServerContext`."""
+"""Class of simulated server for each type of transport. Each class implements `SimulatedServer` and
+takes a `ServerContext`."""
 
 
 def option_port(context: ServerContext, key: str = "port", default: int | None = None) -> int:
@@ -142,7 +142,7 @@ def host_and_port(host: str, port: int) -> str:
 
 
 def cannot_listen(context: ServerContext, port: int, fault: OSError, kind: str = "") -> UrcError:
-    """Return the error for an unavailable address."""
+    """Return the error for an address on which the server cannot listen."""
     where = f"{kind}{host_and_port(context.host, port)}"
     return UrcError(f"transports.{context.name}: cannot listen on {where} ({reason(fault)})")
 

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class ClientConnection:
-    """One client of a server."""
+    """One client that is connected to a simulated server."""
 
     def __init__(self, line: EmulatedConnection, abort: Callable[[], None]) -> None:
         self.line = line

@@ -32,7 +32,7 @@ class Listener(NamedTuple):
 
 
 class ListeningServer(ABC):
-    """A listening port and its clients."""
+    """Base class of servers that listen on a port, with all connected clients."""
 
     DEFAULT_PORT: ClassVar[int | None] = None
     """Default port of the transport type."""

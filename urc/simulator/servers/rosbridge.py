@@ -183,7 +183,7 @@ class BridgeClient:
     # -- replies of the robot
 
     def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
-        """Reply to a call from this client."""
+        """Send the reply to a service call that this client has made."""
         operation = {"op": "service_response", "service": service, "values": values}
         if number is not None:
             operation["id"] = number
@@ -287,7 +287,7 @@ class BridgeClient:
             client.answer(_text(operation, "service"), number, values, is_ok)
 
     def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
-        """Send a goal to the robot."""
+        """Return the envelope that sends a client's action goal to the robot."""
         action, number = _text(operation, "action"), operation.get("id")
         self._remember(self._goals, number, action)
         attributes = {

@@ -96,7 +96,7 @@ class SshServer(ListeningServer):
 
 
 class _Lock:
-    """The credentials in the driver's options."""
+    """Checks logins against the credentials in the driver's options."""
 
     def __init__(self, context: ServerContext) -> None:
         options = context.options

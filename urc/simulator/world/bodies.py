@@ -46,7 +46,7 @@ class Motion:
     phase: float = 0.0
     """Phase of the wave that travels along a jointed body, in cycles."""
     drive: float = 0.0
-    """Amplitude of the body's wave, 0 to 1."""
+    """Amplitude of the wave that travels along a jointed body, 0 to 1."""
     bend: float = 0.0
     """Bend of the body to the left, -1 to 1."""
     is_up: bool = False

@@ -135,7 +135,7 @@ def _seen(
 
 
 def _open_country(plan: WorldMap, pose: CameraPose, direction: Array, slope: Array) -> Array:
-    """Return the colours of sky and ground."""
+    """Return the colours of sky and ground in the given directions."""
     above, horizon = (np.array(one, dtype=np.float32) for one in _SKY)
     share = np.clip(slope * 1.5, 0, 1)[..., None]
     picture: Array = horizon + (above - horizon) * share

@@ -33,8 +33,8 @@ __all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 STEP_S: Final = 0.02
 """Length of a simulation step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Maximum simulated time between two observations, in seconds. The earlier part of a longer gap is
-skipped."""
+"""Maximum simulated time between two observations, in seconds. If a gap is longer, the simulation
+skips its earlier part."""
 _ASKED_EVERY_S: Final = 0.1
 """Interval at which time-dependent inputs are evaluated during a long gap, in seconds."""
 _TRAIL_EVERY_M: Final = 0.05
@@ -83,7 +83,7 @@ class World:
         self.battery = Battery(spec)
         self.touch: Contact | None = None
         self.tick = 0
-        """Number of completed steps."""
+        """Number of completed simulation steps."""
         self.time_s: float | None = None
         """End of the last step, in seconds since the epoch; None before the first observation."""
         self.noise = 1.0
@@ -122,7 +122,7 @@ class World:
         self.battery.drain(_LOW)
 
     def view(self, now_s: float) -> "SensorView":
-        """Return the sensor view at `now_s`."""
+        """Advance the world to `now_s`, and return its sensor view."""
         self.advance(now_s)
         return SensorView(self)
 

@@ -37,7 +37,7 @@ _REPLY_HEAD: Final = struct.Struct("<xIII")
 
 
 class MessageData(NamedTuple):
-    """A message of a subscribed channel."""
+    """A message on a subscribed channel."""
 
     subscription: int
     time_ns: int

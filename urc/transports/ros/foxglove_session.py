@@ -382,7 +382,7 @@ class FoxgloveSession:
     # -- sending
 
     def perform(self, envelope: Envelope) -> None:
-        """Write the frames for an envelope.
+        """Write the frames for an envelope that publishes a message or calls a service.
 
         Raises:
             TransportError: the robot does not support the operation.

@@ -39,7 +39,7 @@ class TopicGraph:
             self._log(f"this bridge is ROS {found}: write 'version: {found}' or 'version: auto'")
 
     def subscribed(self, wanted: Mapping[str, str]) -> None:
-        """Check the subscribed topics and their types against the existing topics."""
+        """Report each subscribed topic that does not exist or has a different type."""
         for topic, kind in sorted(wanted.items()):
             # In ROS 2, the feedback of an action is not an ordinary topic.
             if topic not in self._types and not topic.endswith("/feedback"):
@@ -56,7 +56,7 @@ class TopicGraph:
         return True
 
     def subscribers(self, topic: str, nodes: Iterable[object]) -> None:
-        """Check that a published topic has subscribers."""
+        """Report a published topic that has no subscribers."""
         if not list(nodes):
             self._log(f"nothing subscribes to {topic}: its messages have no effect")
 

@@ -49,7 +49,7 @@ class RosClient:
     """Converts between envelopes and rosbridge operations, for one connection."""
 
     def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver messages to `queue`; `ros` is the ROS version for type names, or None."""
+        """Deliver messages to `queue`; `ros` is the ROS version of type names; None keeps names."""
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -256,7 +256,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         self._frames.append(payload)
 
     def send_ros_message(self, message: Any) -> None:
-        """Write an operation; unlike roslibpy, raise an error on failure."""
+        """Add an operation to the frames to send; unlike roslibpy, raise an error on failure."""
         self.send_message(encode_operation(dict(message)))
 
     def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:

@@ -62,7 +62,7 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
 
 
 class OperationReader:
-    """A decoder for the frames of one connection, which also joins fragmented operations."""
+    """Decodes the frames of one connection, and joins fragmented operations."""
 
     def __init__(self) -> None:
         self._halves: dict[str, dict[int, str]] = {}
@@ -156,7 +156,7 @@ def _tagged(first: Any, second: Any) -> object:
 
 
 class _Plain:
-    """A converter from CBOR values to JSON-like values, with a limit on the result's size.
+    """Converts CBOR values to JSON-like values, up to a maximum size of the result.
 
     References in CBOR data may be nested, so a few bytes could expand without limit.
     """
