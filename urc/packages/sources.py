@@ -46,7 +46,7 @@ class FileSource:
         self.is_folder = is_folder
         """Whether the source is a folder of packages in development."""
         self.signatures = dict(signatures or {})
-        """Signatures of signed archives, by digest."""
+        """Signatures of the signed archives, by digest of the archive."""
         self.roots = tuple(roots)
         """Packages to install if the user requests the whole source."""
         self._packages = {package.digest: package for package in packages}

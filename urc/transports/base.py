@@ -63,8 +63,9 @@ class PeerClosed(TransportError):
 
 
 class Transport(Protocol):
-    """Carries payloads to and from one robot. A transport may be reopened after `close` but has at
-    most one connection at a time.
+    """Carries payloads to and from one robot.
+
+    A transport may be reopened after `close` but has at most one connection at a time.
     """
 
     @property

@@ -79,7 +79,7 @@ class TopicReceiveQueue:
         self._answers_bytes += size_bytes
 
     def end(self, reason: str) -> None:
-        """End the queue; envelopes in the queue can still be read."""
+        """End the queue; the envelopes that it already contains can still be read."""
         if self._ended is None:
             self._ended = reason
         self._arrived.set()
