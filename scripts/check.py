@@ -51,7 +51,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of a step."""
+    """Result of a step: its failure, its duration and its failed tests."""
 
     name: str
     fault: str

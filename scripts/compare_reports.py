@@ -149,7 +149,7 @@ class Comparison:
         self._migrated: dict[str, Migrated | None] = {}
 
     def compare_reports(self, before: dict[str, Any], after: dict[str, Any]) -> None:
-        """Compare the reports of the broken documents."""
+        """Compare the problems that both trees report for the broken documents."""
         self.counts["broken documents before"] = len(before)
         self.counts["broken documents after"] = len(after)
         for name, old in before.items():
@@ -170,7 +170,7 @@ class Comparison:
             self.counts["reports equal"] += moved == found
 
     def compare_resolved(self, before: dict[str, str], after: dict[str, str]) -> None:
-        """Compare the resolved profiles of the robots."""
+        """Compare the output of `urc resolve` in both trees, for each robot."""
         for name, text in before.items():
             with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
                 file.write(text)
@@ -211,7 +211,7 @@ class Comparison:
     def moved(self, problem: Problem) -> Problem:
         """Return a problem of the old tree as expected in this tree: with its new column and code.
 
-        Renames never change lines.
+        The line stays the same, because renames never change lines.
         """
         file, line, column, severity, code = problem
         migrated = self.migrated(file) if (self.old / BROKEN / file).is_file() else None

@@ -107,7 +107,7 @@ class Explained(NamedTuple):
     kinds: tuple[Kind, ...] = ()
 
     def covers(self, mutant: Mutant) -> bool:
-        """Return whether a mutant is explained."""
+        """Return whether a reason or a category explains why a mutant is harmless."""
         known = (mutant.function, mutant.change) in self.reasons
         return known or any(kind.fits(mutant.change) for kind in self.kinds)
 

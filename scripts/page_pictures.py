@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 async def take(address: str, given: argparse.Namespace) -> None:
-    """Take the pictures, and write the measurements."""
+    """Take the pictures, and write the measurements to shares.md."""
     lines = ["| robot | screen | background | bars | faults |", "|---|---|---|---|---|"]
     touched = [screen for screen in given.screens if screen != DESKTOP]
     async with running_browser() as browser:

@@ -59,7 +59,7 @@ class Sentence(NamedTuple):
 
 
 def is_read(path: str) -> bool:
-    """Return whether a file can contain prose."""
+    """Return whether prose is extracted from files at this path."""
     if path.startswith(GENERATED):
         return False
     if path.endswith(".md"):
@@ -90,7 +90,7 @@ def passages(files: Mapping[str, str]) -> Iterator[Passage]:
 
 
 def sentences(found: Passage) -> Iterator[Sentence]:
-    """Yield a passage's sentences."""
+    """Yield the sentences of a passage, each with its own line number."""
     start = 0
     for end in [*(match.end() for match in _END.finditer(found.text)), len(found.text)]:
         piece = found.text[start:end]

@@ -60,7 +60,7 @@ class BuildError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Build the folder; return the exit code."""
+    """Build the folder of the playground; return the exit code."""
     parser = argparse.ArgumentParser(description="Build the playground as static files.")
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     folder: Path = parser.parse_args(arguments).folder

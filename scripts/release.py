@@ -3,9 +3,9 @@
     ./dev release                      everything, into dist/
     ./dev release --debian WHEELS      also the Debian package, from a folder of wheels
 
-The command publishes nothing. Each build runs twice, in different folders; the results must have
-the same bytes. All files carry the time of the last commit, so builds on other machines produce the
-same bytes.
+The command only builds files, and publishes nothing. Each build runs twice, in different folders;
+the results must have the same bytes. All files carry the time of the last commit, so builds on
+other machines produce the same bytes.
 """
 
 import argparse

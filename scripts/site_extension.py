@@ -38,7 +38,7 @@ DOCUMENT = "urc-document"
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect the extension to Sphinx."""
+    """Connect the extension's functions to the events of Sphinx."""
     app.connect("doctree-read", mark_documents)
     app.connect("doctree-read", anchor_terms)
     app.connect("doctree-resolved", link_names)

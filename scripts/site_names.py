@@ -54,6 +54,6 @@ def names() -> Mapping[str, Place]:
 
 
 def headings(page: str, level: str) -> list[str]:
-    """Return a reference page's headings."""
+    """Return the headings of a reference page, at the levels that a pattern selects."""
     text = (REFERENCE / f"{page}.md").read_text("utf-8")
     return re.findall(rf"^{level} (.+)$", text, re.MULTILINE)

@@ -3,8 +3,8 @@
     python -m scripts.structure             this tree
     python -m scripts.structure ROOT        another tree, such as a worktree of an older commit
 
-Use the metrics to compare the code before and after a change. No metric is a goal in itself.
-`--names` lists the counted modules, classes and functions. Definitions of the metrics:
+Use the metrics to compare the code before and after a change. A better metric is never a goal in
+itself. `--names` lists the counted modules, classes and functions. Definitions of the metrics:
 
 - modules with one importer: modules of `urc` that exactly one other module uses. A use is an import
   at any level, or an entry `"urc.module:name"` in a table. Packages and `__main__` do not count;
@@ -33,7 +33,7 @@ _ENTRY = re.compile(r"(urc(?:\.\w+)+):\w+")
 
 @dataclass
 class Module:
-    """A parsed Python file."""
+    """A Python file with its path, its text and its syntax tree."""
 
     path: str
     name: str

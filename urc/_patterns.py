@@ -53,7 +53,7 @@ _BEYOND_ASCII: Final = 6
 """Number of RE2 instructions for all non-ASCII characters, which RE2 matches byte by byte."""
 
 _OTHER = 128
-"""Code that represents all non-ASCII characters."""
+"""Number that represents all non-ASCII characters in a character set."""
 _ALL = frozenset(range(129))
 _DIGITS = frozenset(range(48, 58))
 _SPACES = frozenset(b" \t\n\r\f\v")

@@ -90,7 +90,7 @@ def runaway_quote(lines: Sequence[str], number: int, column: int) -> tuple[int, 
     Args:
         lines: lines of the document.
         number: index of the line with the error; a quote in this line ended the text.
-        column: column of the error.
+        column: 0-based column of the error in that line.
 
     Returns:
         The line, column and quote of the text; None if no earlier text extends to the error.
@@ -114,7 +114,7 @@ def missing_comma(text: str, column: int) -> int | None:
     """Return the column of a key inside ``{ }`` that lacks a comma before it, or None.
 
     Args:
-        text: line of the error.
+        text: content of the line with the error.
         column: column of the error: a second colon, or the key after a quoted text.
     """
     if len(text) > _LONGEST:

@@ -30,7 +30,7 @@ _CLOSING: Final = ("”", "“", "’", "‘", "»", "«")
 
 
 class DocumentLimits(NamedTuple):
-    """Size limits of a document."""
+    """Limits that bound the time and the memory for reading a document."""
 
     size_bytes: int = 1 << 20
     depth: int = 64

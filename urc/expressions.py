@@ -305,5 +305,5 @@ def is_nonce(template: Template) -> bool:
 
 
 def is_byte_filter(name: str) -> bool:
-    """Return whether a filter returns bytes."""
+    """Return whether the filter with this name returns bytes."""
     return name in table.FILTERS and table.FILTERS[name].gives_bytes

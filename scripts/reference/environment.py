@@ -9,7 +9,7 @@ __all__ = ["page"]
 
 def page() -> str:
     """Return the page: one section for each variable."""
-    lines = ["# Environment variables", "", "Variables that `urc` reads.", ""]
+    lines = ["# Environment variables", "", "Environment variables that `urc` reads.", ""]
     lines += ["## Variables of URC", "", *_sections(VARIABLES)]
     lines += ["## System variables", "", *_sections(SYSTEM)]
     return "\n".join(lines).rstrip() + "\n"

@@ -46,7 +46,7 @@ _WORDS_OF_YAML = frozenset(("true", "false", "null", "yes", "no", "on", "off", "
 
 @cache
 def read_schema(name: str) -> Schema:
-    """Return a schema by its file name."""
+    """Return the schema in the file with this name."""
     schema: Schema = json.loads((SCHEMAS / name).read_text("utf-8"))
     return schema
 

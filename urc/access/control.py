@@ -27,7 +27,7 @@ from urc.model.role import Role
 __all__ = ["LOCAL_USER", "AccessControl"]
 
 LOCAL_USER: Final = Principal("local", "person", "this computer", (Grant("administer"),))
-"""The holder of the start key."""
+"""The principal of the local user, who holds the start key."""
 LOCAL_SIGN_INS: Final = 1000
 """Maximum number of sign-ins with the start key; above the limit, the oldest is closed."""
 _CODES: Final = 16

@@ -43,9 +43,9 @@ class SignIn(NamedTuple):
     """The sign-in of one browser, or the token of one program."""
 
     id: str
-    """Unique identifier; not secret."""
+    """Unique identifier of the sign-in; not secret."""
     principal: str
-    """Id of the principal."""
+    """Id of the principal who signed in."""
     way: Way
     digest: bytes
     """SHA-256 of the secret; the store never contains the secret itself."""
@@ -102,7 +102,7 @@ class Directory:
     sign_ins: Mapping[str, SignIn] = field(default_factory=dict)
     """Sign-ins by id."""
     by_digest: Mapping[bytes, str] = field(default_factory=dict)
-    """Sign-in ids by digest of the secret."""
+    """Id of each sign-in, by digest of the sign-in's secret."""
 
     def identify(self, secret: str, now: float) -> Identity:
         """Return the identity with this `secret`; `NOBODY` if it is unknown, expired or revoked."""

@@ -42,7 +42,7 @@ class OidcRedirect(NamedTuple):
     """The redirect that begins a sign-in."""
 
     url: str
-    """Address of the provider's page."""
+    """Address of the provider's sign-in page, to which the browser is redirected."""
     binding: str
     """Secret in a browser cookie during the sign-in at the provider."""
 

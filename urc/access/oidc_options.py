@@ -31,7 +31,7 @@ KEYS: Final = (
     "issuer", "client_id", "client_secret_file", "title", "address", "scopes", "name",
     "authority_file", "hours", "grants",
 )  # fmt: skip
-"""All permitted keys of the file."""
+"""All keys that the options file may contain."""
 _RULE_KEYS: Final = ("claim", "value", "grant")
 _SCOPES: Final = ("openid", "profile")
 _OPENID: Final = "openid"
@@ -44,7 +44,7 @@ class ClaimRule(NamedTuple):
     claim: str
     """Name of the claim; dots separate nested names, as in ``realm_access.roles``."""
     value: str
-    """The required value, or `ANY`. A claim that is a list matches if it contains the value."""
+    """Value that the claim must have, or that a list in the claim must contain; or `ANY`."""
     grant: Grant
 
 
@@ -112,7 +112,7 @@ def _values_of_one(found: Any) -> tuple[str, ...]:
 
 
 def read_oidc_options(file: str) -> OidcOptions:
-    """Return the options from a file.
+    """Read the options in a YAML file, and check them.
 
     Raises:
         ProblemsError: the file or a secret's file cannot be read, or a value is invalid.

@@ -30,7 +30,7 @@ class OptionsFile:
 
         Args:
             file: the file's path.
-            keys: all permitted keys of the file.
+            keys: all keys that the file may contain.
 
         Raises:
             ProblemsError: the file cannot be read, or is not a mapping with these keys.

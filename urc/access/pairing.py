@@ -56,7 +56,7 @@ def pair(
         code: the code.
         name: name chosen on the device, used if the invitation has no name.
         now: UTC time in seconds since 1970.
-        origin: origin of the request.
+        origin: network address and browser of the request.
 
     Raises:
         AccessError: the code is unknown, or the name is invalid or in use.
@@ -79,10 +79,10 @@ def join(
 
     Args:
         store: the store.
-        code: the code of the invitation.
+        code: the code from the person's invitation.
         kept: hash of the passphrase.
         now: UTC time in seconds since 1970.
-        origin: origin of the request.
+        origin: network address and browser of the request.
 
     Raises:
         AccessError: the code is unknown, or the person was removed.

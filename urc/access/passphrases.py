@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 SHORTEST: Final = 8
-"""Minimum number of characters."""
+"""Minimum number of characters in a passphrase."""
 LONGEST: Final = 256
 """Maximum number of characters; longer text would let attackers waste the server's time."""
 WRONG: Final = "the name or the passphrase is wrong"

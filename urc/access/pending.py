@@ -44,7 +44,7 @@ class Pending(Generic[_Value]):
         return len(self._entries)
 
     def begin(self, value: _Value, place: str, now: float) -> str:
-        """Store a value and return its key.
+        """Store a value, and return the random key with which it can be retrieved.
 
         Args:
             value: the value, which can be retrieved once.

@@ -19,7 +19,7 @@ __all__ = ["KEYS", "ProxiedRequest", "TrustedProxy", "read_proxy_options", "with
 SHORTEST_SECRET: Final = 32
 """Minimum length of the secret, in characters; 32 random letters cannot be guessed."""
 KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
-"""All permitted keys of the file."""
+"""All keys that the options file may contain."""
 _HEADER: Final = re.compile(r"[A-Za-z0-9-]{1,64}")
 _TAKEN: Final = re.compile(
     r"host|origin|cookie|authorization|connection|upgrade|content-.*|transfer-.*|sec-.*|user-agent",
@@ -89,7 +89,7 @@ def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) ->
 
 
 def read_proxy_options(file: str) -> TrustedProxy:
-    """Return the proxy described by a file.
+    """Read and check the file that describes a proxy; return the proxy.
 
     Raises:
         ProblemsError: the file or the secret's file cannot be read, or a value is invalid.

@@ -317,7 +317,7 @@ class AccessStore:
     # Codes that work once
 
     def invite(self, invitation: Invitation, *, now: float = 0.0) -> str:
-        """Return a new code for `invitation`.
+        """Store an invitation, and return its new one-time code.
 
         Args:
             invitation: the right that the code grants.
@@ -354,7 +354,7 @@ class AccessStore:
     def invitation(self, code: str, now: float) -> Invitation | None:
         """Return a code's invitation, or None if the code is unknown or expired.
 
-        The code stays valid.
+        Reading an invitation does not invalidate its code.
         """
         with self._change():
             row = self._base.execute(

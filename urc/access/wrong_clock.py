@@ -21,7 +21,7 @@ class KnownTime(NamedTuple):
     """A past event and its time; a correct clock shows a later time."""
 
     at: float
-    """UTC time in seconds since 1970."""
+    """UTC time of the event, in seconds since 1970."""
     event: str
     """Event at that time, such as “the newest entry of the audit log”."""
 

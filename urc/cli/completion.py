@@ -46,7 +46,7 @@ def answer() -> None:
 
 
 def _parsers_of(tree: argparse.ArgumentParser) -> Iterable[argparse.ArgumentParser]:
-    """Return the parsers of the subcommands."""
+    """Yield the parser of each subcommand in the tree."""
     for action in tree._actions:  # noqa: SLF001 - argparse has no public list
         if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - the type has no other name
             yield from action.choices.values()

@@ -135,7 +135,7 @@ async def _nearby(
 ) -> tuple[list[Row], str]:
     """Return the shipped robots whose ports are open, on this machine or on the given hosts.
 
-    Settings without a given value have their default values.
+    A setting without a value in `settings` has its default value.
 
     For each rosbridge that replies, the result includes its topics.
     """

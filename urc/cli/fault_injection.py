@@ -216,6 +216,6 @@ class FaultInjector:
             print(self, flush=True)
 
     async def listen(self) -> None:
-        """Execute the commands from standard input until the input ends."""
+        """Execute the fault commands on standard input, until the input ends."""
         async for line in typed_lines(sys.stdin):
             self.obey(line)

@@ -61,7 +61,7 @@ def add_actions(parser: argparse.ArgumentParser, actions: Iterable[str], text: s
 
 
 def add_roles(parser: argparse.ArgumentParser, text: str) -> None:
-    """Declare the option `--role`."""
+    """Declare the repeatable option `--role`, which contains one grant."""
     parser.add_argument("--role", dest="roles", metavar="ROLE", action="append", help=text)
 
 

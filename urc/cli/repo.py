@@ -222,7 +222,7 @@ def _withdraw(arguments: argparse.Namespace) -> int:
 
 
 def _restore(arguments: argparse.Namespace) -> int:
-    """Make a withdrawn version available again."""
+    """Make a withdrawn version of a package available again."""
     return _note(arguments, "")
 
 

@@ -199,7 +199,7 @@ def _add_alarms(parser: argparse.ArgumentParser) -> None:
 
 
 def _notify(arguments: argparse.Namespace) -> "NotifyOptions | None":
-    """Return the hook for alarm notifications.
+    """Return the hook for alarm notifications, as described in the file of `--notify-alarms`.
 
     Raises:
         ProblemsError: the file contains mistakes.

@@ -24,7 +24,7 @@ def settings_given(
     defaults. With several profiles, a setting applies to each profile that declares it.
 
     Args:
-        profiles: one or more profiles.
+        profiles: the profiles whose settings are returned, at least one.
         arguments: parsed arguments with the options of `add_settings`.
         allows_any_port: whether a port may be 0, which selects a free port.
 

@@ -21,7 +21,7 @@ __all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance", "ready_
 
 
 class ReadyDashboard(NamedTuple):
-    """The addresses of a running dashboard."""
+    """The addresses at which browsers and viewers reach a running dashboard."""
 
     url: str
     """Address for this machine, without a key."""

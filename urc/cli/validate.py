@@ -36,7 +36,7 @@ class _Report:
         self.failed = 0
         """Number of failed tests."""
         self.is_cut_short = False
-        """Whether errors prevented later checks."""
+        """Whether errors in a document prevented later checks of the document."""
         self.problems: list[Problem] = []
         """Problems in command-line order, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []

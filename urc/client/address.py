@@ -18,12 +18,12 @@ _MOST_BYTES = 4096
 
 
 class ServerAddress(NamedTuple):
-    """A validated server address."""
+    """A server's address, checked and split into its scheme and host."""
 
     scheme: str
     """``http`` or ``https``."""
     netloc: str
-    """Host, and port if given."""
+    """Host of the server, followed by the port if the address contains a port."""
     is_loopback: bool
 
     @property
@@ -52,7 +52,7 @@ class ServerAddress(NamedTuple):
 
 
 def server_address(server: str, *, allow_unencrypted: bool = False) -> ServerAddress:
-    """Return a server's address.
+    """Parse and check a server's address.
 
     Args:
         server: address such as ``https://robots.lab:8080``, without a path.

@@ -100,7 +100,7 @@ def links_of(message: LinksMessage, now_s: float) -> Iterator[LinkStatus]:
 
 
 def entry_of(row: LogRow, now_s: float) -> LogEntry:
-    """Return the log line in `row`."""
+    """Return the line of the robot's log that `row` describes."""
     level = row.level if row.level in _LEVELS else "info"
     return LogEntry(now_s - row.age / 1000, level, row.source, row.text)  # type: ignore[arg-type]
 

@@ -87,7 +87,7 @@ class ConnectedRobot(HubReadings):
         super().__init__(session.hub)
         self.session = session
         self.motion = LocalMotion(session)
-        """The controls of this process."""
+        """The object that takes and releases the robot's controls for this process."""
 
     @property
     def name(self) -> str:

@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class LocalMotion(ProgramControls):
-    """The controls of one connected robot."""
+    """Takes and releases the controls of one robot that this process is connected to."""
 
     def __init__(self, session: Session) -> None:
         """Prepare the controls; the robot cannot move before the context `running` is active."""
@@ -145,7 +145,7 @@ class LocalMotion(ProgramControls):
         self.controller.release(_US.id, command)  # begin a new gesture, even after a stop
 
     def tick(self, command: str, arguments: Mapping[str, Reading]) -> str:
-        """Pass one tick to the controller."""
+        """Pass one tick of a stick to the motion controller."""
         if self._interlock is not None and self._interlock.why:
             return self._interlock.why
         now = self._clock.now()

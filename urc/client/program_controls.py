@@ -48,7 +48,7 @@ class ProgramControls(ABC):
 
     def __init__(self) -> None:
         self.sticks: dict[str, Stick] = {}
-        """Sticks of open contexts, by held command."""
+        """Stick of each open `drive` context, by held command."""
 
     @property
     @abstractmethod
@@ -119,6 +119,6 @@ class ProgramControls(ABC):
                 stick.end(text)
 
     def end_all(self, reason: str) -> None:
-        """End the motion of all sticks."""
+        """End the motion of all sticks, for the same reason."""
         for stick in self.sticks.values():
             stick.end(reason)

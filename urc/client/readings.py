@@ -24,12 +24,12 @@ class HubReadings:
 
     @property
     def signals(self) -> Mapping[str, Signal]:
-        """All signals, by name."""
+        """All signals of the robot, by name."""
         return self.hub.signals
 
     @property
     def links(self) -> Mapping[str, LinkStatus]:
-        """State of every transport, by name."""
+        """State of every transport of the robot, by name of the transport."""
         return self.hub.links
 
     def latest(self, name: str, /) -> Sample | None:
@@ -42,7 +42,7 @@ class HubReadings:
         return self.hub.latest(name)
 
     def state(self, transport: str, /) -> LinkState:
-        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+        """Return a transport's state: ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
             UrcError: the robot has no transport with this name.

@@ -138,7 +138,7 @@ class RemoteRobot(HubReadings):
         super().__init__(Hub({}))
         self._robot = robot
         self.motion = RemoteMotion(socket)
-        """The controls of this program."""
+        """The object that takes and releases the robot's controls for this program."""
         self.motion.is_connecting = self._is_connecting
         self.alarms = RemoteAlarms(self._post_alarms)
         """The robot's alarms, as listed by the server."""

@@ -21,10 +21,10 @@ _Answer = TypeVar("_Answer")
 
 
 class RemoteCommands:
-    """The pending commands of a server's robot."""
+    """Sends commands to a server's robot, and waits for the replies."""
 
     def __init__(self, socket: RobotSocket) -> None:
-        """Prepare the commands; nothing is sent."""
+        """Initialise without pending commands; nothing is sent."""
         self._socket = socket
         self._numbers = count(1)
         self._replies: dict[int, asyncio.Future[ReplyMessage]] = {}

@@ -41,7 +41,7 @@ _CUT: Final = "the connection to the server was lost"
 
 
 class RemoteMotion(ProgramControls):
-    """The controls of one server's robot."""
+    """Takes, keeps and releases the controls of a server's robot."""
 
     def __init__(self, socket: RobotSocket) -> None:
         """Prepare the controls."""

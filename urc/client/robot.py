@@ -64,7 +64,7 @@ class RobotInterface(Protocol):
         """
 
     def state(self, transport: str, /) -> LinkState:
-        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+        """Return a transport's state: ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
             UrcError: the robot has no transport with this name.

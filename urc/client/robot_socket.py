@@ -45,7 +45,7 @@ _encode = msgspec.json.Encoder().encode
 
 
 class RobotSocket:
-    """The socket of a server's robot."""
+    """The WebSocket to a server's robot, which is reopened after each loss."""
 
     def __init__(
         self,

@@ -145,7 +145,7 @@ class SyncRobot:
         return self._here(lambda: self._robot.latest(name))
 
     def state(self, transport: str, /) -> LinkState:
-        """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
+        """Return a transport's state: ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
             UrcError: the robot has no transport with this name.

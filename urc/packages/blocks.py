@@ -31,7 +31,7 @@ class Block(msgspec.Struct, frozen=True, omit_defaults=True):
     versions: _Text = "*"
     """Blocked range of versions. Pre-releases within the bounds are also blocked."""
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
-    """Digest of the blocked archive."""
+    """Digest of the blocked archive; "" for an entry about a package or a key."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A(SHA256:[A-Za-z0-9+/]{43})?\Z")] = ""
     """Fingerprint of a key whose packages are all blocked, for example a stolen key."""
 
@@ -87,7 +87,7 @@ class BlockFile(msgspec.Struct, frozen=True):
     signature: Signature
 
     def to_bytes(self) -> bytes:
-        """Return the file's content."""
+        """Return the content of the file with the block list."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 

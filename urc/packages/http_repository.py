@@ -24,7 +24,7 @@ _CHECKED_S: Final = 90.0
 
 
 class HttpResponse(NamedTuple):
-    """A web server's response."""
+    """A web server's response to a download or an upload."""
 
     status: int
     """Status code; a download returns only 200, 304 (unchanged file) or 404 (missing file)."""

@@ -232,7 +232,7 @@ def write_index(
         name: the repository's name.
         entries: all versions.
         work: folder for incomplete files.
-        index_signer: maintainer's signer, for the head.
+        index_signer: maintainer's signer, which signs the head.
 
     Raises:
         PackageError: the index is signed with another key; no file has been changed.

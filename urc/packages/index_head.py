@@ -1,7 +1,8 @@
 """An index's head: number, digest, signature and expiry time.
 
 A maintainer with a key signs the head, and therefore the digest of the whole index. A head's
-signature expires after some days. An attacker can then no longer hide newer versions from clients.
+signature expires after a number of days that the maintainer chooses. An attacker can then no longer
+hide newer versions from clients.
 """
 
 import time

@@ -35,7 +35,7 @@ class Lock(msgspec.Struct, frozen=True):
     """Versions by package, including `root`; the keys are names such as ``drivers/puppet``."""
 
     def __post_init__(self) -> None:
-        """Reject invalid names and versions."""
+        """Reject a lock with invalid package names or versions."""
         if len(self.packages) > _PACKAGES_MOST or self.root not in self.packages:
             raise ValueError(f"expected 1 to {_PACKAGES_MOST} packages, including the root")
         for key, pin in self.packages.items():
@@ -59,7 +59,7 @@ class Lock(msgspec.Struct, frozen=True):
 
     @property
     def digest(self) -> str:
-        """Digest that identifies this combination of versions."""
+        """Digest of the lock file, which identifies this combination of versions."""
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
@@ -71,7 +71,7 @@ class Lock(msgspec.Struct, frozen=True):
 
 
 def lock_of(root: PackageId, chosen: Mapping[PackageId, IndexEntry]) -> Lock:
-    """Return the lock of resolved versions."""
+    """Return the lock for the versions that the resolver has chosen."""
     pins = {
         str(key): Pin(entry.version, entry.sha256, entry.size)
         for key, entry in sorted(chosen.items())

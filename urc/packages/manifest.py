@@ -40,7 +40,7 @@ class Manifest(NamedTuple):
 
 
 def parse_manifest(content: bytes, file: str) -> Manifest:
-    """Return a manifest's content.
+    """Parse and check a manifest.
 
     Raises:
         PackageError: the manifest is invalid; the message contains the line number.

@@ -20,7 +20,7 @@ LEFT_OUT = ("urcpm.json",)
 
 
 class Package(NamedTuple):
-    """A complete, validated package in memory."""
+    """A complete package in memory, whose manifest and files have been checked."""
 
     manifest: Manifest
     files: dict[str, bytes]

@@ -35,7 +35,7 @@ class _Tags(msgspec.Struct, frozen=True):
     sha256: str
     """Digest of the index that the stored ETags belong to."""
     index: str = ""
-    """ETag of the index."""
+    """ETag that the server sent with the index; "" if unknown."""
     head: str = ""
     said: IndexHead | None = None
     """The verified head; None if no head matches the index."""

@@ -111,7 +111,7 @@ class Signer:
         return self.signs(_statement(package, version, sha256, self.by))
 
     def signs(self, statement: bytes) -> Signature:
-        """Return the signature of a statement.
+        """Sign a statement with the private key, and return the signature.
 
         The statement must contain the signer and the subject.
         """

@@ -28,7 +28,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     """Packages that the user accepts without a signature in every installation, sorted."""
 
     def with_installed(self, plan: InstallPlan) -> "StoreState":
-        """Return the state after installing a plan.
+        """Return the state in which a plan's packages are also installed.
 
         Other versions of the package remain installed.
         """

@@ -124,7 +124,7 @@ class Store:
         return self.blob_file(digest).is_file()
 
     def blob_file(self, digest: str) -> Path:
-        """Return an archive's path. The archive may be missing."""
+        """Return the path of an archive, which may be missing."""
         return self.folder / "blobs" / f"{digest}.zip"
 
     def signature(self, digest: str) -> Signature | None:

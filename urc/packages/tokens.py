@@ -46,7 +46,7 @@ class _TokenFile(msgspec.Struct, frozen=True):
 
 
 class UploadTokens:
-    """A file of tokens. Each call reads the file, so a removal takes effect immediately."""
+    """The upload tokens in a file. Each call reads the file, so a removal takes effect at once."""
 
     def __init__(self, file: Path) -> None:
         self.file = file

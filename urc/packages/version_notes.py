@@ -55,7 +55,7 @@ class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
     provenance: Provenance | None = None
 
     def __post_init__(self) -> None:
-        """Reject text with hidden characters."""
+        """Reject a reason for withdrawal that contains hidden characters."""
         if not self.withdrawn.isprintable():
             raise ValueError("expected a reason on one line")
 

@@ -244,7 +244,7 @@ class DefaultConnection:
         raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> ReceivedRequest | None:
-        """Return a frame's request and arguments. Exact matches take priority.
+        """Return the request that produced a frame, and its arguments; prefer exact matches.
 
         Args:
             frame: the received frame.

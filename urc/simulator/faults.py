@@ -103,7 +103,7 @@ class Faults:
         """Faults, keyed by name; faults of a signal are keyed by name and signal."""
         self._missing = missing
         self.dropped = missing
-        """Signals with failed sensors."""
+        """Signals whose sensors have failed."""
         self.stuck: dict[str, Reading] = {}
         """Last values of stuck signals, keyed by name."""
         self._frames = 0
@@ -162,7 +162,7 @@ class DelayLine:
         return self._waiting[0][0] if self._waiting else math.inf
 
     def push(self, frames: Sequence[Payload], due_s: float) -> None:
-        """Queue frames until the time `due_s`."""
+        """Add frames to the queue, to be sent at the time `due_s`."""
         for one in frames:
             if len(self._waiting) >= MOST_LATE:
                 self.lost += 1
@@ -170,7 +170,7 @@ class DelayLine:
                 self._waiting.append((due_s, one))
 
     def pop_due(self, now_s: float) -> list[Payload]:
-        """Remove and return the due frames."""
+        """Remove and return the frames that are due at `now_s`."""
         due: list[Payload] = []
         while self._waiting and self._waiting[0][0] <= now_s + 1e-9:
             due.append(self._waiting.popleft()[1])

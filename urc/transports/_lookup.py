@@ -32,7 +32,7 @@ class AddressLookup:
         self._answer: asyncio.Future[list[Address]] | None = None
 
     async def addresses(self) -> list[Address]:
-        """Return every address of the host.
+        """Look up the host, and return all of its addresses.
 
         Raises:
             OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller must set a

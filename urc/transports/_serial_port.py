@@ -126,7 +126,7 @@ class SerialStream(asyncio.Protocol):
     # -- called by the library
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Store the opened port's transport."""
+        """Store the asyncio transport of the port that has opened."""
         assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - guaranteed by the library
         self._transport = transport
         transport.set_write_buffer_limits(high=0)

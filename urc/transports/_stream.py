@@ -87,7 +87,7 @@ class TcpStream(asyncio.BufferedProtocol):
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Store the opened connection's transport."""
+        """Store the asyncio transport of the connection that has opened."""
         # No isinstance check: uvloop's transports have a different base class.
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(high=0)

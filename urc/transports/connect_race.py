@@ -17,7 +17,7 @@ __all__ = ["HURRY", "ConnectRace", "connected"]
 
 
 class ConnectRace:
-    """The interval between overlapping connection attempts."""
+    """Setting for overlapping connection attempts: their interval, and whether they were used."""
 
     __slots__ = ("every_s", "is_used")
 

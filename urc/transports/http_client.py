@@ -273,7 +273,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
         self._dialer = dialer
         self._spare: ByteStream | None = None
         self._connections: set[_PooledStream] = set()
-        """Open connections that the library is using."""
+        """Open connections that httpcore2 is using."""
 
     def unsent(self) -> int:
         return sum(one.unsent() for one in self._connections)

@@ -38,7 +38,7 @@ class HttpReceiveQueue:
         self._arrived.set()
 
     def forget(self, place: int) -> None:
-        """Remove a request's unread response."""
+        """Remove the unread response to a request that was dropped."""
         self._waiting.pop(("answer", place), None)
 
     def picture(self, topic: str, body: bytes) -> None:

@@ -92,7 +92,7 @@ class LastActivity:
         self._beat_s = self._clock()
 
     def heartbeat(self) -> None:
-        """Record that data has arrived."""
+        """Record that the robot has sent data now."""
         self._beat_s = self._clock()
 
     @property

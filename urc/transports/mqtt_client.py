@@ -347,7 +347,7 @@ class _PahoClient(Client):
         """The operating system's reason for the end of the connection, which paho only logs."""
 
     def start(self) -> None:
-        """Send the login request."""
+        """Send the login request (CONNECT) to the broker."""
         options = self._options
         properties: Properties | None = None
         if options.is_v5:

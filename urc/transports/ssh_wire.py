@@ -86,13 +86,13 @@ class SshSocket(asyncio.BufferedProtocol):
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Pass the connection to asyncssh."""
+        """Tell asyncssh that the connection is open."""
         self._transport = transport
         self._transport.set_write_buffer_limits(high=0)
         self._inner.connection_made(transport)
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return the receive buffer."""
+        """Return the receive buffer, for the event loop to fill."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:

@@ -42,7 +42,7 @@ class TelnetOptions(NamedTuple):
     is_first: bool = False
     """Whether URC starts the negotiation; if false, URC only replies."""
     echo: bool = False
-    """Whether the robot may echo received input."""
+    """Whether the robot may echo the input that URC sends."""
     binary: bool = False
     """Whether all byte values are transmitted unchanged in both directions."""
     terminal: str = "VT100"

@@ -1,8 +1,8 @@
 """Connections for web transports: direct or tunnelled, with or without TLS.
 
-For URC's own protocols, `StreamDialer` returns streams. A third-party protocol library needs a
-socket instead. The library receives the socket of a plain connection, or one end of a relayed
-socket pair.
+`StreamDialer` returns streams, for the protocols that URC itself implements. A third-party protocol
+library needs a socket instead. The library receives the socket of a plain connection, or one end of
+a relayed socket pair.
 """
 
 import asyncio

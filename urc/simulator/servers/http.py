@@ -83,7 +83,7 @@ _TYPES = {
 
 
 class HttpRequest(NamedTuple):
-    """One request from a client."""
+    """One HTTP request from a client, with its decoded path."""
 
     method: str
     target: str

@@ -76,7 +76,7 @@ class Bridge:
 
 
 class BridgeClient:
-    """One client of the bridge."""
+    """The state of one client of the bridge, and the operations that it sends."""
 
     def __init__(self, bridge: Bridge, send: Callable[[str | bytes], None]) -> None:
         """Join `bridge`. The function `send` transmits one text or binary frame."""
@@ -278,7 +278,7 @@ class BridgeClient:
             del self._bridge.servers[name]
 
     def respond(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Forward a reply to the caller."""
+        """Forward the reply of a client that offers a service to the caller."""
         asked = self._bridge.asked.pop(str(operation.get("id")), None)
         if asked is not None:
             client, number = asked

@@ -17,7 +17,7 @@ CALLS_EVERY_S = 0.5
 
 
 class TcpServer(StreamServer):
-    """A plain TCP port."""
+    """A simulated server on a plain TCP port, or a client of a listening driver."""
 
     def __init__(self, context: ServerContext) -> None:
         super().__init__(context)

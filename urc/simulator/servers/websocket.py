@@ -23,7 +23,7 @@ MAX_MESSAGE_BYTES = 1_048_576
 
 
 class MessageServer(ListeningServer):
-    """A server for WebSocket clients."""
+    """A simulated server that exchanges payloads with WebSocket clients."""
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await self._serve(host, port)

@@ -25,7 +25,7 @@ class Edge(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Overlap of a circle with an edge."""
+    """Overlap of a circle, such as a robot's outline, with an edge."""
 
     x: float
     y: float
@@ -61,7 +61,7 @@ class WorldMap:
     """The world map, prepared for collision tests."""
 
     def __init__(self, spec: PlanSpec) -> None:
-        """Prepare the obstacles of `spec`."""
+        """Convert the walls, boxes and holes of `spec` for collision tests."""
         self.spec = spec
         edges = [Edge(*wall) for wall in spec.walls]
         for box in spec.boxes:

@@ -20,7 +20,7 @@ class EdgeArrays:
     """The edges of a world map as arrays."""
 
     def __init__(self, plan: WorldMap) -> None:
-        """Convert the edges of `plan`."""
+        """Convert the edges of `plan` to arrays."""
         edges: tuple[Edge, ...] = plan.edges
         self.start: Numbers = np.array([(one.x1, one.y1) for one in edges]).reshape(-1, 2)
         end: Numbers = np.array([(one.x2, one.y2) for one in edges]).reshape(-1, 2)

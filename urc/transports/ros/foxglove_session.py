@@ -102,7 +102,7 @@ class FoxgloveSession:
         """Initialise the state for a new connection.
 
         Args:
-            queue: queue for messages and replies.
+            queue: queue that receives the messages and replies from the robot.
             wishes: topics to subscribe to, without duplicates.
             graph: object that reports topics with mistakes.
             call_at: function that schedules a call for a given time on `clock`.
