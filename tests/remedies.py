@@ -246,6 +246,7 @@ def _unchanged(text: str, problem: Problem, found: re.Match[str]) -> str:
 
 _RULES: tuple[tuple[str, Rule], ...] = (
     (r"^use the (?:key|word|type) '([^']+)'", _put()),
+    (r"^write 'kind: (\w+)'$", _put()),
     (r"^did you mean '([^']+)'\?", _put()),
     (r"^the new name is '([^']+)'", _put()),
     (r"^write the name without braces: (\S+)", _put()),

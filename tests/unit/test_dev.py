@@ -100,7 +100,7 @@ def test_where_no_lock_fits_one_line_says_so(
     assert dev.done == ["venv", "install --upgrade pip", "install --editable .[demo] --group=dev"]
     (line,) = [one for one in capsys.readouterr().err.splitlines() if "locked" in one.lower()]
     assert said in line
-    assert "without the hashes of requirements/" in line
+    assert "without checking the hashes in requirements/" in line
 
 
 def test_a_python_newer_than_the_locks_takes_the_newest_packages(

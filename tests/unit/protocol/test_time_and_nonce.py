@@ -138,7 +138,7 @@ def test_a_nonce_that_cannot_be_written_is_found(send: str, why: str) -> None:
 
 def test_a_nonce_stands_only_in_what_is_sent() -> None:
     """A condition over it would mean nothing."""
-    with pytest.raises(AssertionError, match="a nonce is only available"):
+    with pytest.raises(AssertionError, match="only 'send' can use a nonce"):
         driver_of("commands: { go: { send: GO, requires: [{ expr: nonce() == 1, else: No }] } }")
 
 

@@ -66,8 +66,7 @@ class Conversation(Connection):
         self._free_at = float("-inf")
         """Earliest time, in seconds, of the next request after a reply to a motion frame."""
         self._may_recut = False
-        """Whether a pending reply or step may declare a framing that differs from the
-        connection's."""
+        """Whether a pending reply or step may have a framing of its own."""
         self._number = 0
         """Number of the last envelope that expects a reply; numbers are never reused."""
 
