@@ -112,7 +112,7 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
     assert "widget dial: a program in" in told
     assert person.does("list").startswith("robots/my-puppet 1.0.0  with drivers/puppet 1.0.0, ")
     person.does("repo", "search")
-    assert "its last index is used" in person.complaints
+    assert "its last stored index is used" in person.complaints
     assert "`wire` | tcp" in person.does("docs", "my-puppet")
     words = ["serve", "my-puppet", "--simulate", "--port", "0"]
     dashboard = UrcProcess(words, {"URC_DATA_DIR": str(person.folder)})

@@ -225,7 +225,7 @@ def _print_coverage(report: _Report) -> None:
         tested = coverage.total - len(coverage.untested)
         print(f"{coverage.file}: {tested} of {coverage.total} commands, polls and messages tested")
         for kind, name in coverage.untested:
-            print(f"  no test covers {kind} {name}")
+            print(f"  no test of {kind} {name}")
 
 
 def _summary(report: _Report) -> str:

@@ -175,7 +175,7 @@ def test_what_a_client_kept_may_be_damaged(lab: Lab) -> None:
     (kept,) = (lab.folder.parent / "client").glob("*.index.json")
     kept.write_bytes(b"{")
     assert lab.asks() == [HEAD, INDEX]
-    assert "it will be downloaded again" in lab.said.pop()
+    assert "the index will be downloaded again" in lab.said.pop()
 
 
 def test_a_keeper_killed_at_any_moment_leaves_a_repository_to_read(

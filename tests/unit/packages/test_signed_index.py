@@ -68,7 +68,7 @@ def test_the_first_key_is_kept_and_no_other_is_believed(lab: Signed) -> None:
         lab.web.instead[HEAD] = instead
         lab.refuses("but the key SHA256:.* is pinned. If the maintainer confirms this")
         assert len(lab.client.entries()) == 2
-        assert "its last index is used" in lab.said.pop()
+        assert "its last stored index is used" in lab.said.pop()
     lab.web.instead.clear()
     lab.client.forget()
     assert len(lab.client.refresh().packages) == 3
