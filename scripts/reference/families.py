@@ -90,6 +90,12 @@ FAMILIES: Mapping[str, Family] = {
         _driver("mqtt"),
         {"transports/mqtt.md": "MQTT"},
     ),
+    "zenoh": Family(
+        "Keys of zenoh transports",
+        "Keys of a connection to a Zenoh router.",
+        _driver("zenoh"),
+        {"transports/zenoh.md": "Zenoh"},
+    ),
     "http": Family(
         "Keys of http transports",
         "Keys of a robot with a web server, and of HTTP authentication.",
@@ -188,7 +194,8 @@ FAMILIES: Mapping[str, Family] = {
         "Keys of sent frames",
         "Keys of the frame or message that a command, poll or step sends.",
         _driver(
-            "send sendFrames sendForm publishForm callForm goalForm cancelForm requestForm jsonBody"
+            "send sendFrames sendForm publishForm callForm goalForm cancelForm requestForm getForm"
+            " jsonBody"
             " textBody hexBody bytesBody"
         ),
         {"language/binary.md": "Binary and structured frames", "language/messages.md": "Messages"},

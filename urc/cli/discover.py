@@ -172,7 +172,7 @@ def _places(
     from urc.transports.ros.choice import PORTS
 
     for spec in profile.driver.transports.values():
-        if spec.type not in ("tcp", "ros", "mqtt", "telnet", "ssh") or spec.tunnel:
+        if spec.type not in ("tcp", "ros", "mqtt", "zenoh", "telnet", "ssh") or spec.tunnel:
             continue
         try:
             options = options_of(spec, settings)

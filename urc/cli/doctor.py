@@ -36,6 +36,7 @@ EXTRAS = {
     "pillow": ("demo", "cameras of emulated robots"),
     "serialx": ("serial", "robots on serial ports"),
     "paho-mqtt": ("mqtt", "robots behind an MQTT broker"),
+    "eclipse-zenoh": ("zenoh", "devices with Zenoh keys"),
     "cbor2": ("cbor", "CBOR images from rosbridge"),
     "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
     "mcap": ("record", "recordings of sessions"),

@@ -27,4 +27,5 @@ WRITE_FORMS: Final[Mapping[str, str]] = {
     "goal": "urc.config.parse.forms.envelope",
     "cancel": "urc.config.parse.forms.envelope",
     "request": "urc.config.parse.forms.envelope",
+    "get": "urc.config.parse.forms.envelope",
 }

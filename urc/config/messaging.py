@@ -22,6 +22,7 @@ MESSAGING: Final = {
         ("publish", "call", "goal", "cancel"), ("type", "throttle", "queue_length", "compression")
     ),
     "mqtt": MessageTransportRules(("publish",), ("qos",)),
+    "zenoh": MessageTransportRules(("publish", "get"), ("liveliness",)),
     "http": MessageTransportRules(("request",), ("stream", "every")),
 }
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket"))

@@ -102,6 +102,11 @@ class TransportSpec(NamedTuple):
     """Next step for the operator while the transport cannot connect; "" means the default step for
     the cause."""
 
+    @property
+    def has_keys(self) -> bool:
+        """Whether the topics of this transport are Zenoh keys."""
+        return self.type == "zenoh"
+
 
 class Reply(NamedTuple):
     """The reply to a request; a frame that matches one of `errors` reports a failure."""

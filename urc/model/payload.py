@@ -38,8 +38,9 @@ class Envelope(NamedTuple):
     """A message on a transport that carries messages instead of bytes."""
 
     verb: str
-    """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and
-    ``request``. The transport delivers ``message``, ``response``, ``feedback`` and ``notice``."""
+    """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel``,
+    ``request`` and ``get``. The transport delivers ``message``, ``response``, ``feedback`` and
+    ``notice``."""
     attributes: Mapping[str, object] = NOTHING
     """Address and options: topic, type, method, path, headers, quality of service and so on. A
     request and its response have the same ``id``. Every response has the attribute ``ok``; a
@@ -48,7 +49,7 @@ class Envelope(NamedTuple):
     """Content of the envelope: JSON-like data, or bytes."""
 
 
-NUMBERED: Final = frozenset(("call", "goal", "request"))
+NUMBERED: Final = frozenset(("call", "goal", "request", "get"))
 """Verbs of requests. The ``response`` to a request has the request's ``id``."""
 
 Payload = bytes | Envelope

@@ -21,7 +21,7 @@ from urc.runtime.transport_chain import BuiltTransport, make_lines
 
 __all__ = ["start_guard_client"]
 
-_SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
+_SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "zenoh", "ros"))
 """Transport types that are not reset at once when they stall, because reopening is slow or may
 fail."""
 

@@ -181,7 +181,7 @@ def period_of(driver: Driver, command: Command) -> float:
     return max(repeat_s, rate_s, gap_s)
 
 
-_LOSSY = frozenset(("udp", "serial", "mqtt", "ros"))
+_LOSSY = frozenset(("udp", "serial", "mqtt", "zenoh", "ros"))
 """Transport types that may lose a single stop frame."""
 
 

@@ -206,7 +206,9 @@ def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | Non
         return None
     try:
         encode = build_encode(
-            command.send, build_framing(spec.framing), CodecContext(spec.encoding)
+            command.send,
+            build_framing(spec.framing),
+            CodecContext(spec.encoding, has_keys=spec.has_keys),
         )
         return traffic_of(encode({}))
     except UrcError:

@@ -165,7 +165,7 @@ class DefaultConnection:
         self._robot = robot
         self._spec = spec
         self._framing = framing
-        self._context = CodecContext(spec.encoding, robot.settings)
+        self._context = CodecContext(spec.encoding, robot.settings, has_keys=spec.has_keys)
         self.opening, requests = self._script("on_connect", spec.on_connect)
         self._requests = [*requests, *self._declared()]
         self.messages: list[DefaultMessage] = []

@@ -102,7 +102,7 @@ class RuleSet:
         auto: DefaultConnection,
         values: Values,
     ) -> None:
-        self._context = CodecContext(spec.encoding, values.settings)
+        self._context = CodecContext(spec.encoding, values.settings, has_keys=spec.has_keys)
         self._framing = framing
         self._auto = auto
         self._values = values

@@ -29,7 +29,7 @@ from urc.simulator.servers.base import (
 __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
-_PORTS = {"ssh": 22, "telnet": 23, "ros": 9090}
+_PORTS = {"ssh": 22, "telnet": 23, "ros": 9090, "zenoh": 7447}
 """Default ports of the transport types whose `port` is optional."""
 
 

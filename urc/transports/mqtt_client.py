@@ -23,9 +23,10 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from urc.model.payload import Envelope, Payload
+from urc.transports._bodies import body_bytes
 from urc.transports._faults import CLOSED, HUNG_UP, broke, late, reason
 from urc.transports.base import ConnectFailed, PeerClosed, TransportError
-from urc.transports.mqtt_options import MqttOptions, body_bytes
+from urc.transports.mqtt_options import MqttOptions
 from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.web_dial import Dialer
 

@@ -1,4 +1,4 @@
-"""An MQTT transport's options and the encoding of message bodies.
+"""An MQTT transport's options.
 
 This module needs no MQTT library.
 """
@@ -6,18 +6,14 @@ This module needs no MQTT library.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import msgspec
-
 from urc.transports import _options
 from urc.transports._faults import place_of
 from urc.transports._tls import Tls
 from urc.transports.base import TransportError, TransportSetup
 
-__all__ = ["MqttOptions", "MqttTopic", "WillMessage", "body_bytes", "read_options"]
+__all__ = ["MqttOptions", "MqttTopic", "WillMessage", "read_options"]
 
 DEFAULT_PORT, DEFAULT_TLS_PORT = 1883, 8883
-
-_encode = msgspec.json.Encoder().encode
 
 
 class MqttTopic(NamedTuple):
@@ -80,22 +76,6 @@ def read_options(setup: TransportSetup) -> MqttOptions:
         _will(given.get("will")),
         tuple(MqttTopic(one.topic, _qos("qos", one.attributes)) for one in setup.subscriptions),
     )
-
-
-def body_bytes(body: object) -> bytes:
-    """Encode a message body: bytes stay unchanged, and all other values become JSON.
-
-    Raises:
-        TransportError: the value cannot be written as JSON.
-    """
-    if isinstance(body, bytes):
-        return body
-    if body is None:
-        return b""
-    try:
-        return _encode(body)
-    except (TypeError, ValueError, OverflowError) as problem:
-        raise TransportError(f"the value cannot be sent as JSON ({problem})") from problem
 
 
 def _will(given: object) -> WillMessage | None:

@@ -16,6 +16,7 @@ TRANSPORTS = Table(
         "websocket": "urc.transports.websocket:from_setup",
         "ros": "urc.transports.ros.choice:from_setup",
         "mqtt": "urc.transports.mqtt:from_setup",
+        "zenoh": "urc.transports.zenoh:from_setup",
     },
 )
 """Factories by transport type; each factory returns a `Transport` for a

@@ -34,6 +34,7 @@ PEERS = {
     "websocket": "tests.e2e.transports.peers.websocket:WebSocketPeer",
     "ros": "tests.e2e.transports.peers.rosbridge:RosbridgePeer",
     "mqtt": "tests.e2e.transports.peers.mqtt:MqttPeer",
+    "zenoh": "tests.e2e.transports.peers.zenoh:ZenohPeer",
 }
 """Kind of transport (a variant after a space) → class of its `Peer`."""
 

@@ -38,6 +38,7 @@ def lines(host: str, port: int) -> Mapping[str, Mapping[str, object]]:
         "websocket": {"url": f"ws://{shown}:{port}/ws?robot=puppet"},
         "ros": place,
         "mqtt": place,
+        "zenoh": place,
         "ssh": {**place, **login},
     }
 

@@ -25,7 +25,7 @@ from urc.transports.http import from_setup
 pytestmark = pytest.mark.anyio
 
 COUNTED = (
-    *("tcp", "tcp with tls", "websocket", "telnet", "ros", "mqtt", "ssh", "serial"),
+    *("tcp", "tcp with tls", "websocket", "telnet", "ros", "mqtt", "zenoh", "ssh", "serial"),
     "http",
 )
 """Lines that must tell: a robot that moves over one of them may be cut off."""

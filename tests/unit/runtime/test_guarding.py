@@ -31,7 +31,7 @@ class Stub:
         self.address = f"stub {setup.name}"
 
 
-KINDS = ("tcp", "udp", "serial", "mqtt", "ros", "ssh")
+KINDS = ("tcp", "udp", "serial", "mqtt", "zenoh", "ros", "ssh")
 TABLE = Table("urc.transports", dict.fromkeys(KINDS, f"{__name__}:Stub"))
 
 
@@ -64,7 +64,7 @@ def test_guard_is_told_the_terms_of_each_held_command() -> None:
 @pytest.mark.parametrize(
     ("driver", "is_dear"),
     [
-        *((robot(kind, ""), kind in ("serial", "mqtt", "ros", "ssh")) for kind in KINDS),
+        *((robot(kind, ""), kind in ("serial", "mqtt", "zenoh", "ros", "ssh")) for kind in KINDS),
         (robot("tcp", "", tunnel="other"), True),
         (robot("tcp", "wait"), True),
         (robot("ssh", "abort"), False),

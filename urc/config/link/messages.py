@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from urc.config.form_table import WRITE_FORMS
+from urc.config.link.keys import check_key, check_sent_keys
 from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
 from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
@@ -11,7 +12,7 @@ from urc.model.driver import Driver, TransportSpec
 __all__ = ["check_messages", "check_via"]
 
 _VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
-_ANSWERED = ("call", "goal", "request")
+_ANSWERED = ("call", "goal", "request", "get")
 
 
 def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
@@ -28,6 +29,8 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
             _check_read(reply, spec, problems, wants_topic=verb not in _ANSWERED)
     for name, inner in part.named("transports").items():
         keepalive, spec = inner.get("keepalive"), driver.transports.get(name)
+        if spec is not None and spec.has_keys:
+            check_key(inner.get("liveliness"), problems)
         if keepalive is not None:
             _check_send(keepalive.get("send"), spec, problems)
         for key in ("on_connect", "on_close"):
@@ -101,6 +104,8 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
             key=True,
             hint="write text, or one of the forms hex, bytes, struct and json",
         )
+    elif form and spec.has_keys:
+        check_sent_keys(part.must(form), problems)
     elif form and spec.type == "ros":
         _check_ros(part.must(form), problems)
     return form
@@ -157,6 +162,8 @@ def _check_read(
                 hint="subscribe: { topic: NAME }",
             )
         return
+    if spec.has_keys:
+        check_key(subscribe.get("topic"), problems, is_expression=True)
     for name, inner in subscribe.entries().items():
         if name != "topic" and name not in kind.listen:
             known = ", ".join(("topic", *kind.listen))

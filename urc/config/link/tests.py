@@ -61,7 +61,7 @@ def _reads(test: DocumentTest, driver: Driver) -> bool:
 
 
 _COMES: Final = ("message", "response", "feedback")
-_GOES: Final = ("publish", "call", "goal", "cancel", "request")
+_GOES: Final = ("publish", "call", "goal", "cancel", "request", "get")
 """Kinds of sent messages that a test may expect."""
 
 

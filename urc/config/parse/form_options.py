@@ -39,7 +39,7 @@ def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
             )
     when, subscribe = part.get("when"), part.get("subscribe")
     topic = problems.template(subscribe.must("topic")) if subscribe else None
-    if topic is not None and ("+" in topic.source or "#" in topic.source):
+    if topic is not None and any(sign in topic.source for sign in "+#*"):
         spec = spec._replace(fields=(*spec.fields, "_topic"))
     head = {name: str(inner.data).lower() for name, inner in heads.items()}
     spec = spec._replace(head=head, fields=(*spec.fields, *head))

@@ -16,11 +16,12 @@ _IN_STEPS: Final = ("polls", "ready")
 """Keys that are valid only in a test with steps."""
 _VERBS: Final = (
     "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
+    "get",
 )  # fmt: skip
 """Keys for the kinds of messages in a test."""
 _ADDRESS: Final = (
     "topic", "type", "service", "action", "method", "path", "url", "query", "headers", "qos",
-    "retain", "ok", "status", "reason",
+    "retain", "ok", "status", "reason", "parameters",
 )  # fmt: skip
 """Keys of a message that are not part of its body: its address, options and status."""
 _BODIES: Final = ("json", "text", "hex")

@@ -46,6 +46,7 @@ def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
         if on_line:
             _check_baud(on_line, spec, problems)
             _check_will(on_line, spec, problems)
+            _check_token(on_line, spec, problems)
     is_mute = all(driver.transports[one[1].transport].never_replies for one in held)
     noticed = any(_notices(spec, driver) for spec in driver.transports.values())
     if held and not is_mute and not noticed:
@@ -191,6 +192,30 @@ def _check_will(
         key=True,
         hint=f"give {spec.name!r} a 'will' with the topic and payload of the stop, for the broker"
         " to publish",
+    )
+
+
+def _check_token(
+    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
+) -> None:
+    """Warn about a robot behind a Zenoh router that would not notice the loss of URC."""
+    if spec.type != "zenoh" or spec.options.get("liveliness") is not None:
+        return
+    unwatched = [(part, command) for part, command, hold in held if not _stops_itself(hold)]
+    for part, command in unwatched[:1]:
+        problems.warn(
+            part,
+            "motion-without-token",
+            f"if URC's connection to the router is lost, nothing ends {command.name!r}",
+            key=True,
+            hint=f"give {spec.name!r} a 'liveliness' key, and let the robot stop when the token of"
+            " this key disappears",
+        )
+
+
+def _stops_itself(hold: Hold) -> bool:
+    return hold.step_s is not None or (
+        hold.watchdog_s is not None and math.isfinite(hold.watchdog_s)
     )
 
 

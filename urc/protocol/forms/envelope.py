@@ -1,4 +1,4 @@
-"""The form for envelopes: publish, call, goal and request.
+"""The form for envelopes: publish, call, goal, request and get.
 
 Pure. An envelope has an address (attributes) and a body. The body uses another form, such as JSON.
 A JSON body stays plain data, because each message transport encodes it in its own way.
@@ -20,6 +20,7 @@ __all__ = ["EnvelopeWriter", "place_writer"]
 
 _SETTINGS: Final = frozenset(("settings",))
 _WILD: Final = ("+", "#", "\0")
+_KEY_WILD: Final = ("*", "$", "?", "#", "\0")
 _UP: Final = (".", "..")
 
 
@@ -56,14 +57,15 @@ class PathTemplate:
         return "".join(words)
 
 
-def place_writer(name: str, tree: object) -> PathTemplate | None:
+def place_writer(name: str, tree: object, *, has_keys: bool = False) -> PathTemplate | None:
     """Return the writer for the attribute `name`; None if the attribute has no restrictions.
 
     Args:
         name: name of the attribute, such as ``path`` or ``topic``.
         tree: compiled value of the attribute.
+        has_keys: whether topics are Zenoh keys.
     """
-    written = _WRITTEN.get(name)
+    written = _key if has_keys and name == "topic" else _WRITTEN.get(name)
     if written is None or not isinstance(tree, Template) or tree.names <= _SETTINGS:
         return None
     pieces = []
@@ -81,23 +83,24 @@ def _path(text: str, is_whole: bool) -> str:
     return quote(text, safe="/" if is_whole else "")
 
 
-def _name(text: str, is_whole: bool, *, what: str) -> str:
+def _name(text: str, is_whole: bool, *, what: str, wild: tuple[str, ...] = _WILD) -> str:
     """Check a value for use in the name of a topic, service or action, and return it."""
-    for sign in (*_WILD, *(() if is_whole else ("/",))):
+    for sign in (*wild, *(() if is_whole else ("/",))):
         if sign in text:
             raise NotWritable(f"{quoted(text)} would change the {what}: {sign!r} is not allowed")
     return text
 
 
+_key: Final = partial(_name, what="topic", wild=_KEY_WILD)
 _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
     "path": _path,
     **{what: partial(_name, what=what) for what in ("topic", "service", "action")},
 }
 
 
-_ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
+_ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query", "parameters")
 """Attributes that form an envelope's address; all other attributes are delivery options."""
-_TEXTS: Final = ("query", "headers")
+_TEXTS: Final = ("query", "headers", "parameters")
 """Attributes whose values map names to text."""
 
 
@@ -107,7 +110,8 @@ class EnvelopeWriter:
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._verb = cast("str", spec.options["verb"])
         self._attributes = cast("Mapping[str, Any]", spec.options["attributes"])
-        places = {name: place_writer(name, tree) for name, tree in self._attributes.items()}
+        keys = context.has_keys
+        places = {n: place_writer(n, tree, has_keys=keys) for n, tree in self._attributes.items()}
         self._places = {name: one for name, one in places.items() if one is not None}
         self._rest = {
             name: tree for name, tree in self._attributes.items() if name not in self._places

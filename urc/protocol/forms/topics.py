@@ -1,13 +1,15 @@
 """A driver's topics and subscriptions on a message transport.
 
 Pure. A topic may have MQTT wildcards (version 5.0, section 4.7): ``+`` for one level, and ``#`` at
-the end for all following levels.
+the end for all following levels. On Zenoh, a topic is a key expression
+(`urc.key_expressions`).
 """
 
 import re
 from collections.abc import Callable, Iterator, Mapping
 
 from urc.expressions import ExpressionError
+from urc.key_expressions import key_matches
 from urc.model.driver import Driver, Reply
 from urc.model.payload import Envelope, Payload, ReadSpec
 from urc.model.sequence import ExpectStep, all_steps
@@ -31,8 +33,9 @@ class TopicReader:
     def __init__(self, reader: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
         self._reader = reader
         self._topic = topic_of(spec, context.settings)
-        self._fits = matches(self._topic)
-        self._is_plain = not _WILD.search(self._topic)
+        self._fits = key_matches(self._topic) if context.has_keys else matches(self._topic)
+        self._wild = _KEY_WILD if context.has_keys else _WILD
+        self._is_plain = not self._wild.search(self._topic)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the fields; None if the topic or the message does not match."""
@@ -44,7 +47,7 @@ class TopicReader:
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return a message with `fields`; raise `NotWritable` if impossible."""
-        topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
+        topic = str(fields.get("_topic") or self._wild.sub("x", self._topic))
         if not self._fits(topic):
             raise NotWritable(f"{topic!r} does not match the topic {self._topic!r}")
         body = self._reader.write({name: raw for name, raw in fields.items() if name != "_topic"})
@@ -52,6 +55,7 @@ class TopicReader:
 
 
 _WILD = re.compile(r"(?<![^/])[+#](?![^/])")
+_KEY_WILD = re.compile(r"[$]?[*]+")
 
 
 def matches(topic: str) -> Callable[[str], bool]:

@@ -58,7 +58,9 @@ class RequestCompiler:
         self.lines: dict[str, Conversation] = {}
         for name, spec in driver.transports.items():
             messages = [one for one in driver.messages.values() if one.transport == name]
-            context = CodecContext(spec.encoding, self._readings.settings, fresh, is_compiled)
+            context = CodecContext(
+                spec.encoding, self._readings.settings, fresh, is_compiled, spec.has_keys
+            )
             matchers = [self._message(one.read, context) for one in messages]
             if any(one.acknowledge or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
@@ -156,7 +158,11 @@ class RequestCompiler:
     ) -> CompiledRequest:
         line = self.lines[transport]
         context = CodecContext(
-            line.spec.encoding, self._readings.settings, self._fresh, self._is_compiled
+            line.spec.encoding,
+            self._readings.settings,
+            self._fresh,
+            self._is_compiled,
+            line.spec.has_keys,
         )
         encode = build_encode(send, line.framing, context, arguments)
         if line.codec is not None:
@@ -203,7 +209,7 @@ class RequestCompiler:
 
     def _answer(self, transport: str, stage: Stage) -> CompiledReply:
         spec = self.lines[transport].spec
-        context = CodecContext(spec.encoding, self._readings.settings)
+        context = CodecContext(spec.encoding, self._readings.settings, has_keys=spec.has_keys)
         asides: tuple[tuple[Aside, ReadSpec | None], ...]
         asides = (("resend", stage.asides.resend), ("extend", stage.asides.extend))
         return CompiledReply(

@@ -88,6 +88,8 @@ class CodecContext(NamedTuple):
     is_compiled: bool = False
     """Whether to generate functions for messages and commands; generated functions save time only
     in live sessions."""
+    has_keys: bool = False
+    """Whether topics are Zenoh keys, with the wildcards of key expressions."""
 
 
 class PayloadReader(Protocol):

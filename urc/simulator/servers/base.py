@@ -111,6 +111,7 @@ SERVERS = Table(
         "websocket": "urc.simulator.servers.websocket:WebSocketServer",
         "ros": "urc.simulator.servers.rosbridge:RosbridgeServer",
         "mqtt": "urc.simulator.servers.mqtt:MqttRobot",
+        "zenoh": "urc.simulator.servers.zenoh:ZenohRobot",
     },
 )
 """Class of simulated server for each type of transport. Each class implements `SimulatedServer` and

@@ -131,7 +131,7 @@ def _written(
     names: Mapping[str, object],
 ) -> PreviewLine:
     spec = driver.transports[transport]
-    context = CodecContext(spec.encoding, settings)
+    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
     if COUNTERS in send.names:
         names = {**names, COUNTERS: Counters().draw()}
     try:

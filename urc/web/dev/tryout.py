@@ -231,7 +231,7 @@ def _why_not(
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
         came = "a reply" if frame.topic is None else repr(frame.topic)
         return f"expected the topic {topic!r}, found {came}"
-    context = CodecContext(spec.encoding, settings)
+    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
     try:
         found = build_reader(read._replace(when=None), context).read(frame)
     except (BadItem, BadText) as error:
@@ -250,7 +250,7 @@ def _candidates(
     driver: Driver, spec: TransportSpec, settings: Mapping[str, object]
 ) -> list[_Candidate]:
     readings = Readings(driver.signals, {"settings": settings})
-    context = CodecContext(spec.encoding, settings)
+    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
 
     def matcher(read: ReadSpec) -> Matcher:
         return Matcher(build_reader(read, context), readings.decoder(read.fields))

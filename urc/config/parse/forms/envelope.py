@@ -1,4 +1,4 @@
-"""The forms of message transports: `publish`, `call`, `goal` and `request`.
+"""The forms of message transports: `publish`, `call`, `goal`, `request`, `get`.
 
 An envelope has an address and a body. The address may contain templates, and the body has one of
 the other forms.

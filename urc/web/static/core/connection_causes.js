@@ -14,6 +14,7 @@ import { mark, t } from "./words.js";
 const PROGRAMS = {
   ros: mark("Is rosbridge running?"),
   mqtt: mark("Is the MQTT broker running?"),
+  zenoh: mark("Is the Zenoh router running?"),
   ssh: mark("Is the SSH server running?"),
   http: mark("Is the robot's web server running?"),
   websocket: mark("Is the robot's web server running?"),
