@@ -44,6 +44,7 @@ NAMES = (
     "motion_cuts",
     "motion_freeze",
     "motion_foxglove",
+    "motion_zenoh",
     "motion_counters",
     "motion_flood",
     "motion_idle",

@@ -40,16 +40,23 @@ in `bench.rig.kinds` for slow transports."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0
+_ROS: Final = "type: ros, via: VIA, version: 2"
+_ROS_SEND: Final = '{ topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } }'
+_WAYS: Final = {
+    "rosbridge": ("bridge", _ROS.replace("VIA", "rosbridge"), _ROS_SEND),
+    "foxglove": ("foxglove", _ROS.replace("VIA", "foxglove"), _ROS_SEND),
+    "zenoh": ("zenoh", "type: zenoh", '{ topic: go, text: "M {{ t }}" }'),
+}
+"""Address, transport and motion frame, for each kind of server."""
 _DOCUMENT: Final = """\
 urc: 1
 kind: robot
 name: frozen
 transports:
-  wire:
-    { type: ros, via: VIA, host: 127.0.0.1, port: PORT, version: 2, reconnect: { initial: 100ms } }
+  wire: { TRANSPORT, host: 127.0.0.1, port: PORT, reconnect: { initial: 100ms } }
 commands:
   go:
-    send: { publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }
+    send: { publish: SEND }
     args: { t: { type: integer, min: 0, default: 0 } }
     hold: { repeat: 50ms, release: { t: 0 }, watchdog: none }
 """
@@ -99,9 +106,10 @@ async def freeze(
 ) -> Sequence[Freeze]:
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
-    If `via` is rosbridge, the robot's program is a substitute for rosbridge; if `via` is foxglove,
-    the program is the SDK's server. If `is_killed` is true, the program is killed instead, and a
-    new program starts `lasts_s` seconds later.
+    If `via` is rosbridge, the robot's program is a substitute for rosbridge. If `via` is foxglove,
+    the program is the SDK's server. If `via` is zenoh, the program is a Zenoh router. With
+    `is_killed`, the program is killed instead, and a new program starts `lasts_s` seconds
+    later.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
@@ -125,7 +133,7 @@ async def _queue(
     is_killed: bool,
     told: Callable[[Freeze], None],
 ) -> None:
-    door = "foxglove" if via == "foxglove" else "bridge"
+    door = _WAYS[via][0]
     robots = await asyncio.to_thread(Robots, [f"{door}:127.0.0.1:0"])
     port = robots.ports[0]
     try:
@@ -183,7 +191,9 @@ class _Death:
 def _profile(port: int, via: str) -> Profile:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "frozen.yaml")
-        file.write_text(_DOCUMENT.replace("PORT", str(port)).replace("VIA", via), "utf-8")
+        _, transport, send = _WAYS[via]
+        text = _DOCUMENT.replace("TRANSPORT", transport).replace("SEND", send)
+        file.write_text(text.replace("PORT", str(port)), "utf-8")
         return load_profile(file, built_in_catalog())
 
 

@@ -165,8 +165,8 @@ def peer(script: str, *arguments: object) -> Iterator[int]:
 
 def _script(name: str, *arguments: str) -> list[str]:
     # -P: otherwise, its own folder is first on the path, with names from the standard library.
-    # -S: only Foxglove's server needs installed packages.
-    flags = "-PE" if name == "foxglove_process.py" else "-PSE"
+    # -S: only the servers of others need installed packages.
+    flags = "-PE" if name in ("foxglove_process.py", "zenoh_process.py") else "-PSE"
     return [sys.executable, flags, str(HERE / name), *arguments]
 
 
@@ -179,7 +179,7 @@ class Heard(NamedTuple):
 
 
 class Robots(Program):
-    """Robots in one process; see `bench.rig.robot_process` and `bench.rig.foxglove_process`."""
+    """Robots in one process; see `bench.rig.robot_process`, `foxglove_process`, `zenoh_process`."""
 
     def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         self.heard: list[list[Heard]] = [[] for _ in places]
@@ -194,8 +194,8 @@ class Robots(Program):
         """
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
-        is_foxglove = any(place.startswith("foxglove:") for place in places)
-        name = "foxglove_process.py" if is_foxglove else "robot_process.py"
+        door = places[0].partition(":")[0]
+        name = f"{door}_process.py" if door in ("foxglove", "zenoh") else "robot_process.py"
         super().__init__(_script(name, *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
