@@ -81,7 +81,7 @@ def _told(via: str, trouble: str, rows: Sequence[Mapping[str, object]], wanted: 
         print(json.dumps({"broken": f"motion_{via}_{trouble}", **one._asdict()}), flush=True)
     worst = max(newest / HEARD_MS, stop / limit) if len(said) >= wanted and not bad else inf
     return Result(
-        name=f"motion_{via}: {len(said)} x {trouble} of the server: worst / limit",
+        name=f"motion_{via}: {len(said)} trials of “{trouble}” on the server: worst / limit",
         ratio=round(worst, 3),
         goal=1.0,
         baseline_ms=limit,

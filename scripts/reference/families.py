@@ -82,6 +82,7 @@ FAMILIES: Mapping[str, Family] = {
         {
             "transports/rosbridge.md": "ROS over rosbridge",
             "transports/foxglove.md": "ROS over foxglove_bridge",
+            "transports/ros-zenoh.md": "ROS over Zenoh",
         },
     ),
     "mqtt": Family(

@@ -52,7 +52,7 @@ class KeyRename(NamedTuple):
             return False
         kind = mapping.get("type")
         if self.old == "via":  # `via` of a ROS transport is a new key with another meaning
-            bridges = ("rosbridge", "foxglove", "auto")
+            bridges = ("rosbridge", "foxglove", "auto", "zenoh")
             return kind != "ros" and (kind is not None or mapping["via"] not in bridges)
         return not self.types or kind is None or kind in self.types
 

@@ -43,10 +43,12 @@ def make_lines(
             spec = driver.transports[name]
             # The loader has checked that `tunnel` names a tunnel.
             tunnel = cast("Tunnel", make(spec.tunnel)) if spec.tunnel else None
-            topics = listened(driver, name, settings)
+            options, topics = options_of(spec, settings), listened(driver, name, settings)
+            if spec.type == "ros" and options.get("via") == "zenoh":
+                topics = _with_hashes(topics)
             setup = TransportSetup(
                 name,
-                options_of(spec, settings),
+                options,
                 tuple(TopicSubscription(*topic) for topic in topics.items()),
                 tunnel,
             )
@@ -57,6 +59,16 @@ def make_lines(
     for name in driver.transports:
         make(name)
     return made
+
+
+def _with_hashes(topics: dict[str, Mapping[str, Value]]) -> dict[str, Mapping[str, Value]]:
+    """Add the hash of each known type, which a transport to rmw_zenoh needs for its tokens."""
+    from urc.protocol.ros.known_types import known_hash  # only for these robots
+
+    return {
+        topic: {**how, "hash": known_hash(str(how["type"]))} if "type" in how else how
+        for topic, how in topics.items()
+    }
 
 
 def make_transports(

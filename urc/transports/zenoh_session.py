@@ -68,7 +68,7 @@ class ZenohSession:
         self._turn = asyncio.Lock()
         self._gets: set[_Get] = set()
         self._is_over = threading.Event()
-        self._came: deque[tuple[str, Any, bool]] = deque(maxlen=MAX_HANDOVER)
+        self._came: deque[Callable[[], None]] = deque(maxlen=MAX_HANDOVER)
         self._is_woken = False
         self._ping: asyncio.Future[None] | None = None
         self._check: asyncio.TimerHandle | None = None
@@ -98,17 +98,23 @@ class ZenohSession:
     async def publish(self, envelope: Envelope) -> None:
         """Put one value; return when the kernel has accepted it, or raise `TransportError`."""
         key = _key_of(envelope, "publish to")
-        body = body_bytes(envelope.body)
+        await self.put(key, body_bytes(envelope.body), _encoding_of(envelope.body))
+
+    async def put(
+        self, key: str, body: bytes, encoding: Any = None, attachment: bytes | None = None
+    ) -> None:
+        """Put `body`; return when the kernel has accepted it, or raise `TransportError`."""
         put = partial(
-            self._session.put,
+            self.library.put,
             key,
             body,
-            encoding=_encoding_of(envelope.body),
+            encoding=encoding,
+            attachment=attachment,
             congestion_control=zenoh.CongestionControl.DROP,
             express=True,
             allowed_destination=zenoh.Locality.REMOTE,
         )
-        await self._leave(put, len(key.encode()) + len(body))
+        await self._leave(put, len(key.encode()) + len(body) + len(attachment or b""))
 
     async def get(self, envelope: Envelope) -> None:
         """Ask for the value of one key; the reply arrives as a response."""
@@ -137,6 +143,23 @@ class ZenohSession:
             self._send_ping()
         await asyncio.shield(self._ping)
         self._raise_if_ended()
+
+    @property
+    def library(self) -> Any:
+        """The library's session; raise `PeerClosed` if the connection has ended."""
+        self._raise_if_ended()
+        return self._session
+
+    def keep(self, declared: object) -> None:
+        """Keep a subscription or token of the library until the connection ends."""
+        self._declared.append(declared)
+
+    def hand_over(self, work: Callable[[], None]) -> None:
+        """Run `work` on the event loop; called from the library's threads."""
+        self._came.append(work)
+        if not self._is_woken:
+            self._is_woken = True
+            self._from_thread(self._arrived)
 
     def unsent(self) -> int:
         """Return the number of bytes that the router has not acknowledged."""
@@ -257,17 +280,14 @@ class ZenohSession:
             self._hand_over(key, sample.payload.to_bytes(), False)
 
     def _hand_over(self, key: str, body: bytes, is_liveliness: bool) -> None:
-        self._came.append((key, body, is_liveliness))
-        if not self._is_woken:
-            self._is_woken = True
-            self._from_thread(self._arrived)
+        attributes = {"topic": key, "liveliness": True} if is_liveliness else {"topic": key}
+        envelope = Envelope("message", attributes, body)
+        self.hand_over(partial(self.queue.message, key, envelope, len(key) + len(body)))
 
     def _arrived(self) -> None:
         self._is_woken = False
         while self._came:
-            key, body, is_liveliness = self._came.popleft()
-            attributes = {"topic": key, "liveliness": True} if is_liveliness else {"topic": key}
-            self.queue.message(key, Envelope("message", attributes, body), len(key) + len(body))
+            self._came.popleft()()
 
     def _from_thread(self, work: Callable[[], object]) -> None:
         with suppress(RuntimeError):  # the event loop has ended

@@ -108,6 +108,8 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
         check_sent_keys(part.must(form), problems)
     elif form and spec.type == "ros":
         _check_ros(part.must(form), problems)
+        if spec.options.get("via") == "zenoh":
+            _check_ros_zenoh(part.must(form), problems)
     return form
 
 
@@ -131,6 +133,23 @@ def _check_ros(part: Node, problems: Problems) -> None:
             key=True,
             hint="'rostopic info' shows the type, such as type: geometry_msgs/Twist",
         )
+
+
+def _check_ros_zenoh(part: Node, problems: Problems) -> None:
+    """Report what ROS 2 over Zenoh cannot do: anything but topics, and topics that are latched."""
+    is_topic = part.name == "publish"
+    if is_topic and not part.data.get("retain"):
+        return
+    problems.error(
+        part,
+        "wrong-form",
+        "with via: zenoh, topics cannot be latched"
+        if is_topic
+        else f"with via: zenoh, ros carries topics and does not support {part.name!r}",
+        at="retain" if is_topic else "",
+        key=True,
+        hint="use via: foxglove or via: rosbridge, which need a bridge on the robot",
+    )
 
 
 def _check_read(

@@ -74,8 +74,9 @@ class RequestCompiler:
             return None
         from urc.protocol.ros.topic_codec import TopicCodec  # takes 4 ms, so only for these
 
+        has_hashes = spec.options.get("via") not in ("foxglove", "auto")
         paths = paths_by_topic(self._driver, spec.name, self._readings.settings)
-        return TopicCodec(paths, is_ros1=spec.options.get("version") == 1)
+        return TopicCodec(paths, is_ros1=spec.options.get("version") == 1, has_hashes=has_hashes)
 
     def _react(
         self,

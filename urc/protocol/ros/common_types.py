@@ -12,7 +12,7 @@ from functools import cache
 from typing import Final
 
 from urc.protocol.ros.definition import Definition, Definitions, MessageField
-from urc.protocol.ros.msg_text import parse_msg
+from urc.protocol.ros.msg_text import parse_lines
 
 __all__ = ["common_types"]
 
@@ -110,10 +110,7 @@ _ROS1: Final[Mapping[str, tuple[MessageField, ...]]] = {
 @cache
 def common_types(*, is_ros1: bool = False) -> Definitions:
     """Return the definitions for ROS 2, or for ROS 1 if `is_ros1` is true."""
-    found: dict[str, Definition] = {}
-    for line in _TYPES.replace("\n  ", " ").splitlines():
-        name, _, fields = line.partition(":")
-        found |= parse_msg(name, fields.replace(", ", "\n"))
+    found = parse_lines(_TYPES)
     if is_ros1:
         found |= {name: Definition(name, fields, {}) for name, fields in _ROS1.items()}
     return found

@@ -14,6 +14,7 @@ __all__ = [
     "BYTE_CODES",
     "MAX_TEXT",
     "SIZES",
+    "STANDARD",
     "TIME_TYPES",
     "Array",
     "BadDefinition",
@@ -24,6 +25,7 @@ __all__ = [
     "Primitive",
     "Record",
     "Text",
+    "full_name",
     "layout_of",
     "plain_name",
 ]
@@ -119,7 +121,7 @@ class Array(NamedTuple):
 
 Layout = Primitive | Text | Record | Array
 
-_STANDARD: Final = {
+STANDARD: Final = {
     "builtin_interfaces/Time": (MessageField("sec", "int32"), MessageField("nanosec", "uint32")),
     "builtin_interfaces/Duration": (
         MessageField("sec", "int32"),
@@ -153,6 +155,23 @@ def layout_of(name: str, definitions: Definitions, *, is_ros1: bool = False) -> 
     return _Expansion(definitions, is_ros1).record(plain_name(name), 0)
 
 
+def full_name(name: str, owner: str, definitions: Definitions) -> str:
+    """Return the short form of a field's type name, which may lack its package.
+
+    Args:
+        name: type name as written in the definition of `owner`.
+        owner: short name of the type with the field.
+        definitions: definitions of all types.
+    """
+    if "/" in name or "::" in name or name in STANDARD:
+        return plain_name(name)
+    for package in (owner.partition("/")[0], "std_msgs"):
+        if f"{package}/{name}" in definitions:
+            return f"{package}/{name}"
+    found = [known for known in definitions if known.endswith(f"/{name}")]
+    return found[0] if len(found) == 1 else name
+
+
 class _Expansion:
     def __init__(self, definitions: Definitions, is_ros1: bool) -> None:
         self._definitions = definitions
@@ -163,7 +182,7 @@ class _Expansion:
         if depth > MAX_DEPTH:
             raise BadDefinition(f"{name} is nested more than {MAX_DEPTH} levels deep")
         found = self._definitions.get(name)
-        fields = found.fields if found is not None else _STANDARD.get(name)
+        fields = found.fields if found is not None else STANDARD.get(name)
         if fields is None:
             raise BadDefinition(f"the type {name} has no definition")
         made = tuple((one.name, self._field(one, name, depth)) for one in fields)
@@ -184,17 +203,7 @@ class _Expansion:
         elif field.type in ("string", "wstring"):
             element = Text(field.type == "wstring", default)
         else:
-            element = self.record(self._full(field.type, owner), depth + 1)
+            element = self.record(full_name(field.type, owner, self._definitions), depth + 1)
         if field.length is None:
             return element
         return Array(element, field.length, field.default, field.bound)
-
-    def _full(self, name: str, owner: str) -> str:
-        """Return the short form of a type name that may lack its package."""
-        if "/" in name or "::" in name or name in _STANDARD:
-            return plain_name(name)
-        for package in (owner.partition("/")[0], "std_msgs"):
-            if f"{package}/{name}" in self._definitions:
-                return f"{package}/{name}"
-        found = [known for known in self._definitions if known.endswith(f"/{name}")]
-        return found[0] if len(found) == 1 else name

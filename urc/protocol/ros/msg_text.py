@@ -20,7 +20,7 @@ from urc.protocol.ros.definition import (
     plain_name,
 )
 
-__all__ = ["parse_msg", "split_types"]
+__all__ = ["parse_lines", "parse_msg", "split_types"]
 
 _TYPE: Final = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=([0-9]{1,9}))?(?:\[(<=)?([0-9]{0,9})\])?")
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -80,6 +80,18 @@ def parse_msg(name: str, text: str) -> Definitions:
             if bare and not bare.startswith("#"):
                 _read_line(bare, fields, constants, inner)
         found.setdefault(inner, Definition(inner, tuple(fields.values()), constants))
+    return found
+
+
+def parse_lines(text: str) -> dict[str, Definition]:
+    """Return the definitions in a list of types, each ``pkg/Type: TYPE NAME, TYPE NAME, …``.
+
+    A line that begins with two spaces continues the previous line.
+    """
+    found: dict[str, Definition] = {}
+    for line in text.replace("\n  ", " ").splitlines():
+        name, _, fields = line.partition(":")
+        found |= parse_msg(name, fields.replace(", ", "\n"))
     return found
 
 

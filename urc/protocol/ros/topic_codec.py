@@ -11,6 +11,9 @@ published type comes from `urc.protocol.ros.common_types`, or from a topic of th
 there is no definition, the envelope has no bytes, and the transport sends JSON. The envelope always
 keeps its plain body, so it also works with rosbridge.
 
+Over Zenoh, a robot sends the hash of each type instead of its definition. The codec then uses its
+own definition (`urc.protocol.ros.known_types`) if the hash is the same.
+
 Services have their own definitions, which the transport delivers with the first call. The transport
 returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
 """
@@ -23,6 +26,7 @@ from urc.problems import UrcError, printable
 from urc.protocol.ros.common_types import common_types
 from urc.protocol.ros.definition import BadDefinition, Definitions, Record, layout_of, plain_name
 from urc.protocol.ros.idl_text import parse_idl
+from urc.protocol.ros.known_types import check_known, known_hash, known_types
 from urc.protocol.ros.msg_text import parse_msg
 from urc.protocol.ros.read_source import BadRosMessage, Read, build_read, read_safely
 from urc.protocol.ros.wanted import ALL, Path, Wanted, wanted_of
@@ -33,6 +37,8 @@ __all__ = ["DEFINITION", "UNENCODED", "Received", "TopicCodec"]
 DEFINITION: Final = "definition"
 """Verb of a definition; the envelope has a text body and the attributes `topic`, `type`, `encoding`
 and `notation`."""
+KNOWN: Final = "known"
+"""Notation of a definition without text, which has the attribute `hash` instead."""
 UNENCODED: Final = "unencoded"
 """Verb of a call that the transport has returned because it is not yet in binary form. The
 attributes are those of the call, plus `request` and `response`, each a list of type, encoding,
@@ -95,7 +101,11 @@ class TopicCodec:
     """The codec of one connection; its definitions are discarded when the connection is opened."""
 
     def __init__(
-        self, paths: Mapping[str, Iterable[Path]] | None = None, *, is_ros1: bool = False
+        self,
+        paths: Mapping[str, Iterable[Path]] | None = None,
+        *,
+        is_ros1: bool = False,
+        has_hashes: bool = False,
     ) -> None:
         """Initialise without definitions.
 
@@ -103,9 +113,11 @@ class TopicCodec:
             paths: paths that the driver reads, keyed by topic; messages on other topics are read
                 whole.
             is_ros1: whether to write in the ROS 1 format until a definition determines the format.
+            has_hashes: whether the connection uses hashes of types instead of definitions.
         """
         self._wanted = {topic: wanted_of(set(each)) for topic, each in (paths or {}).items()}
         self._is_ros1 = is_ros1
+        self._has_hashes = has_hashes
         self._sources: dict[str, _Source] = {}
         self._services: dict[str, tuple[Writer | None, _Source | None, str]] = {}
         self._compiled: dict[tuple[object, ...], _Source | Writer] = {}
@@ -146,6 +158,8 @@ class TopicCodec:
             str(said.get("notation")),
             str(envelope.body),
         )
+        if schema.notation == KNOWN:
+            check_known(schema.type, str(said.get("hash")))
         if schema.encoding == "json":
             return  # the form ``json`` reads bytes
         self._is_ros1 = schema.encoding == "ros1"
@@ -167,6 +181,8 @@ class TopicCodec:
     def _layout(self, schema: _Schema) -> Record:
         if schema.encoding not in ("cdr", "ros1"):
             raise BadDefinition(f"the message encoding {schema.encoding!r} is not supported")
+        if schema.notation == KNOWN:
+            return layout_of(schema.type, known_types())
         parse = {"ros2msg": parse_msg, "ros1msg": parse_msg, "ros2idl": parse_idl}.get(
             schema.notation
         )
@@ -243,17 +259,20 @@ class TopicCodec:
         if writer is None:
             return payload
         written = writer.write(payload.body)
-        added = {
+        added: dict[str, object] = {
             "encoding": "ros1" if self._is_ros1 else "cdr",
             "data": written.data,
             "stamps": list(written.stamps),
         }
+        if self._has_hashes:
+            added["hash"] = known_hash(str(payload.attributes.get("type")))
         return payload._replace(attributes={**payload.attributes, **added})
 
     def _writer(self, name: str) -> Writer | None:
         key = (name, self._is_ros1)
         if key not in self._writers:
-            common = common_types(is_ros1=self._is_ros1)
+            is_known = self._has_hashes and not self._is_ros1
+            common = known_types() if is_known else common_types(is_ros1=self._is_ros1)
             definitions = self._known.get(name, common)
             try:
                 layout = layout_of(name, definitions, is_ros1=self._is_ros1)

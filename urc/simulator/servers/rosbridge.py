@@ -12,7 +12,7 @@ from websockets.asyncio.server import Server, ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
 from urc.model.payload import Envelope, Payload
-from urc.simulator.servers.base import ServerContext
+from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
 from urc.transports.ros.types import spelled
@@ -408,6 +408,10 @@ class RosbridgeServer(MessageServer):
         ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("version"))
         types = {name: str(how.get("type") or "") for name, how in context.topics.items()}
         self._bridge = Bridge({name: spelled(kind, "msg", ros) for name, kind in types.items()})
+
+    def _endpoint(self, host: str, port: int) -> Endpoint:
+        found = super()._endpoint(host, port)
+        return found._replace(options={**found.options, "via": "rosbridge"})
 
     async def _serve(self, host: str, port: int) -> Server:
         return await serve(

@@ -1,4 +1,4 @@
-"""The kinds of ROS bridges and the automatic choice between them.
+"""The kinds of ROS connections and the automatic choice between bridges.
 
 A WebSocket client offers subprotocols, and the server selects at most one. A Foxglove protocol
 server requires one of its own subprotocols. A rosbridge server selects no subprotocol. With ``via:
@@ -20,12 +20,14 @@ from urc.transports.ros.foxglove_session import TopicWish
 from urc.transports.ros.rosbridge import RosbridgeTransport
 from urc.transports.ros.rosbridge_operations import MAX_BYTES
 from urc.transports.websocket import WebSocketTransport
+from urc.transports.zenoh_options import DEFAULT_PORT as ZENOH_PORT
 
 __all__ = ["PORTS", "AnyBridgeTransport", "from_setup"]
 
 PORTS: Final[Mapping[str, tuple[int, ...]]] = {
     "rosbridge": (rosbridge.DEFAULT_PORT,),
     "foxglove": (FOXGLOVE_PORT,),
+    "zenoh": (ZENOH_PORT,),
     "auto": (FOXGLOVE_PORT, rosbridge.DEFAULT_PORT),
 }
 """Usual ports for each kind of bridge, in the order in which they are tried."""
@@ -138,7 +140,7 @@ class AnyBridgeTransport:
 def from_setup(setup: TransportSetup) -> Transport:
     """Return a ROS transport for a document's options.
 
-    See docs/transports/rosbridge.md and docs/transports/foxglove.md.
+    See docs/transports/rosbridge.md, docs/transports/foxglove.md and docs/transports/ros-zenoh.md.
 
     Raises:
         TransportError: an option is missing or invalid.
@@ -147,6 +149,10 @@ def from_setup(setup: TransportSetup) -> Transport:
     via = options.get("via", "rosbridge")
     if not isinstance(via, str) or via not in PORTS:
         raise TransportError(f"ros: via must be one of {', '.join(PORTS)}, not {via!r}")
+    if via == "zenoh":
+        from urc.transports.ros import zenoh  # not needed for the bridges
+
+        return zenoh.from_setup(setup)
     host, port = options.get("host"), options.get("port")
     if not isinstance(host, str) or not host.strip():
         raise TransportError(f"ros: host must be a host name or address, not {host!r}")
