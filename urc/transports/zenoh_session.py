@@ -42,6 +42,14 @@ _CHECK_S: Final = 1.0
 _PASS_S: Final = 5.0
 """Time in which the library must pass a value on to the relay, in seconds."""
 _FAREWELL_S: Final = 0.5
+RECENT_S: Final = 2.0
+"""Age of a message's key at the end of a connection, in seconds, up to which a new connection waits
+for the key's subscribers."""
+MEET_S: Final = 3.0
+"""Maximum wait for subscribers on a new connection, in seconds."""
+MAX_RECENT: Final = 64
+"""Maximum number of keys for whose subscribers a new connection waits."""
+_LOOK_S: Final = 0.02
 _LARGE_BYTES: Final = 32_768
 """Size of a value that does not fit into one batch of the library, in bytes."""
 _ENDED: Final = "the router ended the session"
@@ -65,6 +73,9 @@ class ZenohSession:
         """The library's subscriptions and tokens, which end when nothing refers to them."""
         self._tokens: set[str] = set()
         """Subscribed tokens that have been seen."""
+        self._put_s: dict[str, float] = {}
+        """Time of the newest message for each of the last keys, on the event loop's clock."""
+        self._ended_s = self._loop.time()
         self._turn = asyncio.Lock()
         self._gets: set[_Get] = set()
         self._is_over = threading.Event()
@@ -115,6 +126,33 @@ class ZenohSession:
             allowed_destination=zenoh.Locality.REMOTE,
         )
         await self._leave(put, len(key.encode()) + len(body) + len(attachment or b""))
+        self._put_s.pop(key, None)
+        self._put_s[key] = self._loop.time()
+        if len(self._put_s) > MAX_RECENT:
+            del self._put_s[next(iter(self._put_s))]
+
+    def recent(self) -> tuple[str, ...]:
+        """Return the keys of the messages that were sent just before the connection ended."""
+        return tuple(k for k, put_s in self._put_s.items() if put_s >= self._ended_s - RECENT_S)
+
+    async def meet(self, keys: tuple[str, ...]) -> None:
+        """Wait until each of `keys` has a subscriber, but no longer than `MEET_S`.
+
+        After a restart of the router, robots connect to it later than URC. A stop that is sent
+        earlier would be lost.
+        """
+        until_s = self._loop.time() + MEET_S
+        remote = zenoh.Locality.REMOTE
+        publishers = [self.library.declare_publisher(k, allowed_destination=remote) for k in keys]
+        try:
+            while self._loop.time() < until_s and self.queue.ended is None:
+                if all(_has_match(one) for one in publishers):
+                    return
+                await asyncio.sleep(_LOOK_S)
+        finally:
+            # While a publisher is declared, the library drops values without subscribers.
+            for one in publishers:
+                one.undeclare()
 
     async def get(self, envelope: Envelope) -> None:
         """Ask for the value of one key; the reply arrives as a response."""
@@ -305,6 +343,8 @@ class ZenohSession:
 
     def _end(self, reason: str) -> None:
         """Wake all waiting tasks, and tell them why the connection ended."""
+        if not self._is_over.is_set():
+            self._ended_s = self._loop.time()
         self._is_over.set()
         self.queue.end(reason)
         if self._check is not None:
@@ -422,6 +462,12 @@ def _encoding_of(body: object) -> Any:
 def _words(fault: Exception) -> str:
     """Return the library's reason without source positions."""
     return one_line(str(fault).partition(" at /")[0])
+
+
+def _has_match(publisher: Any) -> bool:
+    """Return whether a publisher has subscribers; the library declares a boolean."""
+    status = publisher.matching_status
+    return bool(getattr(status, "matching", status))
 
 
 def _ignore(_: object) -> None:

@@ -32,7 +32,7 @@ from urc.transports.base import (
 )
 from urc.transports.zenoh import from_setup
 from urc.transports.zenoh_client import ZenohTransport
-from urc.transports.zenoh_session import MAX_BYTES, PING_S
+from urc.transports.zenoh_session import MAX_BYTES, MEET_S, PING_S, RECENT_S
 
 pytestmark = pytest.mark.anyio
 
@@ -130,12 +130,13 @@ class Device:
 
 
 @asynccontextmanager
-async def device(port: int = 0, **settings: object) -> AsyncIterator[Device]:
+async def device(port: int = 0, late_s: float = 0, **settings: object) -> AsyncIterator[Device]:
     """Run the router with its device until the context ends."""
     port = port or free_port()
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "tests.e2e.transports.zenoh_device", str(port)),
         json.dumps(settings),
+        str(late_s),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
     )
@@ -238,6 +239,37 @@ async def test_router_that_dies_is_lost_at_once_and_stays_lost() -> None:
             await transport.open(OPEN_S)
             await transport.send(said("lamp/set", b"3"))
             assert (await again.next("put"))["value"] == "3"
+            await transport.close()
+
+
+async def test_new_connection_waits_for_those_who_were_sent_to() -> None:
+    """Else the stop reaches nobody. It waits for the last keys only, and not for ever."""
+    loop = asyncio.get_running_loop()
+    async with nothing_left():
+        async with device() as other:
+            transport = line(other.port)
+            await transport.open(OPEN_S)
+            await transport.send(said("old", b"1"))
+            await asyncio.sleep(RECENT_S + 0.2)
+            await transport.send(said("drive", b"1"))
+            await other.next("put")
+            other.signal(signal.SIGKILL)
+            await ends(transport)
+        async with device(other.port, late_s=1.0) as again:
+            await transport.open(OPEN_S)
+            await transport.send(said("drive", b"0"))
+            assert (await again.next("put"))["value"] == "0"
+            again.signal(signal.SIGKILL)
+            await ends(transport)
+        async with device(other.port, late_s=60.0) as again:
+            began = loop.time()
+            await transport.open(OPEN_S)
+            assert MEET_S - 0.5 < loop.time() - began < MEET_S + 2.0
+            await transport.send(said("drive", b"0"))  # nobody hears it, and nothing waits
+            await transport.close()
+            began = loop.time()
+            await transport.open(OPEN_S)
+            assert loop.time() - began < MEET_S + 2.0
             await transport.close()
 
 

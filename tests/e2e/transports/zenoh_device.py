@@ -7,6 +7,7 @@ on its standard input: a line of JSON with a key and a value.
 import json
 import sys
 import threading
+import time
 from typing import Any
 
 import zenoh
@@ -59,12 +60,16 @@ def main() -> None:
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         **(json.loads(sys.argv[2]) if len(sys.argv) > 2 else {}),
     }
+    late_s = float(sys.argv[3]) if len(sys.argv) > 3 else 0.0
     with zenoh.open(zenoh.Config.from_json5(json.dumps(settings))) as session:
+        if late_s:  # it is a router at once, and a device later
+            say("ready", "")
+            time.sleep(late_s)
         session.declare_subscriber("**", zenoh.handlers.Callback(heard))
         session.declare_queryable("robot/*", zenoh.handlers.Callback(asked))
         session.liveliness().declare_subscriber("**", zenoh.handlers.Callback(seen), history=True)
         token = session.liveliness().declare_token("robot/alive")
-        say("ready", "")
+        say("ready" if not late_s else "subscribed", "")
         for line in sys.stdin:
             told = json.loads(line)
             if told["key"] == "robot/alive":

@@ -94,6 +94,8 @@ class RosZenohTransport:
         """Topic, type and hash of each published topic. A new connection declares all of them, so
         that the robot's graph shows them immediately."""
         self._node: _RosNode | None = None
+        self._awaited: tuple[str, ...] = ()
+        """Keys for whose subscribers the next connection waits; see `ZenohTransport`."""
 
     @property
     def address(self) -> str:
@@ -109,6 +111,7 @@ class RosZenohTransport:
                 session = ZenohSession(self._options.zenoh, stream)
                 try:
                     await session.start(timeout_s)
+                    await session.meet(self._awaited)
                     node = _RosNode(self._options, session, self._graph, self._published)
                     node.begin()
                 except BaseException:
@@ -118,7 +121,7 @@ class RosZenohTransport:
             raise ConnectFailed(late(self._options.zenoh.where, timeout_s)) from fault
         except zenoh.ZError as fault:
             raise ConnectFailed(one_line(str(fault))) from fault
-        self._node = node
+        self._node, self._awaited = node, ()
 
     async def receive(self) -> Envelope:
         """Return the next message or definition; raise `PeerClosed` at the end."""
@@ -149,6 +152,7 @@ class RosZenohTransport:
         if node is not None:
             node.end()
             await node.session.close()
+            self._awaited = node.session.recent()
 
     async def abort(self) -> None:
         """Close the connection immediately and discard unsent data. Never raises."""
@@ -156,6 +160,7 @@ class RosZenohTransport:
         if node is not None:
             node.end()
             await node.session.abort()
+            self._awaited = node.session.recent()
 
     async def settle(self) -> str:
         """Return a line that lists the published topics without subscribers, or ""."""
