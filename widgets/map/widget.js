@@ -5,10 +5,12 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./geo.js").Place} Place */
 /** @typedef {typeof import("leaflet")} Leaflet */
-import { DASH, attribute, button, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";
+import { DASH, attribute, button, colours, isStill, many, noteOf, number, part, style, svg, write } from "urc/kit";
 import { Choice } from "./choose.js";
 import { Trail, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
+import { cornersOf, sizeText } from "./grid_image.js";
+import { Occupancy } from "./occupancy.js";
 
 export default {
   /**
@@ -22,8 +24,8 @@ export default {
     ctx.follow("theme", () => chart.theme());
     return {
       update: (readings, outputs) => chart.update(readings, outputs),
-      resize: () => chart.map.invalidateSize({ animate: false }),
-      destroy: () => chart.map.remove(),
+      resize: () => chart.resize(),
+      destroy: () => chart.destroy(),
     };
   },
 };
@@ -49,12 +51,26 @@ class Chart {
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
+    /** @type {Readonly<Record<string, any>> | undefined} */
+    this.readings = undefined;
+    /** @type {Place | null} */
+    this.place = null;
+    /** Reading of the position. @type {Reading | undefined} */
+    this.reading = undefined;
     /** Description of the last drawing; "" after a move of the map. */
     this.drawn = "";
     this.trail = new Trail(Number(options["trail"] ?? 1000), Number(options["trail_step"] ?? 0.2), false);
     /** @type {Place[]} */
     this.fence = [];
+    this.occupancy = new Occupancy(() => this.drawGrids());
+    /** Zoom level at which the whole occupancy grid was shown last; -1 before. */
+    this.fittedZoom = -1;
     this.map = this.makeMap(false);
+  }
+
+  destroy() {
+    this.occupancy.end();
+    this.map.remove();
   }
 
   /**
@@ -66,6 +82,7 @@ class Chart {
     const map = new leaflet.Map(part(this.root, ".map-area"), {
       crs: isLocal ? leaflet.CRS.Simple : leaflet.CRS.EPSG3857,
       center: [0, 0],
+      zoomSnap: isLocal ? 0.25 : 1,
       zoom: Number(options["zoom"] ?? (isLocal ? 5 : 18)),
       minZoom: isLocal ? -3 : 1,
       maxZoom: isLocal ? 10 : 22,
@@ -88,7 +105,9 @@ class Chart {
    * @param {Readonly<Record<string, Outlet>>} outputs
    */
   begin(readings, outputs) {
-    const isLocal = readings["x"] !== undefined && readings["latitude"] === undefined && readings["fix"] === undefined;
+    const isEarth = readings["latitude"] !== undefined || readings["fix"] !== undefined;
+    const hasGrids = many(readings["grids"]).length > 0;
+    const isLocal = !isEarth && (readings["x"] !== undefined || hasGrids);
     this.isLocal = isLocal;
     if (isLocal) {
       this.map.remove();
@@ -105,7 +124,9 @@ class Chart {
       fence,
       changed: () => this.drawChoice(),
     });
-    this.addButtons("waypoints" in outputs);
+    this.grid.under = (pen) => this.occupancy.paint(pen, this.map);
+    attribute(this.root, "data-grids", hasGrids ? "" : null);
+    this.addButtons("waypoints" in outputs, hasGrids);
     this.layers = this.makeLayers();
     this.theme();
     this.map.on("dragstart", () => this.follow(false));
@@ -129,8 +150,11 @@ class Chart {
     this.root.addEventListener("keydown", key, { signal: this.signal });
   }
 
-  /** @param {boolean} hasWay */
-  addButtons(hasWay) {
+  /**
+   * @param {boolean} hasWay
+   * @param {boolean} hasGrids
+   */
+  addButtons(hasWay, hasGrids) {
     const row = document.createElement("div");
     row.className = "map-tools";
     row.dataset["floats"] = "";
@@ -142,9 +166,42 @@ class Chart {
     add("+", this.t("Zoom in"), () => this.map.zoomIn());
     add("−", this.t("Zoom out"), () => this.map.zoomOut());
     this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    if (hasGrids) add("⤢", this.t("Show the whole map"), () => this.fit());
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a way"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
     this.follow(true);
+  }
+
+  /** Show the whole occupancy grid. */
+  fit() {
+    const { place } = this.occupancy;
+    if (!place) return;
+    this.follow(false);
+    this.scale();
+  }
+
+  /** Scale the map to its occupancy grid; a followed robot stays in the middle. */
+  scale() {
+    const { place } = this.occupancy;
+    if (!place) return;
+    this.map.fitBounds(new this.leaflet.LatLngBounds(cornersOf(place)), { animate: false });
+    this.fittedZoom = this.map.getZoom();
+    if (this.isFollowing && this.place) this.map.panTo(this.place, { animate: false });
+  }
+
+  /** Adapt to another size of the cell; a map that was shown whole stays whole. */
+  resize() {
+    this.map.invalidateSize({ animate: false });
+    if (this.map.getZoom() === this.fittedZoom) this.scale();
+  }
+
+  /** Draw new grids; the first one determines the scale, unless an option does. */
+  drawGrids() {
+    const { place } = this.occupancy;
+    const isFree = (this.options["zoom"] ?? null) === null && this.fence.length === 0;
+    if (place && isFree && this.fittedZoom === -1) this.scale();
+    this.grid?.ask();
+    this.describe();
   }
 
   toggleWay() {
@@ -187,6 +244,7 @@ class Chart {
     const ink = colours(this.root, ["text", "level", "line", "caution", "accent"]);
     this.ink = ink;
     this.grid?.theme();
+    this.occupancy.theme(colours(this.root, ["raised", "faint", "text", "series-3"]));
     this.layers?.trail.setStyle({ color: ink.level });
     this.layers?.ring.setStyle({ color: ink.level, fillColor: ink.level, fillOpacity: 0.15 });
     this.layers?.fence?.setStyle({ color: ink.caution, weight: 2, dashArray: "10 6" });
@@ -204,17 +262,46 @@ class Chart {
     const [first, second] = isLocal ? ["y", "x"] : ["latitude", "longitude"];
     const place = fix.place ?? placeOf(number(readings[first ?? ""]), number(readings[second ?? ""]), isLocal);
     const reading = readings["fix"] ?? worse(readings[first ?? ""], readings[second ?? ""]);
-    attribute(this.root, "data-state", reading?.state ?? "none");
+    const grids = many(readings["grids"]);
+    attribute(this.root, "data-state", (reading ?? grids[0])?.state ?? "none");
     const yaw = number(readings["yaw"]);
     const heading = number(readings["heading"]) ?? (yaw === null ? null : bearingOf(yaw));
     this.draw(place, heading, number(readings["accuracy"]) ?? fix.accuracy, reading?.state === "live");
-    write(this.text, place ? placeText(place, this.form, isLocal) : DASH);
+    this.readings = readings;
+    this.occupancy.update(grids);
+    this.place = place;
+    this.reading = reading;
+    this.describe();
+    this.choice?.update(outputs["goto"], outputs["waypoints"], place);
+  }
+
+  /** Write the place of the robot, and what is wrong with it or with the grids. */
+  describe() {
+    const { place = null, reading } = this;
+    const grids = many(this.readings?.["grids"]);
+    const size = this.occupancy.place;
+    const isAlone = reading === undefined && grids.length > 0;
+    const isLocal = this.isLocal ?? false;
+    write(this.text, place ? placeText(place, this.form, isLocal) : isAlone && size ? sizeText(size) : DASH);
     const isOut = place !== null && !isInside(place, this.fence);
     attribute(this.root, "data-fence", isOut ? "out" : null);
     const unknown = reading?.state === "live" && !place ? this.t("no position") : "";
-    const note = reading ? noteOf(reading, this.t) : this.t("no position is bound to this map");
-    write(this.note, [isOut ? `▲ ${this.t("outside the fence")}` : "", unknown, note].filter(Boolean).join(" · "));
-    this.choice?.update(outputs["goto"], outputs["waypoints"], place);
+    const note = reading ? noteOf(reading, this.t) : isAlone ? "" : this.t("no position is bound to this map");
+    const told = grids.map((grid, index) => this.noteOfGrid(grid, index));
+    write(this.note, [isOut ? `▲ ${this.t("outside the fence")}` : "", unknown, note, ...told].filter(Boolean).join(" · "));
+  }
+
+  /**
+   * Return what is wrong with a grid, after its title; "" if it is live.
+   *
+   * @param {Reading} grid
+   * @param {number} index
+   */
+  noteOfGrid(grid, index) {
+    const isBad = this.occupancy.isBad(index);
+    if (index > 0 && grid.state === "none") return ""; // many robots have a costmap only while driving
+    const note = isBad ? `▲ ${this.t("this picture cannot be shown")}` : noteOf(grid, this.t);
+    return note && `${grid.signal.title || grid.signal.name}: ${note}`;
   }
 
   /**

@@ -117,7 +117,8 @@ def paths_by_topic(
     found: dict[str, list[Path]] = {}
     for read in _reads(driver, transport):
         if read.topic is not None:
-            found.setdefault(topic_of(read, settings), []).extend(paths_of(read))
+            grids = {name for name, one in driver.signals.items() if one.type == "occupancy_grid"}
+            found.setdefault(topic_of(read, settings), []).extend(paths_of(read, grids))
     return found
 
 

@@ -8,6 +8,7 @@ observed.
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from urc.expressions import Template
@@ -124,6 +125,13 @@ class World:
         """Return the sensor view at `now_s`."""
         self.advance(now_s)
         return SensorView(self)
+
+    @cached_property
+    def occupancy_grid(self) -> Mapping[str, object]:
+        """The map of the world as the fields of nav_msgs/OccupancyGrid."""
+        from urc.simulator.world.occupancy import occupancy_grid
+
+        return occupancy_grid(self.plan, self.spec.start[:2])
 
     def top_view(self, width: int, height: int) -> bytes:
         """Return a top view of the world as JPEG; draw at most five new images per second.
@@ -269,6 +277,8 @@ class SensorView(Mapping[str, object]):
             return world.picture()
         if name == "panorama":
             return world.panorama()
+        if name == "occupancy_grid":
+            return world.occupancy_grid
         if name == "top":
             return world.top_view(320, 240)
         raise KeyError(name)
