@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { inflateSync } from "node:zlib";
 
+import { arrowOf, ellipseOf, pairsOf, wrapped } from "../../widgets/map/geo.js";
 import { between, cornersOf, crc32, partsOf, placeOfGrid, recoloured, sizeText } from "../../widgets/map/grid_image.js";
 
 // A grid of 3 by 2 cells as the server sends it: 50 99 1 above 0 100 -1.
@@ -90,4 +91,31 @@ test("colours come from the browser's words for them", () => {
   assert.deepEqual(partsOf("rgba(1, 2, 3, 0.5)"), [1, 2, 3]);
   assert.deepEqual(partsOf(""), [128, 128, 128]);
   assert.deepEqual(between([0, 0, 0], [100, 200, 50], 0.5), [50, 100, 25]);
+});
+
+test("points come in pairs of x and y, without bad ones", () => {
+  assert.deepEqual(pairsOf([1, 2, null, 3, 4, 5, 1e9, 0, 6]), [[2, 1], [5, 4]]);
+  for (const bad of [null, "1,2", 5, {}, []]) assert.deepEqual(pairsOf(bad), []);
+});
+
+test("an ellipse has the spread of the covariance, and turns with it", () => {
+  const corners = ellipseOf([10, 20], [4, 0, 0, 1]);
+  const [ys, xs] = [corners.map(([y]) => y - 10), corners.map(([, x]) => x - 20)];
+  assert.ok(Math.abs(Math.max(...xs) - 2 * Math.sqrt(5.991)) < 1e-9);
+  assert.ok(Math.abs(Math.max(...ys) - Math.sqrt(5.991)) < 0.01);
+  const ros = new Array(36).fill(0);
+  [ros[0], ros[1], ros[6], ros[7], ros[35]] = [1, 0.99, 0.99, 1, 5];
+  const [, farthest] = ellipseOf([0, 0], ros).reduce(([far, at], place) => {
+    const one = Math.hypot(...place);
+    return one > far ? [one, place] : [far, at];
+  }, [0, [0, 0]]);
+  assert.ok(Math.abs(Math.abs(farthest[0]) - Math.abs(farthest[1])) < 0.01 && farthest[0] * farthest[1] > 0);
+  for (const bad of [[1, 2, 2, 1], [1, 2, 3], [0, 0, 0, 0], [null, 0, 0, 1], null, [-1, 0, 0, -1]]) assert.deepEqual(ellipseOf([0, 0], bad), []);
+});
+
+test("an arrow points where the yaw says", () => {
+  const [start, end] = arrowOf([1, 2], Math.PI / 2, 3);
+  assert.deepEqual(start, [1, 2]);
+  assert.ok(Math.abs((end?.[0] ?? 0) - 4) < 1e-9 && Math.abs((end?.[1] ?? 0) - 2) < 1e-9);
+  assert.ok(Math.abs(wrapped(3.5) - (3.5 - 2 * Math.PI)) < 1e-9);
 });

@@ -231,5 +231,5 @@ function mapColours(inks) {
  */
 function costColours(inks) {
   const cost = partsOf(inks["series-3"]);
-  return (value) => [...cost, value <= 0 ? 0 : value >= LETHAL ? 190 : Math.round(25 + value * 0.9)];
+  return (value) => [...cost, value <= 0 ? 0 : value >= LETHAL ? 130 : Math.round(10 + value * 0.8)];
 }

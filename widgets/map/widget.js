@@ -6,11 +6,16 @@
 /** @typedef {import("./geo.js").Place} Place */
 /** @typedef {typeof import("leaflet")} Leaflet */
 import { DASH, attribute, button, colours, isStill, many, noteOf, number, part, style, svg, write } from "urc/kit";
+import { Aim } from "./aim.js";
 import { Choice } from "./choose.js";
-import { Trail, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
+import { Trail, arrowOf, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
 import { cornersOf, sizeText } from "./grid_image.js";
 import { Occupancy } from "./occupancy.js";
+import { Shapes, metresOf } from "./shapes.js";
+
+/** Inputs of which one is enough for the robot's own map. */
+const LOCAL = ["x", "paths", "areas", "points", "goal_x"];
 
 export default {
   /**
@@ -55,6 +60,8 @@ class Chart {
     this.readings = undefined;
     /** @type {Place | null} */
     this.place = null;
+    /** Serial numbers of the drawn points. */
+    this.seenPoints = "";
     /** Reading of the position. @type {Reading | undefined} */
     this.reading = undefined;
     /** Description of the last drawing; "" after a move of the map. */
@@ -107,7 +114,7 @@ class Chart {
   begin(readings, outputs) {
     const isEarth = readings["latitude"] !== undefined || readings["fix"] !== undefined;
     const hasGrids = many(readings["grids"]).length > 0;
-    const isLocal = !isEarth && (readings["x"] !== undefined || hasGrids);
+    const isLocal = !isEarth && (hasGrids || LOCAL.some((name) => readings[name] !== undefined));
     this.isLocal = isLocal;
     if (isLocal) {
       this.map.remove();
@@ -118,20 +125,32 @@ class Chart {
     const { fence, form } = this;
     this.grid = new Grid(this.map, part(this.root, ".map-scale"), isLocal);
     if (this.fence[0]) this.grid.setOrigin(this.fence[0]);
+    const turns = new Set(Object.keys(outputs).filter((name) => isLocal && this.ctx.command(name)?.arguments["yaw"]));
     this.choice = new Choice(part(this.root, ".map-frame"), this.ctx, {
       isLocal,
       form,
       fence,
       changed: () => this.drawChoice(),
+      turns,
     });
-    this.grid.under = (pen) => this.occupancy.paint(pen, this.map);
+    if (isLocal) this.shapes = new Shapes(this.leaflet, this.map);
+    this.aim = new Aim(this.map, this.signal, (place, yaw) => this.choice?.aim(place, yaw));
+    this.grid.under = (pen) => {
+      this.occupancy.paint(pen, this.map);
+      this.shapes?.paint(pen);
+    };
     attribute(this.root, "data-grids", hasGrids ? "" : null);
     this.addButtons("waypoints" in outputs, hasGrids);
+    this.addAims(turns.has("goto"), isLocal && "initial_pose" in outputs);
     this.layers = this.makeLayers();
     this.theme();
     this.map.on("dragstart", () => this.follow(false));
     this.map.on("moveend", () => { this.drawn = ""; });
-    if ("goto" in outputs || "waypoints" in outputs) this.listen();
+    this.map.on("zoomend", () => {
+      this.shapes?.scale();
+      this.drawChoice();
+    });
+    if ("goto" in outputs || "waypoints" in outputs || "initial_pose" in outputs) this.listen();
     if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
   }
 
@@ -142,7 +161,7 @@ class Chart {
         const { lat, lng } = this.map.getCenter();
         this.choice?.tap([lat, lng]);
       }
-      if (event.key === "Escape" && this.choice && this.choice.mode !== "look") {
+      if (event.key === "Escape" && this.choice && (this.choice.mode !== "look" || this.choice.aiming)) {
         event.preventDefault(); // here, Escape means no instead of STOP
         this.choice.clear();
       }
@@ -169,7 +188,27 @@ class Chart {
     if (hasGrids) add("⤢", this.t("Show the whole map"), () => this.fit());
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a way"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
+    this.tools = row;
     this.follow(true);
+  }
+
+  /**
+   * Add the buttons for gestures.
+   *
+   * @param {boolean} hasGoal
+   * @param {boolean} hasPose
+   */
+  addAims(hasGoal, hasPose) {
+    /** @type {Map<string, HTMLButtonElement>} */
+    this.aims = new Map();
+    const add = (/** @type {"goto" | "initial_pose"} */ output, /** @type {string} */ sign, /** @type {string} */ label) => {
+      const made = button("map-button", sign, () => this.choice?.toggleAim(output), { signal: this.signal, label });
+      this.tools?.append(made);
+      this.aims?.set(output, made);
+    };
+    attribute(part(this.root, ".map-tools"), "data-many", hasGoal && hasPose ? "" : null);
+    if (hasGoal) add("goto", "⚑", this.t("Goal with a direction"));
+    if (hasPose) add("initial_pose", "⊕", this.t("Set the robot's position"));
   }
 
   /** Show the whole occupancy grid. */
@@ -233,6 +272,7 @@ class Chart {
       arrow,
       trail: line({ weight: 3 }),
       way: line({ weight: 3, dashArray: "8 6" }),
+      turn: line({ weight: 4 }),
       ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
       robot: new leaflet.Marker([0, 0], { icon, interactive: false, keyboard: false }),
       /** @type {import("leaflet").CircleMarker[]} */
@@ -242,6 +282,7 @@ class Chart {
 
   theme() {
     const ink = colours(this.root, ["text", "level", "line", "caution", "accent"]);
+    this.shapes?.theme(colours(this.root, ["text", "series-1", "series-2", "series-4", "series-5"]));
     this.ink = ink;
     this.grid?.theme();
     this.occupancy.theme(colours(this.root, ["raised", "faint", "text", "series-3"]));
@@ -272,7 +313,11 @@ class Chart {
     this.place = place;
     this.reading = reading;
     this.describe();
-    this.choice?.update(outputs["goto"], outputs["waypoints"], place);
+    this.shapes?.update(readings, place);
+    const points = many(readings["points"]).map(({ serial, state }) => `${serial}${state}`).join();
+    if (points !== this.seenPoints) this.grid?.ask();
+    this.seenPoints = points;
+    this.choice?.update(outputs, place, yaw);
   }
 
   /** Write the place of the robot, and what is wrong with it or with the grids. */
@@ -348,6 +393,12 @@ class Chart {
     const from = this.trail.places.at(-1);
     const way = from && this.hasPlace ? [from, ...choice.places] : choice.places;
     layers.way.setLatLngs(choice.places.length > 0 ? way : []).setStyle({ color: ink.text });
+    const { places: [place], yaw } = choice;
+    const hasTurn = place !== undefined && yaw !== null && choice.mode === "place";
+    layers.turn.setLatLngs(hasTurn ? arrowOf(place, yaw, metresOf(this.map, 48)) : []).setStyle({ color: ink.text });
+    this.aim?.set(choice.aiming !== "");
+    for (const [output, made] of this.aims ?? []) attribute(made, "aria-pressed", String(choice.aiming === output));
+    attribute(this.root, "data-aim", choice.aiming || null);
     attribute(this.root, "data-mode", choice.mode);
     if (this.wayButton) {
       const isWay = choice.mode === "way" || choice.mode === "sure";

@@ -22,6 +22,7 @@ from urc.model.payload import Envelope
 from urc.model.values import Signal
 from urc.protocol.engine import Engine
 from urc.protocol.events import Samples, Violation
+from urc.protocol.forms.topics import listened
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter, build_raw
 from urc.protocol.values.occupancy_grid import KEYWORD, MAX_CELLS, MAX_SIDE, GridConverter
@@ -217,6 +218,22 @@ SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_
 def test_no_message_raises_another_error(message: object) -> None:
     with suppress(BadValue):
         GridConverter()(message)
+
+
+def test_a_message_with_an_empty_topic_is_switched_off(tmp_path: Path) -> None:
+    """A setting can so decide whether a robot has a map."""
+    path = tmp_path / "mapper.yaml"
+    path.write_text(
+        PROFILE.replace(
+            "default: 127.0.0.1 } }", "default: 127.0.0.1 }, map: { type: string, default: /map } }"
+        ).replace("topic: /map,", 'topic: "{{ settings.map }}",')
+    )
+    driver = load_profile(path, built_in_catalog()).driver
+    assert list(listened(driver, "ros", {"map": "/floor"})) == ["/floor", "/map_updates"]
+    assert list(listened(driver, "ros", {"map": ""})) == ["/map_updates"]
+    engine = Engine(driver, {"host": "127.0.0.1", "map": ""})
+    engine.start("ros", 0.0)
+    assert feed(engine, "", grid(1, 1, [0]))[0] is None
 
 
 # -- through the engine, with messages of rosbags

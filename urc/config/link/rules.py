@@ -112,6 +112,8 @@ def link_rules(
             linker.template(inner.must("when"), rule.when, known)
         places = (inner, *inner.listed("then"))
         for place, reaction in zip(places, rule.reactions, strict=True):
+            if reaction.until is not None:
+                linker.template(place.must("until"), reaction.until, known)
             _link_reaction(linker, place, reaction, known, set(state))
             _check_told(linker, place, told)
         _check_answers(linker, places, rule)

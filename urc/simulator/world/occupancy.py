@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from urc.simulator.world.plan import WorldMap
 
-__all__ = ["RESOLUTION_M", "occupancy_grid"]
+__all__ = ["RESOLUTION_M", "costmap", "occupancy_grid"]
 
 RESOLUTION_M: Final = 0.1
 """Side of a cell in metres."""
@@ -21,6 +21,10 @@ _MOST_CELLS: Final = 250_000
 _FREE: Final = 0
 _OCCUPIED: Final = 100
 _UNKNOWN: Final = -1
+_INSCRIBED: Final = 99
+"""Cost of a cell in which the robot would touch an obstacle."""
+_FALL: Final = 3.0
+"""Fall of the cost with the distance from an obstacle, per metre; the default of Nav2."""
 
 
 def occupancy_grid(plan: WorldMap, start: tuple[float, float]) -> dict[str, Any]:
@@ -56,6 +60,27 @@ def occupancy_grid(plan: WorldMap, start: tuple[float, float]) -> dict[str, Any]
         },
         "data": cells,
     }
+
+
+def costmap(grid: dict[str, Any], radius: float) -> dict[str, Any]:
+    """Return the costs of a grid for a robot with `radius` in metres, as Nav2's inflation layer."""
+    width, side = grid["info"]["width"], grid["info"]["resolution"]
+    costs = [0] * len(grid["data"])
+    ring = [at for at, cell in enumerate(grid["data"]) if cell == _OCCUPIED]
+    for at in ring:
+        costs[at] = _OCCUPIED
+    distance = 0.0
+    while ring:
+        distance += side
+        far = max(0.0, distance - radius)
+        cost = round((_INSCRIBED - 1) * math.exp(-_FALL * far)) if far else _INSCRIBED
+        if cost <= 1:
+            break
+        beside = {at + step for at in ring for step in (1, -1, width, -width)}
+        ring = [at for at in beside if 0 <= at < len(costs) and not costs[at]]
+        for at in ring:
+            costs[at] = cost
+    return {**grid, "data": costs}
 
 
 def _fill(cells: list[int], width: int, column: int, row: int) -> None:

@@ -133,6 +133,13 @@ class World:
 
         return occupancy_grid(self.plan, self.spec.start[:2])
 
+    @cached_property
+    def costmap(self) -> Mapping[str, object]:
+        """The costs of the map for this robot, as the fields of nav_msgs/OccupancyGrid."""
+        from urc.simulator.world.occupancy import costmap
+
+        return costmap(dict(self.occupancy_grid), self.spec.body.radius)
+
     def top_view(self, width: int, height: int) -> bytes:
         """Return a top view of the world as JPEG; draw at most five new images per second.
 
@@ -279,6 +286,8 @@ class SensorView(Mapping[str, object]):
             return world.panorama()
         if name == "occupancy_grid":
             return world.occupancy_grid
+        if name == "costmap":
+            return world.costmap
         if name == "top":
             return world.top_view(320, 240)
         raise KeyError(name)
