@@ -11,6 +11,8 @@ import { distance, distanceText, isInside, lengthOf, placeText, wrapped } from "
 
 /** Maximum number of places of a route; a longer route is not drawn by hand. */
 const MOST = 200;
+/** Time after which a command counts as one that takes long, such as a goal, in milliseconds. */
+const SOON_MS = 1000;
 /** Turn of one press, in radians. */
 const STEP = Math.PI / 12;
 
@@ -45,6 +47,8 @@ export class Choice {
     this.robot = null;
     this.outcome = "";
     this.isBusy = false;
+    /** Number of sent commands. */
+    this.sent = 0;
     /** @type {Outlet | undefined} */
     this.goto = undefined;
     /** @type {Outlet | undefined} */
@@ -234,19 +238,45 @@ export class Choice {
       return;
     }
     const isPlace = this.mode === "place";
+    const number = (this.sent += 1);
     this.isBusy = true;
     this.outcome = `… ${this.t("sending")}`;
     this.show();
+    const timer = setTimeout(() => this.leave(number), SOON_MS);
     try {
       await this.send(isPlace ? this.target : "waypoints", isPlace ? this.one() : this.all());
-      this.clear();
-      this.outcome = `✓ ${this.t("sent")}`;
+      this.ended(number, "");
     } catch (error) {
-      this.outcome = `▲ ${error instanceof Error ? error.message : error}`;
+      this.ended(number, `▲ ${error instanceof Error ? error.message : error}`);
     } finally {
-      this.isBusy = false;
-      this.show();
+      clearTimeout(timer);
     }
+  }
+
+  /** Let the operator choose again while the robot is on its way. @param {number} number */
+  leave(number) {
+    if (number !== this.sent || !this.isBusy) return;
+    this.isBusy = false;
+    this.clear();
+    this.outcome = `… ${this.t("on the way")}`;
+    this.show();
+  }
+
+  /**
+   * Show how a command ended, unless a newer one has been sent or the operator chooses again.
+   *
+   * @param {number} number
+   * @param {string} fault "" if the robot has done it
+   */
+  ended(number, fault) {
+    if (number !== this.sent) return;
+    const isQuick = this.isBusy;
+    this.isBusy = false;
+    if (isQuick && !fault) this.clear();
+    if (isQuick || (this.mode === "look" && !this.aiming)) {
+      this.outcome = fault || (isQuick ? `✓ ${this.t("sent")}` : this.t("✓ done"));
+    }
+    this.show();
   }
 
   one() {
