@@ -47,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Take the pictures; return the exit code."""
     parser = argparse.ArgumentParser(prog="page_pictures", description="Picture all pages.")
     parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("--interface", default="", help="an interface other than the first")
     parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=ROBOTS)
     parser.add_argument("--screens", nargs="+", choices=tuple(SCREENS), default=tuple(SCREENS))
     parser.add_argument("--themes", nargs="+", choices=THEMES, default=THEMES)
@@ -95,8 +96,9 @@ async def pictures(
     page = await context.new_page()
     start = address.split("?")[0].split("#")[0].rstrip("/")
     rows = []
+    query = f"?interface={given.interface}" if given.interface else ""
     for name in given.robots:
-        await page.goto(f"{start}/" if name == MENU else f"{start}/robots/{name}/")
+        await page.goto(f"{start}/" if name == MENU else f"{start}/robots/{name}/{query}")
         if name != MENU:
             try:
                 await page.wait_for_function(LIVE, timeout=WAIT_MS)

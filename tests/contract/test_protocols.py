@@ -60,7 +60,8 @@ class Conversation:
     """An engine and the emulated robot of the same document."""
 
     def __init__(self, profile: Profile) -> None:
-        settings = sample_settings(profile.settings)
+        optional = {name: True for name, one in profile.settings.items() if one.type == "boolean"}
+        settings = {**sample_settings(profile.settings), **optional}
         self.profile = profile
         self.now = 0.0
         self.engine = Engine(profile.driver, settings)
@@ -68,6 +69,8 @@ class Conversation:
         self.lines: dict[str, EmulatedConnection] = {}
         self.read: set[str] = set()
         """Signals that had a value."""
+        self.last: dict[str, object] = {}
+        """Newest value of each signal."""
         self.faults: list[str] = []
         self.done: list[str] = []
         """Commands that succeeded."""
@@ -102,6 +105,7 @@ class Conversation:
                     del self.lines[transport]
                 case Samples(_, samples):
                     self.read |= {one.signal for one in samples if one.value is not None}
+                    self.last |= {one.signal: one.value for one in samples}
                 case Replied(_, command, _):
                     self.done.append(command)
                 case Violation(_, code, message) | Failed(_, _, code, message):

@@ -24,6 +24,8 @@ WIDGETS = FOLDER.parent / "widgets"
 FILES = sorted(FOLDER.glob("*.yaml"))
 SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml")])
 
+ON_THE_WAY = {"plan", "goal_x", "goal_y"}
+"""Signals that a robot has only while it drives by itself; see `test_worlds`."""
 LISTENED_S = 20.0
 """How long the emulated robot is listened to: more than twice the slowest poll."""
 
@@ -116,4 +118,4 @@ def test_its_emulated_robot_says_all_that_there_is(file: Path) -> None:
     talk.wait(LISTENED_S)
     refused = {name: line.last_fault for name, line in talk.lines.items() if line.faults}
     assert (talk.faults, refused) == ([], {})
-    assert set(profile.driver.signals) - talk.read == set()
+    assert set(profile.driver.signals) - talk.read - ON_THE_WAY == set()

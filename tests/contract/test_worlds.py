@@ -127,3 +127,37 @@ def test_every_robot_that_moves_or_senses_has_a_world() -> None:
     without = {file.stem for file in files if profile_of(file).world is None}
     assert without == {"puppet", "ur-e-series"}
     assert {*DRIVES} == {file.stem for file in files} - without - {"esp32-cam", "gpsd", "nmea-gps"}
+
+
+@pytest.mark.parametrize("name", ["generic-ros2", "turtlebot4"])
+def test_it_drives_to_a_goal_stops_when_it_is_cancelled_and_refuses_others(name: str) -> None:
+    """With Nav2: the map, the plan and the place on the map come from the same world."""
+    talk = Conversation(profile_of(FOLDER / f"{name}.yaml"))
+    talk.begin()
+    talk.wait(6.0)
+    goal = {"to_x": 1.5, "to_y": 1.0, "to_yaw": 0.0}
+    command(talk, "navigate", goal)
+    talk.wait(1.5)
+    assert {"plan", "goal_x", "goal_y", "floor", "costs", "map_x"} <= talk.read
+    assert "navigate" not in talk.done, "it cannot be there yet"
+    talk.wait(20.0)
+    world = body_of(talk).world
+    assert talk.done.count("navigate") == 1
+    assert math.hypot(world.motion.x - 1.5, world.motion.y - 1.0) < 0.3
+    on_map = [talk.last[axis] for axis in ("map_x", "map_y")]
+    assert on_map == pytest.approx([world.motion.x, world.motion.y], abs=0.1)
+
+    command(talk, "navigate", {**goal, "to_x": -2.0, "to_y": -1.0})
+    talk.wait(5.0)
+    assert abs(world.motion.forward) > 0.05
+    command(talk, "stop_navigation", {})
+    talk.wait(2.0)
+    there = pose(world)
+    talk.wait(2.0)
+    assert pose(world) == pytest.approx(there, abs=1e-3), "STOP did not end the way"
+    assert math.hypot(world.motion.x + 2.0, world.motion.y + 1.0) > 0.5
+
+    talk.faults.clear()
+    request = Request(9, "navigate", {"to_x": 100.0, "to_y": 0.0, "to_yaw": 0.0})
+    talk.perform(talk.engine.command(request, talk.now))
+    assert talk.faults == ["refused: the robot refused it"]

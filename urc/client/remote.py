@@ -42,7 +42,7 @@ from urc.client.remote_motion import ControlMessage, RemoteMotion, plain_argumen
 from urc.client.robot import ConnectionLost
 from urc.client.robot_socket import RobotSocket
 from urc.client.stick import VALID_S, Stick
-from urc.model.values import Reading, Sample, Signal
+from urc.model.values import BINARY_TYPES, Reading, Sample, Signal
 from urc.problems import UrcError
 from urc.runtime.command_failed import CommandFailed
 from urc.runtime.hub import Hub, LogEntry
@@ -354,7 +354,7 @@ class RemoteRobot(HubReadings):
     def shown(self, names: tuple[str, ...]) -> Iterator[None]:
         """Request the image signals among `names` while the context is open."""
         signals = self.hub.signals
-        images = [name for name in names if signals[name].type in ("image", "blob")]
+        images = [name for name in names if signals[name].type in BINARY_TYPES]
         if images:
             self._images.update(images)
             self._select_images()

@@ -133,11 +133,22 @@ def _stems(
 
 def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
     """Return the most specific suitable widget for a signal."""
+    if signal.type == "occupancy_grid":
+        return _map(registry.get("map"), signal)
     for name in _candidates(signal):
         use = _one_input(registry.get(name), signal)
         if use is not None:
             return use
     return None
+
+
+def _map(widget: Widget | None, signal: Signal) -> WidgetUse | None:
+    """Return a map of an occupancy grid; None without a map widget."""
+    port = widget.inputs.get("grids") if widget is not None else None
+    if widget is None or port is None or misfit(port, signal):
+        return None
+    use = _use(widget, signal.name, {}, signal.title)
+    return use._replace(lists={port.name: (signal.name,)})
 
 
 def _candidates(signal: Signal) -> tuple[str, ...]:

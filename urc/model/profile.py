@@ -159,10 +159,14 @@ class Reaction(NamedTuple):
 
     after_s: float = 0.0
     """Delay after the previous reaction, in seconds."""
+    until: Template | None = None
+    """Condition for which the reaction waits; None means no condition."""
     sets: Mapping[str, Template | Reading] = NOTHING
     """New values, or templates for new values, keyed by signal or state variable."""
     answers: bool = False
     """Whether the robot sends the declared reply to the request."""
+    refuses: bool = False
+    """Whether the robot reports a failure to the request."""
     send: WriteSpec | None = None
     """Frame to send; None means no frame."""
     message: str = ""

@@ -13,6 +13,8 @@ from typing import Any, Final, Literal, NamedTuple
 from urc.expressions import Template
 
 __all__ = [
+    "BINARY_TYPES",
+    "PICTURE_TYPES",
     "PLAIN",
     "Alarm",
     "AlarmAttributes",
@@ -35,12 +37,26 @@ NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 
 ElementType = Literal["integer", "number", "boolean", "string"]
 """Element types of an array, named as in JSON Schema."""
-SignalType = Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
+SignalType = Literal[
+    "integer",
+    "number",
+    "boolean",
+    "string",
+    "array",
+    "object",
+    "image",
+    "blob",
+    "occupancy_grid",
+]
 """Signal types: a single value, an array of one type, a mapping, or bytes."""
+BINARY_TYPES: Final[tuple[SignalType, ...]] = ("image", "blob", "occupancy_grid")
+"""Types of signals whose values are bytes, which pages receive as binary messages."""
+PICTURE_TYPES: Final[tuple[SignalType, ...]] = ("image", "occupancy_grid")
+"""Types of signals whose values are image files; an occupancy grid is a PNG image."""
 Value = bool | int | float | str | None
 """A plain value; None means that the robot reports "not available"."""
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
-"""Value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
+"""Value of a signal: bytes for `BINARY_TYPES`, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
 """Axis convention of a value; "" means that the driver declares none."""
 Alarm = Literal["", "lolo", "low", "high", "hihi", "minor", "major"]

@@ -108,6 +108,7 @@ class Engine:
         builder = RequestCompiler(driver, self.readings, self.known, fresh, is_compiled=is_compiled)
         self.lines: Mapping[str, Conversation] = builder.lines
         self._all_lines = tuple(self.lines.values())
+        self._grids = {name: _grids_of(driver, name) for name in driver.transports}
         self._commands = driver.commands
         self._checks = {
             name: build_check(one, is_compiled=is_compiled) for name, one in driver.commands.items()
@@ -170,6 +171,7 @@ class Engine:
         """Record that `transport` is connected."""
         line = self.lines[transport]
         self._down(line, "the connection was replaced by a new one")
+        self.readings.forget_grids(self._grids[transport])
         events = line.opened(now)
         greeting = self._greetings.get(transport)
         if greeting is None:
@@ -398,3 +400,14 @@ class Engine:
         for events in self._schedule.submit_due(self.run, now):
             told += self._settle(events, now)
         return told
+
+
+def _grids_of(driver: Driver, transport: str) -> tuple[str, ...]:
+    """Return the signals of a transport whose occupancy grids are updated part by part."""
+    return tuple(
+        name
+        for message in driver.messages.values()
+        if message.transport == transport
+        for name in message.read.fields
+        if name in driver.signals and driver.signals[name].type == "occupancy_grid"
+    )

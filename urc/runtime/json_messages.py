@@ -18,7 +18,7 @@ import msgspec
 
 from urc.images import media_type
 from urc.model.driver import Argument
-from urc.model.values import Alarm, Sample, Signal
+from urc.model.values import BINARY_TYPES, PICTURE_TYPES, Alarm, Sample, Signal
 from urc.runtime.foxglove_schemas import COMPRESSED_IMAGE
 from urc.runtime.foxglove_schemas import LOG as FOXGLOVE_LOG
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry
@@ -78,7 +78,7 @@ _IMAGE_SCHEMA: Final = MessageSchema("foxglove.CompressedImage", COMPRESSED_IMAG
 
 def signal_schema(signal: Signal) -> MessageSchema:
     """Return the type of a signal's readings."""
-    if signal.type == "image":
+    if signal.type in PICTURE_TYPES:
         return _IMAGE_SCHEMA
     about = " ".join(filter(None, (signal.title or signal.description, signal.unit)))
     value = signal_property(signal)
@@ -90,7 +90,7 @@ def signal_schema(signal: Signal) -> MessageSchema:
 
 def signal_property(signal: Signal) -> dict[str, object]:
     """Return the schema of a signal's value as a property."""
-    if signal.type in ("blob", "image"):
+    if signal.type in BINARY_TYPES:
         return {"type": "string", "contentEncoding": "base64"}
     if signal.type == "array":
         return {"type": "array", "items": {"type": signal.items}}
@@ -113,7 +113,7 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int) -> bytes:
         time_ns: time of the reading, in nanoseconds since 1970.
     """
     value = sample.value
-    if signal.type == "image" and isinstance(value, bytes):
+    if signal.type in PICTURE_TYPES and isinstance(value, bytes):
         return as_json(
             {
                 "timestamp": stamp(time_ns),

@@ -62,6 +62,8 @@ class TimedSetters:
 
 MOST_COURSES: Final = 256
 """Maximum number of delayed replies per connection."""
+_LOOKS_S: Final = 0.1
+"""Interval at which the condition of a waiting reaction is checked, in seconds."""
 
 log = logging.getLogger(__name__)
 """Logger that receives every fault, with the arguments ``(transport, text)``."""
@@ -403,6 +405,9 @@ class EmulatedConnection:
             reaction = running_rule.ready_reactions[0]
             if reaction.what.after_s > 0 and not running_rule.has_waited:
                 self._defer(running_rule, reaction.what.after_s)
+                break
+            if not self._rules.holds(reaction.what.until, now_s, running_rule.names):
+                self._defer(running_rule, _LOOKS_S)
                 break
             running_rule.has_waited = False
             running_rule.ready_reactions = running_rule.ready_reactions[1:]

@@ -200,6 +200,8 @@ class RuleSet:
                 if asked is None:
                     raise Unanswered("the driver never sends this frame and declares no reply")
                 said += self._auto.answers(asked, now_s)
+            if what.refuses:
+                said.append(_refusal(running_rule.frame))
             if reaction.message is not None:
                 said += self._auto.render(reaction.message, now_s)
             if reaction.writer is not None and not self._is_dropped(what):
@@ -272,3 +274,11 @@ def not_taken(frame: Frame) -> str:
     except BadText:
         return f"received a frame that is not valid {frame.encoding} text"
     return f"no rule matches {shown}, and the driver never sends it"
+
+
+def _refusal(asked: Frame | None) -> Payload:
+    """Return the report of a failure; raise `Unanswered` if the frame cannot be refused."""
+    if asked is None or not isinstance(asked.payload, Envelope):
+        raise Unanswered("only a call or a goal of ROS can be refused")
+    said = {"id": asked.payload.attributes.get("id"), "ok": False, "reason": "the robot refused it"}
+    return Envelope("response", said, {"reason": said["reason"]})

@@ -16,6 +16,7 @@ from urc.model.world import WorldSpec
 from urc.problems import UrcError
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter
+from urc.protocol.values.occupancy_grid import Grid, encode_grid
 from urc.simulator.faults import Faults
 from urc.simulator.simulated_body import SimulatedBody, has_rendering, rendered_signals
 from urc.simulator.world.world import PLAIN
@@ -32,12 +33,18 @@ _PIXEL: Final = a2b_base64(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
 )
 """A PNG image of one grey pixel."""
+_ROOM: Final = encode_grid(
+    Grid(4, 4, 1.0, -2.0, -2.0, 0.0, "map", bytes(5) + bytes((100, 255)) + bytes(9))
+)
+"""An occupancy grid of 4 by 4 m with one occupied and one unknown cell."""
 
 
 def plausible(signal: Signal, now_s: float) -> Reading:
     """Return a value for `signal` at `now_s` that is within all limits."""
     if signal.type in ("image", "blob"):
         return _PIXEL if signal.size is None or signal.size >= len(_PIXEL) else b""
+    if signal.type == "occupancy_grid":
+        return _ROOM
     if signal.type == "object":
         return _quaternion(now_s) if signal.axes else {}
     if signal.type != "array":

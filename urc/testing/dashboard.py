@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 
@@ -12,7 +12,7 @@ from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.payload import Payload
 from urc.model.profile import Profile, Setting
-from urc.model.values import Alarm, AlarmLimits, Reading, Sample, Signal, Value
+from urc.model.values import Alarm, AlarmLimits, Reading, Sample, Signal, SignalType, Value
 from urc.model.widget import Widget, WidgetPort
 from urc.protocol.events import MotionEvent, Replied
 from urc.protocol.sequences.sequence_control import Pull
@@ -45,7 +45,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
     declared = _declared(manifest.read_text("utf-8")) if manifest.is_file() else {}
-    types = ("integer", "number", "boolean", "string", "array", "object", "image", "blob")
+    types = get_args(SignalType)
     known = declared.get("inputs", {})
     ports = {
         each: WidgetPort(

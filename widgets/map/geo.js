@@ -217,3 +217,80 @@ export class Trail {
     return this.most > 0;
   }
 }
+
+/** Standard deviations of an ellipse that contains a normally distributed position with 95 %. */
+const SIGMAS = Math.sqrt(5.991);
+const CORNERS = 48;
+
+/** Return whether a place on the robot's own map is near enough to be drawn. @param {Place} place */
+export function isInMap([y, x]) {
+  return Math.max(Math.abs(x), Math.abs(y)) <= FARTHEST_M;
+}
+
+/**
+ * Return the places in an array of x and y in turn, without invalid places.
+ *
+ * @param {unknown} value
+ * @returns {Place[]}
+ */
+export function pairsOf(value) {
+  if (!Array.isArray(value)) return [];
+  /** @type {Place[]} */
+  const found = [];
+  for (let index = 0; index + 1 < value.length; index += 2) {
+    const [x, y] = [value[index], value[index + 1]];
+    if (typeof x === "number" && typeof y === "number" && isInMap([y, x])) found.push([y, x]);
+  }
+  return found;
+}
+
+/**
+ * Return the corners of the ellipse that contains the position with a probability of 95 %.
+ *
+ * @param {Place} place
+ * @param {unknown} covariance the 36 numbers of a ROS pose, or the 4 numbers of x and y, in m²
+ * @returns {Place[]} [] for another array or a matrix that is no covariance
+ */
+export function ellipseOf([y, x], covariance) {
+  const list = Array.isArray(covariance) ? covariance : [];
+  const wide = list.length === 36 ? 6 : list.length === 4 ? 2 : 0;
+  const [xx, xy, yy] = [list[0], list[1], list[wide + 1]];
+  if (!wide || ![xx, xy, yy].every((one) => typeof one === "number" && Number.isFinite(one))) return [];
+  const middle = (xx + yy) / 2;
+  const spread = Math.hypot((xx - yy) / 2, xy);
+  const [long, short] = [middle + spread, middle - spread];
+  if (!(long > 0) || short < -1e-9 * long) return [];
+  const turn = Math.atan2(2 * xy, xx - yy) / 2;
+  const [a, b] = [SIGMAS * Math.sqrt(long), SIGMAS * Math.sqrt(Math.max(0, short))];
+  return Array.from({ length: CORNERS }, (_, corner) => {
+    const angle = (corner / CORNERS) * 2 * Math.PI;
+    const [u, v] = [a * Math.cos(angle), b * Math.sin(angle)];
+    return [y + u * Math.sin(turn) + v * Math.cos(turn), x + u * Math.cos(turn) - v * Math.sin(turn)];
+  });
+}
+
+/**
+ * Return the points of an arrow on the robot's own map.
+ *
+ * @param {Place} place start of the arrow
+ * @param {number} yaw direction in radians, counter-clockwise from the x axis
+ * @param {number} length in metres
+ * @returns {Place[]}
+ */
+export function arrowOf([y, x], yaw, length) {
+  const at = (/** @type {number} */ along, /** @type {number} */ beside) =>
+    /** @type {Place} */ ([
+      y + length * (along * Math.sin(yaw) + beside * Math.cos(yaw)),
+      x + length * (along * Math.cos(yaw) - beside * Math.sin(yaw)),
+    ]);
+  return [at(0, 0), at(1, 0), at(0.65, 0.28), at(1, 0), at(0.65, -0.28)];
+}
+
+/**
+ * Return an angle between -π and π.
+ *
+ * @param {number} angle in radians
+ */
+export function wrapped(angle) {
+  return Math.atan2(Math.sin(angle), Math.cos(angle));
+}

@@ -26,6 +26,8 @@ export class Grid {
     this.canvas.setAttribute("aria-hidden", "true");
     this.pen = this.canvas.getContext("2d");
     map.getContainer().prepend(this.canvas);
+    /** Draws below the lines. @type {((pen: CanvasRenderingContext2D) => void) | null} */
+    this.under = null;
     this.isAsked = false;
     this.theme();
     map.on("move zoom resize viewreset", () => this.ask());
@@ -59,6 +61,7 @@ export class Grid {
     if (width === 0 || height === 0) return;
     const pen = this.clear(width, height);
     if (!pen) return;
+    this.under?.(pen);
     const [one, other] = [map.containerPointToLatLng([0, height / 2]), map.containerPointToLatLng([100, height / 2])];
     const metres = distance([one.lat, one.lng], [other.lat, other.lng], isLocal) / 100;
     const step = gridStep(metres);

@@ -5,10 +5,17 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./geo.js").Place} Place */
 /** @typedef {typeof import("leaflet")} Leaflet */
-import { DASH, attribute, button, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";
+import { DASH, attribute, button, colours, isStill, many, noteOf, number, part, style, svg, write } from "urc/kit";
+import { Aim } from "./aim.js";
 import { Choice } from "./choose.js";
-import { Trail, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
+import { Trail, arrowOf, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
+import { cornersOf, sizeText } from "./grid_image.js";
+import { Occupancy } from "./occupancy.js";
+import { Shapes, metresOf } from "./shapes.js";
+
+/** Inputs of which one is enough for the robot's own map. */
+const LOCAL = ["x", "paths", "areas", "points", "goal_x"];
 
 export default {
   /**
@@ -22,8 +29,8 @@ export default {
     ctx.follow("theme", () => chart.theme());
     return {
       update: (readings, outputs) => chart.update(readings, outputs),
-      resize: () => chart.map.invalidateSize({ animate: false }),
-      destroy: () => chart.map.remove(),
+      resize: () => chart.resize(),
+      destroy: () => chart.destroy(),
     };
   },
 };
@@ -49,12 +56,28 @@ class Chart {
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
+    /** @type {Readonly<Record<string, any>> | undefined} */
+    this.readings = undefined;
+    /** @type {Place | null} */
+    this.place = null;
+    /** Serial numbers of the drawn points. */
+    this.seenPoints = "";
+    /** Reading of the position. @type {Reading | undefined} */
+    this.reading = undefined;
     /** Description of the last drawing; "" after a move of the map. */
     this.drawn = "";
     this.trail = new Trail(Number(options["trail"] ?? 1000), Number(options["trail_step"] ?? 0.2), false);
     /** @type {Place[]} */
     this.fence = [];
+    this.occupancy = new Occupancy(() => this.drawGrids());
+    /** Zoom level at which the whole occupancy grid was shown last; -1 before. */
+    this.fittedZoom = -1;
     this.map = this.makeMap(false);
+  }
+
+  destroy() {
+    this.occupancy.end();
+    this.map.remove();
   }
 
   /**
@@ -66,6 +89,7 @@ class Chart {
     const map = new leaflet.Map(part(this.root, ".map-area"), {
       crs: isLocal ? leaflet.CRS.Simple : leaflet.CRS.EPSG3857,
       center: [0, 0],
+      zoomSnap: isLocal ? 0.25 : 1,
       zoom: Number(options["zoom"] ?? (isLocal ? 5 : 18)),
       minZoom: isLocal ? -3 : 1,
       maxZoom: isLocal ? 10 : 22,
@@ -88,7 +112,9 @@ class Chart {
    * @param {Readonly<Record<string, Outlet>>} outputs
    */
   begin(readings, outputs) {
-    const isLocal = readings["x"] !== undefined && readings["latitude"] === undefined && readings["fix"] === undefined;
+    const isEarth = readings["latitude"] !== undefined || readings["fix"] !== undefined;
+    const hasGrids = many(readings["grids"]).length > 0;
+    const isLocal = !isEarth && (hasGrids || LOCAL.some((name) => readings[name] !== undefined));
     this.isLocal = isLocal;
     if (isLocal) {
       this.map.remove();
@@ -99,18 +125,32 @@ class Chart {
     const { fence, form } = this;
     this.grid = new Grid(this.map, part(this.root, ".map-scale"), isLocal);
     if (this.fence[0]) this.grid.setOrigin(this.fence[0]);
+    const turns = new Set(Object.keys(outputs).filter((name) => isLocal && this.ctx.command(name)?.arguments["yaw"]));
     this.choice = new Choice(part(this.root, ".map-frame"), this.ctx, {
       isLocal,
       form,
       fence,
       changed: () => this.drawChoice(),
+      turns,
     });
-    this.addButtons("waypoints" in outputs);
+    if (isLocal) this.shapes = new Shapes(this.leaflet, this.map);
+    this.aim = new Aim(this.map, this.signal, (place, yaw) => this.choice?.aim(place, yaw));
+    this.grid.under = (pen) => {
+      this.occupancy.paint(pen, this.map);
+      this.shapes?.paint(pen);
+    };
+    attribute(this.root, "data-grids", hasGrids ? "" : null);
+    this.addButtons("waypoints" in outputs, hasGrids);
+    this.addAims(turns.has("goto"), isLocal && "initial_pose" in outputs);
     this.layers = this.makeLayers();
     this.theme();
     this.map.on("dragstart", () => this.follow(false));
     this.map.on("moveend", () => { this.drawn = ""; });
-    if ("goto" in outputs || "waypoints" in outputs) this.listen();
+    this.map.on("zoomend", () => {
+      this.shapes?.scale();
+      this.drawChoice();
+    });
+    if ("goto" in outputs || "waypoints" in outputs || "initial_pose" in outputs) this.listen();
     if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
   }
 
@@ -121,7 +161,7 @@ class Chart {
         const { lat, lng } = this.map.getCenter();
         this.choice?.tap([lat, lng]);
       }
-      if (event.key === "Escape" && this.choice && this.choice.mode !== "look") {
+      if (event.key === "Escape" && this.choice && (this.choice.mode !== "look" || this.choice.aiming)) {
         event.preventDefault(); // here, Escape means no instead of STOP
         this.choice.clear();
       }
@@ -129,8 +169,11 @@ class Chart {
     this.root.addEventListener("keydown", key, { signal: this.signal });
   }
 
-  /** @param {boolean} hasWay */
-  addButtons(hasWay) {
+  /**
+   * @param {boolean} hasWay
+   * @param {boolean} hasGrids
+   */
+  addButtons(hasWay, hasGrids) {
     const row = document.createElement("div");
     row.className = "map-tools";
     row.dataset["floats"] = "";
@@ -142,9 +185,62 @@ class Chart {
     add("+", this.t("Zoom in"), () => this.map.zoomIn());
     add("−", this.t("Zoom out"), () => this.map.zoomOut());
     this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    if (hasGrids) add("⤢", this.t("Show the whole map"), () => this.fit());
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a route"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
+    this.tools = row;
     this.follow(true);
+  }
+
+  /**
+   * Add the buttons for gestures.
+   *
+   * @param {boolean} hasGoal
+   * @param {boolean} hasPose
+   */
+  addAims(hasGoal, hasPose) {
+    /** @type {Map<string, HTMLButtonElement>} */
+    this.aims = new Map();
+    const add = (/** @type {"goto" | "initial_pose"} */ output, /** @type {string} */ sign, /** @type {string} */ label) => {
+      const made = button("map-button", sign, () => this.choice?.toggleAim(output), { signal: this.signal, label });
+      this.tools?.append(made);
+      this.aims?.set(output, made);
+    };
+    attribute(part(this.root, ".map-tools"), "data-many", hasGoal && hasPose ? "" : null);
+    if (hasGoal) add("goto", "⚑", this.t("Goal with a direction"));
+    if (hasPose) add("initial_pose", "⊕", this.t("Set the robot's position"));
+  }
+
+  /** Show the whole occupancy grid. */
+  fit() {
+    const { place } = this.occupancy;
+    if (!place) return;
+    this.follow(false);
+    this.scale();
+  }
+
+  /** Scale the map to its occupancy grid; a followed robot stays in the middle. */
+  scale() {
+    const { place } = this.occupancy;
+    if (!place) return;
+    this.map.fitBounds(new this.leaflet.LatLngBounds(cornersOf(place)), { animate: false });
+    this.fittedZoom = this.map.getZoom();
+    if (this.isFollowing && this.place) this.map.panTo(this.place, { animate: false });
+  }
+
+  /** Adapt to another size of the cell; a map that was shown whole stays whole. */
+  resize() {
+    this.map.invalidateSize({ animate: false });
+    if (this.map.getZoom() === this.fittedZoom) this.scale();
+  }
+
+  /** Draw new grids; the first one determines the scale, unless an option does. */
+  drawGrids() {
+    const { place } = this.occupancy;
+    const isFree = (this.options["zoom"] ?? null) === null && this.fence.length === 0;
+    if (place && isFree && this.fittedZoom === -1) this.scale();
+    this.grid?.ask();
+    this.describe();
   }
 
   toggleWay() {
@@ -176,6 +272,7 @@ class Chart {
       arrow,
       trail: line({ weight: 3 }),
       way: line({ weight: 3, dashArray: "8 6" }),
+      turn: line({ weight: 4 }),
       ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
       robot: new leaflet.Marker([0, 0], { icon, interactive: false, keyboard: false }),
       /** @type {import("leaflet").CircleMarker[]} */
@@ -185,8 +282,10 @@ class Chart {
 
   theme() {
     const ink = colours(this.root, ["text", "level", "line", "caution", "accent"]);
+    this.shapes?.theme(colours(this.root, ["text", "series-1", "series-2", "series-4", "series-5"]));
     this.ink = ink;
     this.grid?.theme();
+    this.occupancy.theme(colours(this.root, ["raised", "faint", "text", "series-3"]));
     this.layers?.trail.setStyle({ color: ink.level });
     this.layers?.ring.setStyle({ color: ink.level, fillColor: ink.level, fillOpacity: 0.15 });
     this.layers?.fence?.setStyle({ color: ink.caution, weight: 2, dashArray: "10 6" });
@@ -204,17 +303,50 @@ class Chart {
     const [first, second] = isLocal ? ["y", "x"] : ["latitude", "longitude"];
     const place = fix.place ?? placeOf(number(readings[first ?? ""]), number(readings[second ?? ""]), isLocal);
     const reading = readings["fix"] ?? worse(readings[first ?? ""], readings[second ?? ""]);
-    attribute(this.root, "data-state", reading?.state ?? "none");
+    const grids = many(readings["grids"]);
+    attribute(this.root, "data-state", (reading ?? grids[0])?.state ?? "none");
     const yaw = number(readings["yaw"]);
     const heading = number(readings["heading"]) ?? (yaw === null ? null : bearingOf(yaw));
     this.draw(place, heading, number(readings["accuracy"]) ?? fix.accuracy, reading?.state === "live");
-    write(this.text, place ? placeText(place, this.form, isLocal) : DASH);
+    this.readings = readings;
+    this.occupancy.update(grids);
+    this.place = place;
+    this.reading = reading;
+    this.describe();
+    this.shapes?.update(readings, place);
+    const points = many(readings["points"]).map(({ serial, state }) => `${serial}${state}`).join();
+    if (points !== this.seenPoints) this.grid?.ask();
+    this.seenPoints = points;
+    this.choice?.update(outputs, place, yaw);
+  }
+
+  /** Write the place of the robot, and what is wrong with it or with the grids. */
+  describe() {
+    const { place = null, reading } = this;
+    const grids = many(this.readings?.["grids"]);
+    const size = this.occupancy.place;
+    const isAlone = reading === undefined && grids.length > 0;
+    const isLocal = this.isLocal ?? false;
+    write(this.text, place ? placeText(place, this.form, isLocal) : isAlone && size ? sizeText(size) : DASH);
     const isOut = place !== null && !isInside(place, this.fence);
     attribute(this.root, "data-fence", isOut ? "out" : null);
     const unknown = reading?.state === "live" && !place ? this.t("no position") : "";
-    const note = reading ? noteOf(reading, this.t) : this.t("no position is bound to this map");
-    write(this.note, [isOut ? `▲ ${this.t("outside the fence")}` : "", unknown, note].filter(Boolean).join(" · "));
-    this.choice?.update(outputs["goto"], outputs["waypoints"], place);
+    const note = reading ? noteOf(reading, this.t) : isAlone ? "" : this.t("no position is bound to this map");
+    const told = grids.map((grid, index) => this.noteOfGrid(grid, index));
+    write(this.note, [isOut ? `▲ ${this.t("outside the fence")}` : "", unknown, note, ...told].filter(Boolean).join(" · "));
+  }
+
+  /**
+   * Return what is wrong with a grid, after its title; "" if it is live.
+   *
+   * @param {Reading} grid
+   * @param {number} index
+   */
+  noteOfGrid(grid, index) {
+    const isBad = this.occupancy.isBad(index);
+    if (index > 0 && grid.state === "none") return ""; // many robots have a costmap only while driving
+    const note = isBad ? `▲ ${this.t("this picture cannot be shown")}` : noteOf(grid, this.t);
+    return note && `${grid.signal.title || grid.signal.name}: ${note}`;
   }
 
   /**
@@ -261,6 +393,12 @@ class Chart {
     const from = this.trail.places.at(-1);
     const way = from && this.hasPlace ? [from, ...choice.places] : choice.places;
     layers.way.setLatLngs(choice.places.length > 0 ? way : []).setStyle({ color: ink.text });
+    const { places: [place], yaw } = choice;
+    const hasTurn = place !== undefined && yaw !== null && choice.mode === "place";
+    layers.turn.setLatLngs(hasTurn ? arrowOf(place, yaw, metresOf(this.map, 48)) : []).setStyle({ color: ink.text });
+    this.aim?.set(choice.aiming !== "");
+    for (const [output, made] of this.aims ?? []) attribute(made, "aria-pressed", String(choice.aiming === output));
+    attribute(this.root, "data-aim", choice.aiming || null);
     attribute(this.root, "data-mode", choice.mode);
     if (this.wayButton) {
       const isWay = choice.mode === "way" || choice.mode === "sure";

@@ -54,9 +54,21 @@ ORDER = {
 }
 """What must come before the other commands, which follow as they are declared."""
 LAST = {"ur-e-series": ["power_off"]}
-WITHOUT = {"turtlebot4": {"stop_docking", "stop_undocking"}}
-"""Commands that send nothing here: the goals of an emulated robot are reached at once, and what has
+NAVIGATION = {"navigate", "stop_navigation", "place"}
+"""Commands for Nav2, which `tests.e2e.test_navigation` gives on the map."""
+WITHOUT = {
+    "generic-ros2": NAVIGATION,
+    "turtlebot4": {"stop_docking", "stop_undocking", *NAVIGATION},
+}
+"""Commands that are not given here. The docking of an emulated robot ends at once, and what has
 ended cannot be given up."""
+ON_THE_WAY = {"plan", "goal_x", "goal_y"}
+LOCALISED = {"floor", "costs", "covariance", "offset_x", "offset_y", "offset_yaw"}
+SILENT = {
+    "turtlebot4": ON_THE_WAY,
+    "generic-ros2": ON_THE_WAY | LOCALISED | {f"offset_q{axis}" for axis in "xyzw"},
+}
+"""Signals without a value: no goal is given, and the setting for Nav2 is off by default."""
 
 
 class Stick(NamedTuple):
@@ -218,7 +230,7 @@ def told(robot: Overheard, sample: Sample, mark: Mapping[str, int]) -> str:
 async def each_signal(page: Page, robot: Overheard, readings: Readings) -> None:
     """Look at every signal of the profile until it is shown as live; an image is asked for anew."""
     signals = robot.profile.driver.signals
-    names = list(signals)
+    names = [name for name in signals if name not in SILENT.get(robot.profile.name, ())]
     readings.pictures.clear()  # what comes from now on is wanted by the table of signals
     end_s = time.monotonic() + SLOWEST_S
     while names := await page.evaluate(NOT_LIVE, names):

@@ -185,7 +185,12 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
         await robot.say({"op": "service_response", "id": "unknown", "values": {}, "result": True})
         await robot.say({"op": "dance"})
         await robot.say({"op": "service_response", "id": first["id"], "values": {"y": 1}})
-        refused, answered = await heard(transport), await heard(transport)
+        refused = await heard(transport)
+        notices = [await heard(transport), await heard(transport)]
+        answered = await heard(transport)
+        assert [one.verb for one in notices] == ["notice", "notice"]
+        assert "a frame of the bridge was dropped" in str(notices[1].body)
+        assert "'dance' (2 such frames)" in str(notices[1].body)
         assert refused.attributes == {"id": 6, "ok": False, "reason": "no"}
         assert answered == Envelope("response", {"id": 5, "ok": True}, {"y": 1})
         goal = {"action": "/dock", "type": "a/action/Dock", "id": 7, "feedback": True}

@@ -16,6 +16,7 @@ from urc.model.interface import Interface, Layout, OutputBinding, Slot, WidgetUs
 from urc.model.payload import WriteSpec
 from urc.model.values import Signal
 from urc.runtime.registries import built_in_catalog
+from urc.shipped import shipped
 
 ANY = "{ type: [integer, number, boolean, string] }"
 NUMBER = "{ type: [integer, number] }"
@@ -110,6 +111,15 @@ def test_what_belongs_together_is_shown_together(tmp_path: Path) -> None:
         "base": "map",
         "imu": "attitude",
     }
+
+
+def test_an_occupancy_grid_is_shown_on_a_map(tmp_path: Path) -> None:
+    """With the widgets that ship; a map that takes no grids shows none."""
+    floor = Signal("floor", "occupancy_grid", title="Ground floor")
+    driver = Driver(signals={"floor": floor})
+    (use,) = automatic_slots(driver, WidgetFolder(shipped("widgets"))).values()
+    assert (use.widget, use.lists, use.title) == ("map", {"grids": ("floor",)}, "Ground floor")
+    assert made(tmp_path, floor) == {}
 
 
 def test_half_a_position_is_two_values(tmp_path: Path) -> None:

@@ -180,6 +180,17 @@ DIALOGUES: dict[str, tuple[str, list[tuple[object, list[bytes]]]]] = {
 """,
         [(b"S\n", [b"?\n", b"21\n"])],
     ),
+    "a reaction waits for its condition": (
+        """
+  state: { ready: false }
+  wire:
+    - match: '^GO$'
+      send: "?"
+      then: [{ until: ready, send: "!" }]
+    - { match: '^R$', set: { ready: true } }
+""",
+        [(b"GO\n", [b"?\n"]), (1.0, []), (b"R\n", []), (0.2, [b"!\n"])],
+    ),
     "a rule takes a frame and says nothing": (
         "  wire: [{ command: drive, answer: none }, { match: '^B', answer: auto }]\n",
         [(b"DRIVE 1\n", [])],
@@ -206,6 +217,7 @@ FAULTS = [
     ),
     ("{ match: '^X$', answer: auto }", "the driver never sends this frame and declares no reply"),
     ("{ match: '^X$', send: \"a\\nb\" }", "contains the delimiter"),
+    ("{ match: '^X$', answer: refused }", "only a call or a goal of ROS can be refused"),
 ]  # fmt: skip
 
 

@@ -54,6 +54,18 @@ def test_the_demo_of_these_tests_is_sound(tmp_path: Path) -> None:
     ("before", "after", "found"),
     [
         (
+            "series: [2, 3] }",
+            'series: [{ resolution: 1, rows: ["..", "#"] }, 3] }',
+            "demo.yaml:8:25: error bad-value states.normal.values.series: the rows of a grid have"
+            " equal lengths and the letters '#. 123456789'",
+        ),
+        (
+            "series: [2, 3] }",
+            'series: [{ rows: [".."] }, 3] }',
+            "demo.yaml:8:25: error bad-value states.normal.values.series: a grid needs numbers for"
+            " resolution, x, y and yaw: 'resolution'",
+        ),
+        (
             "{ level: 1,",
             "{ levl: 1,",
             "demo.yaml:8:15: error unknown-key states.normal.values.levl",

@@ -112,10 +112,21 @@ class _Linker:
                 self.field(part.must("head").must(field), field, {"key": True})
             elif field in read.collects:
                 self.field(part.must("collect").must(field), field, {"key": True})
+            elif self._is_unread_grid(field, read):
+                self.problems.error(
+                    inner,
+                    "wrong-type",
+                    f"signal {field!r} is of type occupancy_grid, which needs the form json",
+                    hint=f'write json: {{ {field}: "@" }} for a whole message',
+                )
             elif field in self.driver.signals or not field.startswith("_"):
                 place, where = form.place_of(inner, field)
                 self.field(place, field, where)
         self._beside(part, read)
+
+    def _is_unread_grid(self, field: str, read: ReadSpec) -> bool:
+        signal = self.driver.signals.get(field)
+        return signal is not None and signal.type == "occupancy_grid" and read.form != "json"
 
     def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
         """Check the name of one signal that `part` sets."""

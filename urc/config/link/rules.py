@@ -10,7 +10,7 @@ from urc.expressions import COUNTERS, Template
 from urc.model.driver import Driver
 from urc.model.payload import ReadSpec
 from urc.model.profile import Reaction, SimulatorRule
-from urc.model.values import Reading, Signal, Value
+from urc.model.values import BINARY_TYPES, Reading, Signal, Value
 from urc.model.world import WorldSpec
 
 __all__ = ["link_rules", "link_values", "settable"]
@@ -59,7 +59,7 @@ def _value(part: Node, signal: Signal, problems: Problems) -> Reading:
     data = part.data
     if data is None:
         return None
-    if signal.type in ("object", "image", "blob"):
+    if signal.type in ("object", *BINARY_TYPES):
         text = f"signal {signal.name!r}: a value of type {signal.type} cannot be set here"
         problems.error(part, "wrong-type", text)
         return None
@@ -112,6 +112,8 @@ def link_rules(
             linker.template(inner.must("when"), rule.when, known)
         places = (inner, *inner.listed("then"))
         for place, reaction in zip(places, rule.reactions, strict=True):
+            if reaction.until is not None:
+                linker.template(place.must("until"), reaction.until, known)
             _link_reaction(linker, place, reaction, known, set(state))
             _check_told(linker, place, told)
         _check_answers(linker, places, rule)

@@ -9,7 +9,7 @@ from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit, fit_argument, fit_hint, known_argument
 from urc.model.driver import Command, Driver
 from urc.model.profile import DialogueStep, DocumentTest, Expected, ExpectedState, Setting
-from urc.model.values import Signal, Value
+from urc.model.values import BINARY_TYPES, Signal, Value
 
 __all__ = ["link_test"]
 
@@ -194,7 +194,7 @@ def _fitting(part: Node, signal: Signal, kind: str, problems: Problems) -> Value
     value: Value = part.data
     if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
         return value
-    if kind in ("object", "image", "blob"):
+    if kind in ("object", *BINARY_TYPES):
         text = f"signal {signal.name!r}: a value of type {kind} cannot be compared"
         problems.error(
             part,

@@ -89,7 +89,8 @@ def aged_by_lines(
 ) -> dict[str, Signal]:
     """Return the signals with the `stale_after` of their transports.
 
-    A signal's own `stale_after` takes precedence.
+    A signal's own `stale_after` takes precedence. An occupancy grid does not become stale with its
+    transport's messages, because a robot may send its map only once.
     """
     ages: dict[str, list[float]] = {}
     frames = [(one.transport, one.read) for one in messages.values()]
@@ -101,7 +102,7 @@ def aged_by_lines(
                 ages.setdefault(name, []).append(spec.stale_after_s)
     return {
         name: one._replace(stale_after_s=min(ages[name]))
-        if name in ages and not one.stale_after_s
+        if name in ages and not one.stale_after_s and one.type != "occupancy_grid"
         else one
         for name, one in signals.items()
     }

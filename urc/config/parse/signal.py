@@ -17,6 +17,8 @@ _NUMBERS: Final = ("integer", "number")
 _ANGLE_UNITS: Final = ("rad", "deg", "°")
 _ROTATIONS: Final = ("roll", "pitch", "yaw")
 _BYTES: Final = ("image", "blob")
+_LATCHED_S: Final = 86400.0
+"""Default age of an occupancy grid, in seconds: a robot may send its map only once."""
 
 
 def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
@@ -65,7 +67,8 @@ def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[st
     """Return the signals, each with the age in seconds at which it becomes stale.
 
     The default age is three periods of the signal's fastest poll, but at least 1 s. Without a poll,
-    the default age is 5 s. The default age of a computed signal is the smallest age of its inputs.
+    the default age is 5 s; for an occupancy grid, it is one day. The default age of a computed
+    signal is the smallest age of its inputs.
     """
     aged = {name: _with_age(one, polls) for name, one in signals.items()}
     for name, one in signals.items():
@@ -98,7 +101,8 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
     periods = [
         poll.every_s for poll in polls if poll.reply and signal.name in poll.reply.read.fields
     ]
-    return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else 5.0)
+    usual_s = _LATCHED_S if signal.type == "occupancy_grid" else 5.0
+    return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else usual_s)
 
 
 def _check_vector(part: Node, kind: str, problems: Problems) -> None:

@@ -267,7 +267,7 @@ def _rule(part: Node, transport: str, problems: Problems, context: FormContext) 
         when=None if when is None else problems.expression(when),
         reactions=(
             first,
-            *(_reaction(inner, problems, context) for inner in part.listed("then")),
+            *(_reaction(inner, problems, context, waits=True) for inner in part.listed("then")),
         ),
     )
 
@@ -305,10 +305,16 @@ def _match(part: Node, problems: Problems, context: FormContext) -> Pattern | Re
 
 
 def _reaction(
-    part: Node, problems: Problems, context: FormContext, *, answers: bool = False
+    part: Node,
+    problems: Problems,
+    context: FormContext,
+    *,
+    answers: bool = False,
+    waits: bool = False,
 ) -> Reaction:
     answer = part.text("answer")
     send, framing = part.get("send"), part.get("framing")
+    until = part.get("until") if waits else None
     if framing is not None and send is None:
         text = "'framing' has no effect without 'send'"
         problems.error(part, "misplaced-key", text, at="framing", key=True)
@@ -317,7 +323,9 @@ def _reaction(
     return Reaction(
         after_s=problems.duration(part, "after", 0.0, least=0.0, most=MAX_STEP_S),
         sets=_sets(part.named("set"), problems),
+        until=None if until is None else problems.expression(until),
         answers=answers if not answer else answer == "auto",
+        refuses=answer == "refused",
         send=None if send is None else parse_write(send, problems, context),
         message=part.text("message"),
         framing=(

@@ -63,6 +63,7 @@ _SAME_TYPES: Final = {
     "dict": "object",
     "map": "object",
     "picture": "image",
+    "costmap": "occupancy_grid",
     "bytes": "blob",
 }
 """URC type names, by the corresponding type name in another tool."""

@@ -66,7 +66,9 @@ class JsonReader:
         for name in fields.keys() & self._finders.keys() - self._paths.keys():
             raise NotWritable(f"{name}: a JMESPath expression cannot be inverted")
         for name, path in self._paths.items():  # in order: some readers need the kind first
-            if name in fields:
+            if name in fields and not path:
+                root = cast("dict[str, Any]", fields[name])  # the whole document
+            elif name in fields:
                 _put(root, path, fields[name])
         try:
             payload = json.dumps(root, separators=(",", ":"), default=_plain).encode("utf-8")

@@ -36,10 +36,14 @@ class TopicReader:
         self._fits = key_matches(self._topic) if context.has_keys else matches(self._topic)
         self._wild = _KEY_WILD if context.has_keys else _WILD
         self._is_plain = not self._wild.search(self._topic)
+        self._is_off = not self._topic
+        """Whether the topic is empty, so that no message matches."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the fields; None if the topic or the message does not match."""
         topic = frame.topic
+        if self._is_off:
+            return None
         if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
             return None
         found = self._reader.read(frame)
@@ -103,12 +107,12 @@ def listened(
     """Return a driver's subscription options for a transport, keyed by topic.
 
     If several declarations have the same topic, the first options take precedence, and later
-    options add missing keys.
+    options add missing keys. An empty topic, such as from an empty setting, is left out.
     """
     topics: dict[str, dict[str, Value]] = {}
     for read in _reads(driver, transport):
-        if read.topic is not None:
-            mine = topics.setdefault(topic_of(read, settings), {})
+        if read.topic is not None and (topic := topic_of(read, settings)):
+            mine = topics.setdefault(topic, {})
             for name, value in read.listen.items():
                 mine.setdefault(name, value)
     return dict(topics)
@@ -121,7 +125,8 @@ def paths_by_topic(
     found: dict[str, list[Path]] = {}
     for read in _reads(driver, transport):
         if read.topic is not None:
-            found.setdefault(topic_of(read, settings), []).extend(paths_of(read))
+            grids = {name for name, one in driver.signals.items() if one.type == "occupancy_grid"}
+            found.setdefault(topic_of(read, settings), []).extend(paths_of(read, grids))
     return found
 
 

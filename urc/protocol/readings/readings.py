@@ -14,6 +14,7 @@ from urc.protocol.readings.alarms import AlarmMonitor
 from urc.protocol.readings.data_change_filter import DataChangeFilter
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import Convert, build_converter
+from urc.protocol.values.occupancy_grid import GridConverter
 
 __all__ = ["Decode", "Readings"]
 
@@ -93,6 +94,13 @@ class Readings:
             return samples, refused
 
         return decode
+
+    def forget_grids(self, names: Iterable[str]) -> None:
+        """Drop the last occupancy grids of the given signals; updates then wait for new grids."""
+        for name in names:
+            convert = self._converters.get(name)
+            if isinstance(convert, GridConverter):
+                convert.forget()
 
     def set_values(
         self, values: Mapping[str, object], now: float

@@ -21,7 +21,7 @@ from typing import Any, Final
 
 from urc.protocol.compile.source import function_of
 from urc.protocol.ros.definition import SIZES, Array, BadDefinition, Layout, Primitive, Record, Text
-from urc.protocol.ros.wanted import EACH, Wanted
+from urc.protocol.ros.wanted import EACH, PACKED, Wanted
 
 __all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
@@ -278,11 +278,13 @@ class _ReadGenerator:
 
     def _array(self, layout: Array, wanted: Wanted) -> str:
         element = layout.element
+        is_packed = isinstance(wanted, dict) and PACKED in wanted
         if isinstance(wanted, dict):
-            wanted = wanted.get(EACH, False)
+            wanted = is_packed or wanted.get(EACH, False)
         count = str(layout.length) if layout.length else self._counter()
         if isinstance(element, Primitive):
-            return self._number_array(element.code, layout.length, count, wanted)
+            code = "B" if is_packed and element.code == "b" else element.code
+            return self._number_array(code, layout.length, count, wanted)
         if not layout.length:
             self._has_room = True
         stride = self._stride(element, wanted) if isinstance(element, Record) else None

@@ -4,20 +4,30 @@ Pure. A message reader skips the parts that are not wanted. `ALL` selects a whol
 dictionary selects fields of a message or, under the key `EACH`, parts of each array element.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any, Final, TypeAlias, cast
 
 from urc.model.payload import ReadSpec
 
-__all__ = ["ALL", "EACH", "Path", "Wanted", "paths_of", "wanted_of"]
+__all__ = ["ALL", "EACH", "PACKED", "Path", "Wanted", "paths_of", "wanted_of"]
 
 ALL: Final = True
 EACH: Final = "*"
 """Path step for the elements of an array."""
 
+PACKED: Final = "packed"
+"""Last path step for an array of small numbers that is read as bytes."""
+
 Wanted: TypeAlias = "bool | dict[str, Wanted]"
 Path = tuple[str, ...]
 
+_GRID_PARTS: Final[tuple[Path, ...]] = (
+    ("header", "frame_id"),
+    ("info",),
+    *((name,) for name in ("x", "y", "width", "height")),
+    ("data", PACKED),
+)
+"""Paths in an occupancy grid or in its update; a message has only some of them."""
 _AROUND: Final = frozenset(
     (
         "multi_select_list",
@@ -54,14 +64,21 @@ def wanted_of(paths: Iterable[Path]) -> Wanted:
     return root
 
 
-def paths_of(read: ReadSpec) -> Iterator[Path]:
-    """Yield the paths that a declaration reads; the empty path means the whole message."""
+def paths_of(read: ReadSpec, grids: Container[str] = ()) -> Iterator[Path]:
+    """Yield the paths that a declaration reads; the empty path means the whole message.
+
+    Args:
+        read: the declaration.
+        grids: fields that are occupancy grids; only the parts of a grid are read.
+    """
     paths = read.options.get("paths")
     if read.form != "json" or not isinstance(paths, Mapping):
         yield ()
         return
-    for path in paths.values():
-        if isinstance(path, tuple):
+    for field, path in paths.items():
+        if isinstance(path, tuple) and field in grids:
+            yield from (path + part for part in _GRID_PARTS)
+        elif isinstance(path, tuple):
             yield tuple(step if isinstance(step, str) else EACH for step in path)
         else:
             yield from _of_expression(getattr(path, "parsed", None))

@@ -19,6 +19,7 @@ from urc.protocol.values.convert import (
     spelt,
     whole_of,
 )
+from urc.protocol.values.occupancy_grid import GridConverter, grid_message
 from urc.protocol.values.vectors import array_converter, bytes_converter, object_converter
 
 __all__ = ["BadValue", "Convert", "build_converter", "build_raw"]
@@ -34,6 +35,8 @@ def build_converter(signal: Signal) -> Convert:
     """Return a function that converts a raw field to a value of `signal`, or raises `BadValue`."""
     if signal.type == "object":
         return _usable(object_converter)
+    if signal.type == "occupancy_grid":
+        return GridConverter()
     if signal.type in ("image", "blob"):
         return _usable(bytes_converter(signal))
     element = _element_converter(signal)
@@ -47,6 +50,8 @@ def build_raw(signal: Signal) -> Callable[[object], object]:
 
     The returned function raises `BadValue` if a value has no corresponding raw field.
     """
+    if signal.type == "occupancy_grid":
+        return lambda value: grid_message(value) if isinstance(value, bytes) else value
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)
     if back is None:

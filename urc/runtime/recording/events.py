@@ -10,7 +10,7 @@ from typing import Any, Final, cast, get_args
 
 import msgspec
 
-from urc.model.values import Alarm, Reading, Sample, Signal
+from urc.model.values import BINARY_TYPES, PICTURE_TYPES, Alarm, Reading, Sample, Signal
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.json_messages import LEVELS
 from urc.runtime.recording.shapes import DRIVING, LINK, LOG, SIGNALS, WIRE
@@ -86,19 +86,20 @@ _KINDS: Final[Mapping[str, type | tuple[type, ...]]] = {
     "array": list,
     "object": dict,
     "image": str,
+    "occupancy_grid": str,
     "blob": str,
 }
 
 
 def _value(signal: Signal, told: Mapping[str, Any]) -> Reading:
-    value = told["data"] if signal.type == "image" and "data" in told else told["value"]
+    value = told["data"] if signal.type in PICTURE_TYPES and "data" in told else told["value"]
     if value is None:
         return None
     if not isinstance(value, _KINDS[signal.type]) or (
         isinstance(value, bool) and signal.type != "boolean"
     ):
         raise TypeError(f"{signal.name} is not of type {signal.type}")
-    if signal.type in ("image", "blob"):
+    if signal.type in BINARY_TYPES:
         return base64.b64decode(str(value), validate=True)
     return _frozen(value)
 

@@ -24,6 +24,8 @@ MAX_TOPICS = 512
 """Maximum number of topics, services and subscriptions per client."""
 _ENDS = {True: 4, False: 6}
 """Status codes of action results: succeeded or aborted."""
+_CANCELLED = 5
+"""Status code of a cancelled goal (action_msgs/GoalStatus)."""
 
 EARLY = 0.1
 """Fraction of the throttle interval by which a message may be early. Robots often send at exactly
@@ -299,8 +301,21 @@ class BridgeClient:
         return Envelope("goal", attributes, operation.get("args") or {})
 
     def cancel(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
-        """Cancel a goal."""
-        attributes = {"action": _text(operation, "action"), "id": operation.get("id")}
+        """Cancel a goal; its result is the bridge's, so a later reply of the robot is dropped."""
+        action, number = _text(operation, "action"), operation.get("id")
+        attributes = {"action": action, "id": number}
+        if isinstance(number, str | int) and number in self._goals:
+            del self._goals[number]
+            self.write(
+                {
+                    "op": "action_result",
+                    "id": number,
+                    "action": action,
+                    "values": {},
+                    "status": _CANCELLED,
+                    "result": False,
+                }
+            )
         return Envelope("cancel", attributes)
 
     def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:

@@ -8,6 +8,7 @@ observations.
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from urc.expressions import Template
@@ -125,6 +126,20 @@ class World:
         """Advance the world to `now_s`, and return its sensor view."""
         self.advance(now_s)
         return SensorView(self)
+
+    @cached_property
+    def occupancy_grid(self) -> Mapping[str, object]:
+        """The map of the world as the fields of nav_msgs/OccupancyGrid."""
+        from urc.simulator.world.occupancy import occupancy_grid
+
+        return occupancy_grid(self.plan, self.spec.start[:2])
+
+    @cached_property
+    def costmap(self) -> Mapping[str, object]:
+        """The costs of the map for this robot, as the fields of nav_msgs/OccupancyGrid."""
+        from urc.simulator.world.occupancy import costmap
+
+        return costmap(dict(self.occupancy_grid), self.spec.body.radius)
 
     def top_view(self, width: int, height: int) -> bytes:
         """Return a top view of the world as JPEG; draw at most five new images per second.
@@ -270,6 +285,10 @@ class SensorView(Mapping[str, object]):
             return world.picture()
         if name == "panorama":
             return world.panorama()
+        if name == "occupancy_grid":
+            return world.occupancy_grid
+        if name == "costmap":
+            return world.costmap
         if name == "top":
             return world.top_view(320, 240)
         raise KeyError(name)

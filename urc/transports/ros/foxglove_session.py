@@ -391,10 +391,10 @@ class FoxgloveSession:
             self._publish(envelope)
         elif envelope.verb == "call":
             self._call(envelope)
-        elif envelope.verb in ("goal", "cancel"):
+        elif envelope.verb == "cancel":
+            pass  # this connection has started no goal, and STOP must not fail for it
+        elif envelope.verb == "goal":
             reason = "the Foxglove protocol has no actions; use via: rosbridge"
-            if envelope.verb == "cancel":
-                raise TransportError(reason)
             self._answer(envelope.attributes.get("id"), reason)
         else:
             raise TransportError(f"this connection cannot {envelope.verb}")

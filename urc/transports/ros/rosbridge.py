@@ -352,6 +352,8 @@ class _Session:
             self._bad += 1
             if self._bad & (self._bad - 1) == 0:  # the 1st, 2nd, 4th, 8th …
                 log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
+                text = f"a frame of the bridge was dropped: {problem} ({self._bad} such frames)"
+                self.queue.answer(Envelope(NOTICE, {}, text))
 
     def _learn(self, subscriptions: tuple[RosSubscription, ...], said: Mapping[str, Any]) -> None:
         """Process the list of topics and types from rosapi."""

@@ -41,6 +41,8 @@ _NUMBERS = {
     69: "H", 70: "I", 71: "Q", 72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d",
 }  # fmt: skip
 
+_WHOLE = frozenset("HIQbhiq")
+
 _decode_json = msgspec.json.Decoder().decode
 _encode_json = msgspec.json.Encoder().encode
 
@@ -152,7 +154,12 @@ def _tagged(first: Any, second: Any) -> object:
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
         raise ValueError(f"the CBOR tag {tag.tag} is unknown")
-    return list(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
+    found = _Numbers if code in _WHOLE else list
+    return found(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
+
+
+class _Numbers(list[int]):
+    """A typed array of integers, which needs no conversion: a map has a million of them."""
 
 
 class _Plain:
@@ -172,14 +179,16 @@ class _Plain:
 
     def of(self, value: Any) -> Any:
         """Return `value` with null in place of numbers that JSON cannot express."""
-        self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
+        self._room -= 1 + (len(value) if isinstance(value, str | bytes | _Numbers) else 0)
         if self._room < 0:
             raise ValueError(f"the frame expands to more than {MAX_BYTES} bytes")
-        self._left -= 1
+        self._left -= 1 + (len(value) if isinstance(value, _Numbers) else 0)
         if self._left < 0:
             raise ValueError(f"the frame expands to more than {self._values} values")
         if isinstance(value, float):
             return value if math.isfinite(value) else None
+        if isinstance(value, _Numbers):
+            return list(value)
         if isinstance(value, dict):
             return {_key(name): self.of(inner) for name, inner in value.items()}
         if isinstance(value, list):

@@ -16,7 +16,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp
 
 from urc.images import media_type
-from urc.model.values import Reading
+from urc.model.values import BINARY_TYPES, Reading
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
 from urc.runtime.contact_times import ContactTimes
@@ -161,7 +161,7 @@ class RobotCalls:
             hub = live.session.hub
             await _first(service, live, lambda: hub.latest(wanted) is not None)
             sample, now_s = hub.latest(wanted), service.clock.now()
-        if signal.type not in ("image", "blob"):
+        if signal.type not in BINARY_TYPES:
             return answer(value_of(signal, sample, now_s))
         if sample is None or not isinstance(sample.value, bytes):
             raise ApiError(404, f"no value of {wanted!r} has arrived", "no-value")

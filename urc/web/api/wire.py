@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 import msgspec
 
 from urc.model.role import Role
-from urc.model.values import Alarm
+from urc.model.values import Alarm, SignalType
 from urc.wire.client_messages import Arguments, Verb
 
 __all__ = [
@@ -194,7 +194,7 @@ class SignalInfo(ApiMessage, frozen=True):
     """A signal of a robot."""
 
     name: str
-    type: Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
+    type: SignalType
     title: str
     description: str
     unit: str

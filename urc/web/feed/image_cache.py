@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from urc.model.values import Sample, Signal
+from urc.model.values import BINARY_TYPES, Sample, Signal
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
 from urc.web.wire.picture import as_frame, encode_picture
@@ -50,7 +50,7 @@ class ImageSubscription:
 
 def is_picture(signal: Signal | None) -> bool:
     """Return whether the values of a signal are sent as binary messages."""
-    return signal is not None and signal.type in ("image", "blob")
+    return signal is not None and signal.type in BINARY_TYPES
 
 
 class ImageCache:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final
 
-from urc.model.values import Sample, Signal
+from urc.model.values import BINARY_TYPES, Sample, Signal
 from urc.runtime.hub import Hub, LinkStatus
 from urc.web.foxglove.topics import LOG_SOURCE, HubMessages, TopicMessage, TopicSource
 from urc.wire.foxglove import encode_message_head
@@ -65,7 +65,7 @@ class RobotFeed:
         """
         self._ids[source] = subscription
         if source.kind in ("signal", "place"):
-            is_large = signal is not None and signal.type in ("image", "blob")
+            is_large = signal is not None and signal.type in BINARY_TYPES
             self._waiting[source] = deque(maxlen=1 if is_large else MOST_WAITING)
         if self._hub is not None:
             self._sort()

@@ -14,7 +14,7 @@ from starlette.responses import JSONResponse, Response
 
 from urc.images import media_type
 from urc.model.driver import Driver
-from urc.model.values import Reading, Signal
+from urc.model.values import BINARY_TYPES, Reading, Signal
 from urc.web.fleet.robots import RobotService
 from urc.web.load.files import picture
 from urc.web.serve.rights import WATCH, ProtectedRoute
@@ -26,7 +26,7 @@ __all__ = ["VALUES", "Cards", "small_values"]
 VALUES = 4
 """Maximum number of values displayed on a card without an image."""
 _FRESH = {"cache-control": "no-store"}
-_UNSHOWN = ("image", "blob", "array")
+_UNSHOWN = (*BINARY_TYPES, "array")
 
 
 class Cards:

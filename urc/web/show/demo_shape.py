@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from urc.config.shape.check import check_inline, check_options
+from urc.model.values import BINARY_TYPES
 from urc.model.widget import Widget
 from urc.problems import Problem
 from urc.source import Document
@@ -25,7 +26,7 @@ _ALARM: Final = {
     "else": {"enum": [*_WORDS, *_SEVERITIES]},
 }
 _ELEMENTS: Final = ["integer", "number", "boolean", "string"]
-_TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
+_TYPES: Final = [*_ELEMENTS, "array", "object", *BINARY_TYPES]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:

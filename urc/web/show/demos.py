@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from urc.images import media_type
 from urc.model.driver import Argument, Command, Driver, Reply, TransportSpec
@@ -21,6 +21,7 @@ from urc.model.profile import Profile
 from urc.model.values import AlarmLimits, Signal
 from urc.model.widget import Widget, WidgetPort
 from urc.problems import ProblemsError, UrcError
+from urc.protocol.values.occupancy_grid import Grid, encode_grid
 from urc.source import Document, read_document
 from urc.web.show.demo_shape import check_demo
 from urc.web.wire.messages import encode_hello
@@ -29,6 +30,8 @@ __all__ = ["WidgetState", "demo_states", "colour_bars"]
 
 PICTURE_BYTES = 4 << 20
 """Maximum size of a demo image, in bytes."""
+_CELLS: Final = {"#": 100, ".": 0, " ": 255, **{str(tenth): 10 * tenth for tenth in range(1, 10)}}
+"""Cell of an occupancy grid, by letter in a demo."""
 _BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
 
 
@@ -159,7 +162,7 @@ def _defaults(widget: Widget) -> dict[str, object]:
 
 def _readings(
     shown: Mapping[str, Any],
-    images: Mapping[str, Mapping[str, Any]],
+    images: Mapping[str, Any],
     inputs: Mapping[str, str],
     lists: Mapping[str, tuple[str, ...]],
 ) -> Iterator[dict[str, Any]]:
@@ -176,7 +179,11 @@ def _readings(
                 "age": _nth(age_s, place),
                 "alarm": _nth(alarm, place) if many else alarm,
             }
-            yield {**one, **(images.get(name) or {"value": value[place] if many else value})}
+            found = images.get(name)
+            if isinstance(found, list):
+                yield {**one, **found[place]}
+            else:
+                yield {**one, **(found or {"value": value[place] if many else value})}
 
 
 def _nth(given: Any, place: int) -> Any:
@@ -185,18 +192,25 @@ def _nth(given: Any, place: int) -> Any:
 
 def _images(
     widget: Widget, document: Document, state: str, shown: Mapping[str, Any]
-) -> dict[str, dict[str, Any]]:
-    """Return the images among a state's values, keyed by signal name."""
-    images = {}
+) -> dict[str, Any]:
+    """Return the images among a state's values, by input: one image, or one for each signal."""
+    images: dict[str, Any] = {}
     for name, value in (shown.get("values") or {}).items():
         try:
-            data = _image(widget, value)
+            many = [_image(widget, one) for one in value] if isinstance(value, list) else []
+            data = None if many else _image(widget, value)
         except UrcError as error:
             path = ("states", state, "values", name)
             raise ProblemsError([document.problem(path, "bad-value", str(error))]) from error
         if data is not None:
-            images[name] = {"picture": base64.b64encode(data).decode(), "type": media_type(data)}
+            images[name] = _encoded(data)
+        elif many and None not in many:
+            images[name] = [_encoded(one) for one in many if one is not None]
     return images
+
+
+def _encoded(data: bytes) -> dict[str, Any]:
+    return {"picture": base64.b64encode(data).decode(), "type": media_type(data)}
 
 
 def _image(widget: Widget, value: Any) -> bytes | None:
@@ -210,7 +224,27 @@ def _image(widget: Widget, value: Any) -> bytes | None:
             return _file(widget.folder, str(name))
         case {"base64": text, **more} if not more:
             return _decoded(str(text))
+        case {"rows": [str(), *_] as rows, **more}:
+            return _grid(rows, {str(name): one for name, one in more.items()})
     return None
+
+
+def _grid(rows: list[str], place: Mapping[str, Any]) -> bytes:
+    """Return an occupancy grid drawn with letters, the far row first.
+
+    ``#`` is occupied, ``.`` is free, a space is unknown, and a digit is ten times its value.
+    """
+    width = len(rows[0])
+    if not width or any(len(row) != width or set(row) - _CELLS.keys() for row in rows):
+        raise UrcError(f"the rows of a grid have equal lengths and the letters {''.join(_CELLS)!r}")
+    cells = bytes(_CELLS[letter] for row in reversed(rows) for letter in row)
+    try:
+        numbers = {name: float(place.get(name, 0)) for name in ("x", "y", "yaw")}
+        return encode_grid(
+            Grid(width, len(rows), float(place["resolution"]), **numbers, frame="map", cells=cells)
+        )
+    except (KeyError, TypeError, ValueError) as fault:
+        raise UrcError(f"a grid needs numbers for resolution, x, y and yaw: {fault}") from fault
 
 
 def _decoded(text: str) -> bytes:

@@ -9,6 +9,7 @@ import pytest
 
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
+from urc.protocol.values.occupancy_grid import Grid, encode_grid
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.hub import (
     AuditRecord,
@@ -24,6 +25,7 @@ from urc.runtime.recording.shapes import DRIVING, LOG, RecordingEncoder, channel
 from urc.testing.profile import text
 
 BORN_NS = 1_700_000_000_000_000_000
+FLOOR = encode_grid(Grid(2, 1, 0.05, -1.0, 2.0, 0.5, "map", b"\x00\xff"))
 PNG = b"\x89PNG\r\n\x1a\n rest"
 SIGNALS = {
     one.name: one
@@ -33,6 +35,7 @@ SIGNALS = {
         Signal("ranges", "array"),
         Signal("pose", "object"),
         Signal("camera", "image"),
+        Signal("floor", "occupancy_grid"),
         Signal("dump", "blob"),
         Signal("isOn", "boolean"),
     )
@@ -106,6 +109,7 @@ EVENTS: Mapping[str, Tapped] = {
     "list": Sample("ranges", (1.0, None, 2.5), 1.5),
     "mapping": Sample("pose", {"x": 1, "at": (1, 2), "in": {"y": None}}, 1.5),
     "image": Sample("camera", PNG, 1.5),
+    "map": Sample("floor", FLOOR, 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
     "line": LinkStatus(
         "wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3, is_ready=True
@@ -148,6 +152,8 @@ def test_every_message_fits_the_schema_that_the_file_says(event: Tapped) -> None
 def test_images_and_the_log_have_the_names_that_programs_know() -> None:
     names = {channel.topic: channel.shape for channel in channels(DRIVER)}
     assert names["/signals/camera"] == "foxglove.CompressedImage"
+    assert names["/signals/floor"] == "foxglove.CompressedImage"
+    assert json.loads(told(EVENTS["map"])[2])["format"] == "png"
     assert names[LOG] == "foxglove.Log"
     assert json.loads(told(EVENTS["image"])[2])["format"] == "png"
 

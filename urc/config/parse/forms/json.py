@@ -1,6 +1,7 @@
 """The ``json`` form: fields of a JSON document, addressed by JMESPath expressions.
 
 The parser converts plain paths such as ``a.b[0].c`` to tuples, which the engine evaluates itself.
+The path ``@``, the whole document, becomes the empty tuple.
 All other paths need the JMESPath library.
 """
 
@@ -16,6 +17,8 @@ __all__ = ["parse_read", "place_of"]
 
 _NAME = r'(?:[A-Za-z_][A-Za-z0-9_]*|"[^"\\]+")'
 _PLAIN = re.compile(rf"{_NAME}(?:\.{_NAME}|\[[0-9]{{1,5}}\])*")
+_WHOLE = "@"
+"""JMESPath's expression for the whole document."""
 _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
@@ -37,6 +40,8 @@ def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
 
 def _path(part: Node, problems: Problems) -> object:
     text = part.data.strip()
+    if text == _WHOLE:
+        return ()
     if _PLAIN.fullmatch(text):
         return _plain(text)
     import jmespath  # takes 20 ms, and most drivers do not need it
