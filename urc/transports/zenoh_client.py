@@ -6,8 +6,8 @@ connection only. `ZenohRelay` connects the two. The library can therefore neithe
 queue motion without URC's knowledge, and TLS and tunnels are the same as for other transports.
 
 A router that was restarted knows no subscribers until the robots have connected again. A new
-connection therefore waits a moment for the subscribers of what was sent last, such as motion. A
-stop then reaches them.
+connection therefore waits a moment for the subscribers of the newest messages, such as motion, so
+that a stop reaches them.
 
 URC is a client of the router. It opens no port and sends no multicast.
 """
