@@ -194,7 +194,7 @@ class Robots(Program):
         """
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
-        door = places[0].partition(":")[0]
+        door = places[0].partition(":")[0] if places else ""
         name = f"{door}_process.py" if door in ("foxglove", "zenoh") else "robot_process.py"
         super().__init__(_script(name, *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
