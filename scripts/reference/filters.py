@@ -22,6 +22,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
         "'123456789' | checksum('crc16-modbus')",
         "checksum of bytes or text, with a named algorithm",
     ),
+    "clamp": ("130 | clamp(-100, 100)", "number limited to the range between the two arguments"),
     "column": ("[[1, 2], [3, 4]] | column(1)", "one column of a list of rows"),
     "cos": ("0 | cos", "cosine of an angle in radians"),
     "cut": ("['ab', 'cd'] | cut(1)", "slice of each text or list in a list"),

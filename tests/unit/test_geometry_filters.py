@@ -24,6 +24,9 @@ from urc.expressions import ExpressionError, compile_expression, compile_templat
         ("1 | exp | log", 1.0),
         ("-2.5 | floor", -3),
         ("2.1 | ceil", 3),
+        ("130 | clamp(-100, 100)", 100),
+        ("-130 | clamp(-100, 100)", -100),
+        ("0.5 | clamp(0, 1)", 0.5),
         ("x | sin * 2", 2 * math.sin(0.3)),
     ],
 )
@@ -40,12 +43,14 @@ def test_what_each_gives(text: str, expected: float) -> None:
         ("0 | log", "'log' is not defined for 0; expected a number above 0"),
         ("1000 | exp", "'exp' is not defined for 1000"),
         ("'a' | sin", "expected a number, found 'a'"),
+        ("1 | clamp(2, 0)", "'clamp' is not defined for 1 and 2 and 0; expected the lower limit"),
+        ("x | clamp(0, 1)", "'clamp' is not defined for nan and 0 and 1"),
     ],
 )
 def test_what_has_no_value_says_why(text: str, why: str) -> None:
     """No reading becomes a zero by accident."""
     with pytest.raises(ExpressionError, match=why):
-        compile_expression(text).evaluate({})
+        compile_expression(text).evaluate({"x": math.nan})
 
 
 def test_the_number_pi_is_no_name_that_somebody_must_give() -> None:

@@ -1,4 +1,4 @@
-"""Expression filters for angles, roots and rounding.
+"""Expression filters for angles, roots, rounding and limits.
 
 Private to `urc.filters.table`. Angles are in radians. An undefined result, such as the root of a
 negative number, raises ValueError, as in all expressions.
@@ -33,12 +33,19 @@ def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[
     return filtered
 
 
+def _clamped(value: float, low: float, high: float) -> float:
+    if not low <= high or math.isnan(value):
+        raise ValueError
+    return min(max(value, low), high)
+
+
 GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "acos": (_of("acos", math.acos, "expected -1 to 1"), (0, 0)),
     "asin": (_of("asin", math.asin, "expected -1 to 1"), (0, 0)),
     "atan": (_of("atan", math.atan), (0, 0)),
     "atan2": (_of("atan2", math.atan2), (1, 1)),
     "ceil": (_of("ceil", math.ceil), (0, 0)),
+    "clamp": (_of("clamp", _clamped, "expected the lower limit first"), (2, 2)),
     "cos": (_of("cos", math.cos), (0, 0)),
     "degrees": (_of("degrees", math.degrees), (0, 0)),
     "exp": (_of("exp", math.exp), (0, 0)),
@@ -50,5 +57,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Filters for angles, roots and rounding, by name: function, and minimum and maximum number of
+"""Filters for angles, roots, rounding and limits, by name: function, and minimum and maximum number of
 arguments."""

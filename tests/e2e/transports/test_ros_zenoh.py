@@ -255,7 +255,7 @@ async def test_mistakes_are_told(tmp_path: Path) -> None:
         await line.open(WAIT_S)
         said = {(await asyncio.wait_for(line.receive(), WAIT_S)).body for _ in wrong}
         assert said == {
-            "nobody publishes /gone",
+            "nothing publishes /gone",
             "/odom carries nav_msgs/Odometry, not nav_msgs/Path",
         }
         await line.close()
@@ -273,7 +273,7 @@ async def test_mistakes_are_told(tmp_path: Path) -> None:
         ({"ros2": {"domain": True}}, "ros needs 0 to 232 as ros2.domain, not True"),
         ({"ros2": {"distro": "foxy"}}, "as ros2.distro, not 'foxy'"),
         ({"ros2": 7}, "ros needs domain and distro as ros2, not 7"),
-        ({"host": ""}, "needs a host name or address as host"),
+        ({"host": ""}, "host must be a host name or address"),
     ],
 )
 def test_invalid_option_is_told(options: dict[str, object], why: str) -> None:
