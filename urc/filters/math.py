@@ -57,5 +57,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Filters for angles, roots, rounding and limits, by name: function, and minimum and maximum number of
+"""Filters for angles, roots, rounding and limits, by name: function, and the range of the number of
 arguments."""

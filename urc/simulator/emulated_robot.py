@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, Protocol
 
+from urc.expressions import Template
 from urc.model.driver import Driver, TransportSpec
 from urc.model.payload import Payload
 from urc.model.profile import Profile, SimulatorRule
@@ -406,7 +407,7 @@ class EmulatedConnection:
             if reaction.what.after_s > 0 and not running_rule.has_waited:
                 self._defer(running_rule, reaction.what.after_s)
                 break
-            if not self._rules.holds(reaction.what.until, now_s, running_rule.names):
+            if not self._holds(reaction.what.until, now_s, running_rule.names):
                 self._defer(running_rule, _LOOKS_S)
                 break
             running_rule.has_waited = False
@@ -429,6 +430,14 @@ class EmulatedConnection:
         except Unanswered as problem:
             self._fault(str(problem))
             return []
+
+    def _holds(self, until: Template | None, now_s: float, names: Mapping[str, object]) -> bool:
+        """Return whether a condition is true. A condition that fails counts as a fault."""
+        try:
+            return self._rules.holds(until, now_s, names)
+        except Unanswered as problem:
+            self._fault(str(problem))
+            return False
 
     def _fault(self, text: str) -> None:
         self.faults += 1

@@ -157,6 +157,7 @@ def test_an_update_waits_for_a_complete_grid_of_the_same_connection() -> None:
         (grid(1, 1, [0], resolution=-0.1), "a resolution of -0.1 m"),
         (grid(1, 1, [0], resolution="5"), "resolution of the grid: '5' is not a number"),
         (grid(1, 1, [0], resolution=math.inf), "resolution of the grid: inf is not a number"),
+        (grid(1, 1, [0], resolution=10**400), "resolution of the grid: "),
         (grid(1, 1, [0], width=True), "width of the grid: true is not a number of cells"),
         (grid(1, 1, [0], width=1.0), "width of the grid: 1 is not a number of cells"),
         (grid(1, 1, [0], width=2**32), "width of the grid: 4294967296 is not a number of cells"),

@@ -191,6 +191,17 @@ DIALOGUES: dict[str, tuple[str, list[tuple[object, list[bytes]]]]] = {
 """,
         [(b"GO\n", [b"?\n"]), (1.0, []), (b"R\n", []), (0.2, [b"!\n"])],
     ),
+    "a condition that fails is not true yet": (
+        """
+  state: { count: 0 }
+  wire:
+    - match: '^GO$'
+      send: "?"
+      then: [{ until: 1 / count > 0, send: "!" }]
+    - { match: '^R$', set: { count: 1 } }
+""",
+        [(b"GO\n", [b"?\n"]), (1.0, []), (b"R\n", []), (0.2, [b"!\n"])],
+    ),
     "a rule takes a frame and says nothing": (
         "  wire: [{ command: drive, answer: none }, { match: '^B', answer: auto }]\n",
         [(b"DRIVE 1\n", [])],

@@ -11,6 +11,7 @@ from urc.model.payload import NUMBERED, Payload, ReadSpec, WriteSpec
 from urc.model.sequence import ExpectStep, SendStep
 from urc.model.values import NOTHING
 from urc.protocol.forms.http_head import LOCATION
+from urc.protocol.forms.json_text import filled
 from urc.protocol.forms.table import build_reader
 from urc.protocol.forms.topics import paths_by_topic
 from urc.protocol.framing.table import build_framing
@@ -74,8 +75,9 @@ class RequestCompiler:
             return None
         from urc.protocol.ros.topic_codec import TopicCodec  # takes 4 ms, so only for these
 
-        has_hashes = spec.options.get("via") not in ("foxglove", "auto")
-        paths = paths_by_topic(self._driver, spec.name, self._readings.settings)
+        settings = self._readings.settings
+        has_hashes = filled(spec.options.get("via"), {"settings": settings}) == "zenoh"
+        paths = paths_by_topic(self._driver, spec.name, settings)
         return TopicCodec(paths, is_ros1=spec.options.get("version") == 1, has_hashes=has_hashes)
 
     def _react(
