@@ -22,8 +22,9 @@ def _words(text: str) -> frozenset[str]:
 _MOTION: Final = _words(
     "advance climb crawl dive dock drive fly follow goto hover jog jump launch move navigate orbit"
     " reverse roll rotate spin steer swim takeoff turn undock walk"
+    " blade drill grind mill mow saw spindle weld"
 )
-"""Words that suggest motion at any position in a command's name."""
+"""Words that suggest motion of the robot or of a tool, at any position in a command's name."""
 _FIRST: Final = _words("back backward flip forward go home lift lower raise return")
 """Words that suggest motion at the start of a command's name."""
 _PAIRS: Final = frozenset(("go to", "set speed", "set velocity", "take off"))
@@ -64,7 +65,7 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner,
                     "unmarked-motion",
-                    f"{name!r} seems to move the robot ({why}) but does not declare motion:"
+                    f"{name!r} seems to move the robot or a tool ({why}) but does not declare motion:"
                     " STOP does not block this command",
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
