@@ -70,9 +70,30 @@ async def test_escape_closes_an_open_panel_first(new_page: PageMaker) -> None:
         await page.wait_for_selector("#device:popover-open")
         await page.keyboard.press("Escape")
         await page.wait_for_selector("#device:not(:popover-open)", state="attached")
+        await page.click("[data-badge]")
+        await expect(page.locator("[data-panel]")).to_have_attribute("open", "")
+        await page.keyboard.press("Escape")
+        await expect(page.locator("[data-panel]")).not_to_have_attribute("open", "")
         assert robot.line.texts == []
         await page.keyboard.press("Escape")
         await until_text(page, NOTE, DONE)
+
+
+async def test_a_click_on_reset_brings_the_focus_back_to_the_stick(new_page: PageMaker) -> None:
+    """The arrow keys drive again, also after the mouse."""
+    async with calmly_driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        await page.mouse.up()
+        await robot.until_stopped()
+        await page.click(STOP)
+        await page.click(RESET)
+        await page.wait_for_function("() => document.activeElement?.matches('.joystick-pad')")
+        await page.keyboard.down("ArrowUp")
+        await robot.until_moving()
+        await page.keyboard.up("ArrowUp")
+        await robot.until_stopped()
 
 
 async def test_escape_is_stop_while_something_is_held_whatever_lies_open(

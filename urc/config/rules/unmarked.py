@@ -65,8 +65,8 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner,
                     "unmarked-motion",
-                    f"{name!r} seems to move the robot or a tool ({why}) but does not declare motion:"
-                    " STOP does not block this command",
+                    f"{name!r} seems to move the robot or a tool ({why}) but does not declare"
+                    " motion: STOP does not block this command",
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
                 )

@@ -114,7 +114,7 @@ export class Controls {
       no: isAsked,
       leave: isMine && !isAsked,
     };
-    const left = this.buttons.find(([verb, button]) => !shown[verb] && button.matches(":focus-visible"))?.[0];
+    const left = this.buttons.find(([verb, button]) => !shown[verb] && button.matches(BEFORE_DRIVING.has(verb) ? ":focus" : ":focus-visible"))?.[0];
     for (const [verb, button] of this.buttons) {
       if (button.hidden === shown[verb]) button.hidden = !shown[verb];
     }

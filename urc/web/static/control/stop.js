@@ -33,6 +33,7 @@ export class StopButton {
         if (event.key !== "Escape" || event.defaultPrevented || event.repeat) return;
         if (document.querySelector(":popover-open")) return; // Escape closes the popover
         event.preventDefault();
+        if (closePanel()) return;
         this.press();
       });
       // In the capture phase, because both keys mean STOP during a hold, regardless of the focus.
@@ -138,4 +139,12 @@ export class StopButton {
     this.seen = look;
     for (const listener of this.listeners) listener(state);
   }
+}
+
+/** Close the open sheet of connection and log; return whether there was one. */
+function closePanel() {
+  const panel = document.querySelector("[data-panel][open]");
+  if (!(panel instanceof HTMLDetailsElement)) return false;
+  panel.open = false;
+  return true;
 }

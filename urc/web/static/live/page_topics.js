@@ -121,7 +121,9 @@ export class Themes {
     this.count = 0;
     const root = document.documentElement;
     new MutationObserver(changed).observe(root, { attributeFilter: ["data-theme"] });
-    for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) {
+    // Over a picture, widgets are dark: a swapped view or another width changes their colours.
+    new MutationObserver(changed).observe(root, { subtree: true, attributeFilter: ["data-place", "data-picture"] });
+    for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)", "(width >= 37.5rem)"]) {
       matchMedia(query).addEventListener("change", changed);
     }
   }
