@@ -215,6 +215,34 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
     assert "2 such frames" in caplog.text
 
 
+async def test_stop_after_a_reconnection_cancels_the_goal() -> None:
+    """The bridge does not cancel the goals of a lost client, and takes ids from any client."""
+    goal = {"action": "/dock", "type": "a/action/Dock", "id": 7}
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port)
+        await transport.open(20.0)
+        await transport.send(Envelope("goal", goal, {}))
+        started = (await robot.hears(2))[1]
+        robot.clients[-1].transport.abort()
+        with pytest.raises(PeerClosed):
+            await heard(transport)
+        robot.said.clear()
+        await transport.open(20.0)
+        await transport.send(Envelope("cancel", {"action": "/dock"}))
+        assert (await robot.hears(2))[1] == {
+            "op": "cancel_action_goal",
+            "id": started["id"],
+            "action": "/dock",
+        }
+        robot.clients[-1].transport.abort()  # perhaps before the bridge has read the frame
+        robot.said.clear()
+        await transport.open(20.0)
+        again, asked = await robot.hears(2)
+        assert (again["op"], again["id"]) == ("cancel_action_goal", started["id"])
+        assert asked["op"] == "call_service"
+        await transport.close()
+
+
 async def test_topics_that_nobody_publishes_are_told_once() -> None:
     """The bridge itself says nothing about them, and would not for ever."""
     told = []

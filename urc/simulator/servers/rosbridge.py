@@ -58,6 +58,9 @@ class Bridge:
         """Client that offers each service, keyed by service name."""
         self.asked: dict[str, tuple[BridgeClient, object]] = {}
         """Caller and original identifier of each forwarded call, keyed by new identifier."""
+        self.goals: dict[str | int, tuple[BridgeClient, str]] = {}
+        """Sender and action of each running goal, keyed by identifier. As in the real bridge, any
+        client may cancel a goal, and a goal outlives its sender's connection."""
         self._count = 0
 
     def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
@@ -70,6 +73,12 @@ class Bridge:
         self.servers[service].write(
             {"op": "call_service", "id": key, "service": service, "args": args}
         )
+
+    def add_goal(self, number: str | int, sender: "BridgeClient", action: str) -> None:
+        """Keep a running goal; above the limit, drop the oldest."""
+        while len(self.goals) >= MAX_TOPICS:
+            del self.goals[next(iter(self.goals))]
+        self.goals[number] = sender, action
 
     def publish(self, topic: str, message: object, now_s: float) -> None:
         """Send a message to every subscriber."""
@@ -89,8 +98,6 @@ class BridgeClient:
         self._shown_s: dict[str, float] = {}
         self._calls: dict[object, str] = {}
         """Services of the unanswered calls, keyed by identifier."""
-        self._goals: dict[object, str] = {}
-        """Actions of the running goals, keyed by identifier."""
         self._fragments = 0
         bridge.clients.append(self)
 
@@ -125,12 +132,12 @@ class BridgeClient:
                 topic = str(payload.attributes.get("topic"))
                 self._bridge.types.setdefault(topic, "")
                 self.show(topic, body, now_s)
-            case "feedback" if number in self._goals:
-                self._feedback(number, body)
+            case "feedback" if action := self._own_goal(number):
+                self._feedback(action, number, body)
             case "response" if number in self._calls:
                 self._respond(self._calls.pop(number), number, payload)
-            case "response" if number in self._goals:
-                self._finish(self._goals.pop(number), number, payload)
+            case "response" if action := self._own_goal(number, ends=True):
+                self._finish(action, number, payload)
 
     def refuses(self, asked: Envelope) -> None:
         """Report to the client that the emulated robot lacks the service or action."""
@@ -138,11 +145,20 @@ class BridgeClient:
         if number in self._calls:
             service = self._calls.pop(number)
             self.answer(service, number, f"Service {service} does not exist", False)
-        elif number in self._goals:
+        elif action := self._own_goal(number, ends=True):
             reason = {"reason": "no such action"}
-            self._finish(
-                self._goals.pop(number), number, Envelope("response", {"ok": False}, reason)
-            )
+            self._finish(action, number, Envelope("response", {"ok": False}, reason))
+
+    def _own_goal(self, number: object, *, ends: bool = False) -> str:
+        """Return the action of this client's goal, or ""; with `ends`, also remove the goal."""
+        if not isinstance(number, str | int):
+            return ""
+        sender, action = self._bridge.goals.get(number, (None, ""))
+        if sender is not self:
+            return ""
+        if ends:
+            del self._bridge.goals[number]
+        return action
 
     def show(self, topic: str, message: object, now_s: float) -> None:
         """Send a message to the client if the client's subscription and throttle rate permit it."""
@@ -196,8 +212,7 @@ class BridgeClient:
         values = said.body if is_ok else said.attributes.get("reason") or said.body
         self.answer(service, number, {} if values is None else values, is_ok)
 
-    def _feedback(self, number: object, body: object) -> None:
-        action = self._goals[number]
+    def _feedback(self, action: str, number: object, body: object) -> None:
         self.write({"op": "action_feedback", "id": number, "action": action, "values": body})
 
     def _finish(self, action: str, number: object, said: Envelope) -> None:
@@ -291,7 +306,8 @@ class BridgeClient:
     def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
         """Return the envelope that sends a client's action goal to the robot."""
         action, number = _text(operation, "action"), operation.get("id")
-        self._remember(self._goals, number, action)
+        if isinstance(number, str | int):
+            self._bridge.add_goal(number, self, action)
         attributes = {
             "action": action,
             "type": _text(operation, "action_type"),
@@ -300,13 +316,17 @@ class BridgeClient:
         }
         return Envelope("goal", attributes, operation.get("args") or {})
 
-    def cancel(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
-        """Cancel a goal; its result is the bridge's, so a later reply of the robot is dropped."""
+    def cancel(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
+        """Cancel a goal of any client; ignore unknown identifiers, as the real bridge does.
+
+        The bridge sends the result to the goal's sender, and drops a later reply of the robot.
+        """
         action, number = _text(operation, "action"), operation.get("id")
-        attributes = {"action": action, "id": number}
-        if isinstance(number, str | int) and number in self._goals:
-            del self._goals[number]
-            self.write(
+        if not isinstance(number, str | int) or number not in self._bridge.goals:
+            return None
+        sender, _ = self._bridge.goals.pop(number)
+        if sender in self._bridge.clients:
+            sender.write(
                 {
                     "op": "action_result",
                     "id": number,
@@ -316,7 +336,7 @@ class BridgeClient:
                     "result": False,
                 }
             )
-        return Envelope("cancel", attributes)
+        return Envelope("cancel", {"action": action, "id": number})
 
     def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:
         kind = _text(operation, "type")

@@ -3,8 +3,11 @@
 Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
 transport. The protocol over the WebSocket is implemented by roslibpy
 (`urc.transports.ros.rosbridge_client`). roslibpy's objects are discarded with the connection, so no
-data can be sent late. A task reads continuously, even if messages are consumed slowly, because one
-stalled reader would freeze the topic for every client of the bridge.
+data can be sent late. Only the ids of unfinished goals are kept, so that a STOP after a
+reconnection cancels these goals. A cancellation without a result is sent again on each new
+connection, because the lost connection may not have delivered it. A task reads continuously, even
+if messages are consumed slowly, because one stalled reader would freeze the topic for every client
+of the bridge.
 
 A bridge delivers the first message on a topic only after the bridge's publisher has connected to
 the subscribers. If the client disconnects before that moment, the bridge drops the message. Clients
@@ -34,6 +37,7 @@ from urc.transports.base import (
     PeerClosed,
     TransportError,
 )
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph, version_of
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
@@ -83,6 +87,7 @@ class RosbridgeTransport:
         self._ros = ros
         self._session: _Session | None = None
         self._graph = TopicGraph(self._log, None if ros == AUTO else ros)
+        self._goals = UnfinishedGoals()
 
     @property
     def address(self) -> str:
@@ -97,7 +102,7 @@ class RosbridgeTransport:
 
     async def begin(self, timeout_s: float) -> None:
         """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
-        session = self._session = _Session(self._wire, self._ros, self._graph)
+        session = self._session = _Session(self._wire, self._ros, self._graph, self._goals)
         try:
             async with asyncio.timeout(timeout_s):
                 await session.start(self._subscriptions, min(_ANSWER_S, timeout_s * _PART))
@@ -221,11 +226,15 @@ class _Session:
     """The state of one open rosbridge connection."""
 
     def __init__(
-        self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
+        self,
+        wire: WebSocketTransport,
+        ros: int | Literal["auto"] | None,
+        graph: TopicGraph,
+        goals: UnfinishedGoals,
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
-        self._client = RosClient(self.queue, None if ros == AUTO else ros)
+        self._client = RosClient(self.queue, None if ros == AUTO else ros, goals)
         self._is_auto = ros == AUTO
         self._frames = OperationReader()
         self._graph = graph
@@ -237,11 +246,12 @@ class _Session:
         """Topics whose first message may not have arrived yet, in order of publication."""
 
     async def start(self, subscriptions: tuple[RosSubscription, ...], answer_s: float) -> None:
-        """Start reading, query the list of topics, and subscribe.
+        """Repeat lost cancellations, start reading, query the list of topics, and subscribe.
 
         With ``version: auto``, wait up to `answer_s` seconds for the list before subscribing.
         """
         self._reader = asyncio.create_task(self._read())
+        await self._write(self._client.cancel_again())
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown

@@ -5,12 +5,13 @@ roslibpy's network connections are not used. After a reconnection, roslibpy woul
 again. roslibpy also fails on binary frames, and never checks whether the bridge still responds.
 Measurements of roslibpy's network connections are recorded in docs/decisions. In this module,
 roslibpy's protocol writes frames to a list, and the transport sends these frames over URC's socket.
-The transport passes received data to the protocol. Each object serves only one connection, so no
-state is carried over to the next connection.
+The transport passes received data to the protocol. Each object serves only one connection.
+Only the unfinished goals are carried over to the next connection, so that STOP can cancel them.
 
 The client does no I/O and uses no tasks or threads.
 """
 
+import secrets
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, cast
 
@@ -21,7 +22,8 @@ from roslibpy.event_emitter import EventEmitterMixin
 from urc.model.payload import Envelope
 from urc.model.values import NOTHING
 from urc.transports._faults import one_line
-from urc.transports.base import TransportError
+from urc.transports.base import NOTICE, TransportError
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -48,8 +50,16 @@ class RosSubscription(NamedTuple):
 class RosClient:
     """Converts between envelopes and rosbridge operations, for one connection."""
 
-    def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver messages to `queue`; `ros` is the ROS version of type names; None keeps names."""
+    def __init__(
+        self, queue: TopicReceiveQueue, ros: int | None, goals: UnfinishedGoals | None = None
+    ) -> None:
+        """Initialise the state for a new connection.
+
+        Args:
+            queue: queue that receives messages and replies.
+            ros: ROS version of type names; None keeps names as written.
+            goals: unfinished goals of this and earlier connections; None for no earlier goals.
+        """
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -57,8 +67,9 @@ class RosClient:
         self._size_bytes = 0
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
-        self._goals: dict[str, tuple[str, object]] = {}
-        """Action name and request id of each running goal, keyed by roslibpy's goal id."""
+        self._goals = UnfinishedGoals() if goals is None else goals
+        self._told: set[str] = set()
+        """Actions for which a `cancel` without a known goal was reported."""
 
     @property
     def unanswered(self) -> int:
@@ -83,6 +94,12 @@ class RosClient:
             reconnect_on_close=False,
         )
         topic.subscribe(lambda body: self._message(wanted.topic, body))
+        return self._protocol.written()
+
+    def cancel_again(self) -> list[bytes]:
+        """Repeat the cancellations without results, which an earlier connection may have lost."""
+        for goal, action in self._goals.cancelled():
+            self._cancel_goal(goal, action)
         return self._protocol.written()
 
     def call_service(
@@ -111,7 +128,7 @@ class RosClient:
         }.get(envelope.verb)
         if work is None:
             raise TransportError(
-                f"rosbridge cannot {envelope.verb}; supported: publish, call, goal"
+                f"rosbridge cannot {envelope.verb}; supported: publish, call, goal, cancel"
             )
         try:
             work(envelope.attributes, envelope.body)
@@ -161,22 +178,27 @@ class RosClient:
         self._protocol.wants_feedback = wants_feedback
         goal: str = ActionClient(self._ros, name, kind, reconnect_on_close=False).send_goal(
             Goal(_fields(body)),
-            resultback=lambda result: self._result(goal, True, result),
+            resultback=lambda result: self._result(goal, number, True, result),
             feedback=lambda values: self._feedback(name, number, values),
-            errback=lambda result: self._result(goal, False, result),
+            errback=lambda result: self._result(goal, number, False, result),
         )
-        if len(self._goals) >= MAX_PENDING:
-            del self._goals[next(iter(self._goals))]
-        self._goals[goal] = name, number
+        self._goals.add(goal, name)
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with the given id or, if the id is unknown, the action's newest goal."""
-        name, number = _text(attributes, "action"), attributes.get("id")
-        running = [goal for goal, (action, _) in self._goals.items() if action == name]
-        named = [goal for goal in running if self._goals[goal][1] == number]
-        client = ActionClient(self._ros, name, "", reconnect_on_close=False)
-        for goal in named or running[-1:]:
-            client.cancel_goal(goal)
+        """Cancel all unfinished goals of an action, including those of earlier connections."""
+        name = _text(attributes, "action")
+        goals = self._goals.cancel(name)
+        for goal in goals:
+            self._cancel_goal(goal, name)
+        if not goals and name not in self._told and len(self._told) < KNOWN_TOPICS:
+            self._told.add(name)
+            text = (
+                f"no unfinished goal of {one_line(name, _NAME_SHOWN)} is known: none is cancelled"
+            )
+            self._queue.answer(Envelope(NOTICE, {}, text))
+
+    def _cancel_goal(self, goal: str, action: str) -> None:
+        ActionClient(self._ros, action, "", reconnect_on_close=False).cancel_goal(goal)
 
     # -- receiving
 
@@ -204,8 +226,8 @@ class RosClient:
         attributes = {"action": action, "id": number}
         self._queue.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
 
-    def _result(self, goal: str, is_ok: bool, result: Any) -> None:
-        _, number = self._goals.pop(goal, ("", None))
+    def _result(self, goal: str, number: object, is_ok: bool, result: Any) -> None:
+        self._goals.finish(goal)
         status, values = result["status"], result["values"]
         attributes = {"id": number, "ok": is_ok, "status": status}
         if not is_ok:
@@ -299,7 +321,9 @@ class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
     """A version of roslibpy's client that uses a given protocol instead of a network connection."""
 
     def __init__(self, protocol: _Protocol) -> None:
-        self._id_counter = 0
+        # A bridge keeps goals by id for all its clients, so a repeated id would replace the goal of
+        # an earlier connection or of another client. Each connection counts from a random number.
+        self._id_counter = secrets.randbits(62)
         self.factory = protocol.factory
         self.is_connecting = False
 

@@ -1,0 +1,95 @@
+"""Goals over rosbridge: their ids, and their cancellation from a later connection."""
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any
+
+import pytest
+
+from urc.model.payload import Envelope
+from urc.transports.base import NOTICE, PeerClosed
+from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
+from urc.transports.ros.rosbridge_client import RosClient
+from urc.transports.topic_queue import TopicReceiveQueue
+
+DOCK = Envelope("goal", {"action": "/dock", "type": "a/action/Dock", "id": 7}, {})
+CANCEL = Envelope("cancel", {"action": "/dock"})
+
+
+def sent(client: RosClient, envelope: Envelope) -> list[dict[str, Any]]:
+    return [json.loads(frame) for frame in client.perform(envelope)]
+
+
+def ended(goal: dict[str, Any], status: int) -> dict[str, Any]:
+    said = {"op": "action_result", "id": goal["id"], "action": "/dock", "values": {}}
+    return {**said, "status": status, "result": status == 4}
+
+
+def told(queue: TopicReceiveQueue) -> list[Envelope]:
+    """Return the queued envelopes, up to the end of the connection."""
+
+    async def take() -> list[Envelope]:
+        queue.end("over")
+        found: list[Envelope] = []
+        with suppress(PeerClosed):
+            while True:
+                found.append(await queue.pop())
+        return found
+
+    return asyncio.run(take())
+
+
+def test_a_later_connection_cancels_the_goals_of_an_earlier_one() -> None:
+    goals = UnfinishedGoals()
+    (first,) = sent(RosClient(TopicReceiveQueue(), 2, goals), DOCK)
+    later = RosClient(queue := TopicReceiveQueue(), 2, goals)
+    (second,) = sent(later, DOCK)
+    sent(later, DOCK._replace(attributes={**DOCK.attributes, "action": "/undock"}))
+    assert sent(later, CANCEL) == [
+        {"op": "cancel_action_goal", "id": one["id"], "action": "/dock"} for one in (first, second)
+    ]
+    assert told(queue) == []
+
+
+def test_a_cancel_without_a_result_is_sent_again_on_the_next_connection() -> None:
+    """The lost connection accepted the frame; STOP counts as sent, and is not repeated."""
+    goals = UnfinishedGoals()
+    first = RosClient(TopicReceiveQueue(), 2, goals)
+    ending, lasting = sent(first, DOCK) + sent(first, DOCK)
+    sent(first, DOCK._replace(attributes={**DOCK.attributes, "action": "/undock"}))
+    assert first.cancel_again() == [], "nothing was cancelled yet"
+    sent(first, CANCEL)
+    first.arrived(ended(ending, 5), 100)
+    (again,) = map(json.loads, RosClient(TopicReceiveQueue(), 2, goals).cancel_again())
+    assert again == {"op": "cancel_action_goal", "id": lasting["id"], "action": "/dock"}
+
+
+@pytest.mark.parametrize("status", [4, 5, 6])
+def test_an_ended_goal_is_not_cancelled_and_the_log_says_so_once(status: int) -> None:
+    client = RosClient(queue := TopicReceiveQueue(), 2, UnfinishedGoals())
+    (goal,) = sent(client, DOCK)
+    client.arrived(ended(goal, status), 100)
+    assert sent(client, CANCEL) == sent(client, CANCEL) == []
+    response, notice = told(queue)
+    assert (response.verb, response.attributes["id"]) == ("response", 7)
+    assert notice == Envelope(NOTICE, {}, "no unfinished goal of /dock is known: none is cancelled")
+
+
+def test_two_connections_use_different_ids() -> None:
+    """The bridge keeps goals by id for all clients; a repeated id would replace a running goal."""
+    call = Envelope("call", {"service": "/a", "id": 1}, {})
+    ids = [
+        one["id"]
+        for _ in range(20)
+        for client in [RosClient(TopicReceiveQueue(), 2)]
+        for one in sent(client, DOCK) + sent(client, DOCK) + sent(client, call)
+    ]
+    assert len(set(ids)) == len(ids) == 60
+
+
+def test_kept_goals_are_bounded_and_the_newest_stay() -> None:
+    goals = UnfinishedGoals()
+    for number in range(MAX_GOALS + 5):
+        goals.add(str(number), "/dock")
+    assert goals.cancel("/dock") == [str(number) for number in range(5, MAX_GOALS + 5)]
