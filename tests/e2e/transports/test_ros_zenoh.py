@@ -20,6 +20,7 @@ from urc.model.payload import Envelope
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
 from urc.transports.base import (
+    NOTICE,
     ConnectFailed,
     PeerClosed,
     TopicSubscription,
@@ -240,6 +241,23 @@ async def test_message_that_the_robot_could_not_read_is_refused() -> None:
         for why, said in refused.items():
             with pytest.raises(TransportError, match=re.escape(why)):
                 await line.send(Envelope("publish", said))
+        await line.close()
+
+
+async def test_stop_does_not_fail_for_a_cancel_and_the_log_says_so_once() -> None:
+    """Zenoh carries no actions; a failed stop command would be sent again for ever."""
+    async with nothing_left(), robot("jazzy") as other:
+        options = {"via": "zenoh", "host": "127.0.0.1", "port": other.port}
+        line = from_setup(TransportSetup("ros", options))
+        await line.open(WAIT_S)
+        for _ in range(2):
+            await line.send(Envelope("cancel", {"action": "/dock"}))
+        await line.send(Envelope("call", {"service": "/a", "id": 1}))
+        told = [await asyncio.wait_for(line.receive(), WAIT_S) for _ in range(2)]
+        text = "ros over zenoh carries no actions: no goal is cancelled"
+        assert told[0] == Envelope(NOTICE, {}, text)
+        assert isinstance(told[1], Envelope)
+        assert told[1].verb == "response"
         await line.close()
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from urc.model.payload import Envelope
+from urc.transports.base import NOTICE
 from urc.transports.ros.foxglove_session import MAX_RETRIES, FoxgloveSession, TopicWish
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -95,9 +96,15 @@ def test_a_goal_fails_at_once_and_stop_does_not_fail_for_its_cancel() -> None:
         clock=lambda: math.inf,
         published={},
     )
-    session.perform(Envelope("cancel", {"action": "/navigate_to_pose"}))
+    for _ in range(2):  # the second one adds no line to the log
+        session.perform(Envelope("cancel", {"action": "/navigate_to_pose"}))
     assert not list(session.written())
     session.perform(Envelope("goal", {"action": "/navigate_to_pose", "id": 4}, {}))
+    notice = asyncio.run(queue.pop())
+    assert (notice.verb, notice.body) == (
+        NOTICE,
+        "the Foxglove protocol has no actions: no goal is cancelled",
+    )
     answer = asyncio.run(queue.pop())
     assert (answer.attributes["id"], answer.attributes["ok"]) == (4, False)
     assert "no actions" in str(answer.attributes["reason"])

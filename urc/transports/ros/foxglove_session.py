@@ -375,9 +375,13 @@ class FoxgloveSession:
                 del self._topics[topic], self._subscriptions[one.number]
 
     def _notice(self, text: str) -> None:
+        self._tell(f"the bridge reports: {text}")
+
+    def _tell(self, text: str) -> None:
+        """Write a line to the robot's log, once per connection."""
         if text not in self._told and len(self._told) < MAX_STATUS:
             self._told.add(text)
-            self.queue.answer(Envelope(NOTICE, {}, f"the bridge reports: {text}"))
+            self.queue.answer(Envelope(NOTICE, {}, text))
 
     # -- sending
 
@@ -392,7 +396,8 @@ class FoxgloveSession:
         elif envelope.verb == "call":
             self._call(envelope)
         elif envelope.verb == "cancel":
-            pass  # this connection has started no goal, and STOP must not fail for it
+            # This connection has started no goal, and STOP must not fail for it.
+            self._tell("the Foxglove protocol has no actions: no goal is cancelled")
         elif envelope.verb == "goal":
             reason = "the Foxglove protocol has no actions; use via: rosbridge"
             self._answer(envelope.attributes.get("id"), reason)

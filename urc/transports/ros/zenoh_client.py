@@ -142,6 +142,9 @@ class RosZenohTransport:
             attributes = {"id": data.attributes.get("id"), "ok": False, "reason": reason}
             node.session.queue.answer(Envelope("response", attributes))
             return
+        if data.verb == "cancel":  # this connection has started no goal; STOP must not fail for it
+            node.nothing_cancelled()
+            return
         if data.verb != "publish":
             raise TransportError(f"ros over zenoh cannot {data.verb}; supported: publish")
         await node.publish(data)
@@ -204,6 +207,7 @@ class _RosNode:
         self._subscriptions = {f"/{one.topic.strip('/')}": _Subscription(one)
                                for one in options.topics}  # fmt: skip
         self._publishers: dict[tuple[str, str], _Publisher] = {}
+        self._is_cancel_told = False
         self._fresh: dict[str, None] = {}
         """Published topics whose subscribers have not been checked."""
         self._tokens: dict[str, TopicToken] = {}
@@ -344,6 +348,13 @@ class _RosNode:
                 and self._names.node.split("/")[2] not in key]  # fmt: skip
 
     # -- sending
+
+    def nothing_cancelled(self) -> None:
+        """Report once per connection that a `cancel` has no effect."""
+        if not self._is_cancel_told:
+            self._is_cancel_told = True
+            text = "ros over zenoh carries no actions: no goal is cancelled"
+            self.session.queue.answer(Envelope(NOTICE, {}, text))
 
     async def publish(self, envelope: Envelope) -> None:
         """Publish a message; raise `TransportError` if the robot could not read it."""
