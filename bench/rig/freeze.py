@@ -23,7 +23,7 @@ from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.motion.hold_to_run import HoldTerms
 from urc.problems import UrcError
-from urc.runtime.held_commands import is_lossy
+from urc.runtime.held_commands import is_lossy, restored_s
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
@@ -210,7 +210,9 @@ async def _one(
         await asyncio.sleep(0.02)
     await asyncio.sleep(_AFTERWARDS_S)
     stop, lossy = session.frames.stop_frame("go"), is_lossy(session.profile.driver, "wire")
-    backend.arm("go", HoldTerms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
+    late_s = restored_s(session.profile.driver, "wire")
+    terms = HoldTerms(b"", period_s=_TICK_S, is_lossy=lossy, restored_s=late_s)
+    backend.arm("go", terms.stopped_by(stop))
     holding = asyncio.create_task(_hold(session))
     try:
         await asyncio.sleep(moment_s)

@@ -24,7 +24,7 @@ from urc.guard import messages
 from urc.guard.channel import Channel, ChannelListener, GuardedLineSpec
 from urc.guard.proxy import GuardedTransport, Stands
 from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
-from urc.motion.hold_to_run import STOP_FOR_S, HoldTerms, HoldToRun, StopReport
+from urc.motion.hold_to_run import HoldTerms, HoldToRun, StopReport
 from urc.problems import UrcError
 
 __all__ = ["GuardClient", "HeldSpec"]
@@ -201,7 +201,7 @@ class GuardClient:
         if control is None:
             return False
         since_s = self.channel.now() - control.stopped_s
-        return control.may_move or since_s < STOP_FOR_S + _TELLING_S
+        return control.may_move or since_s < control.terms.restored_s + _TELLING_S
 
     def owes_stop(self, command: str) -> bool:
         """Return whether `command` may be moving the robot: no written stop was reported."""

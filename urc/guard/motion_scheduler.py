@@ -170,6 +170,7 @@ class MotionScheduler:
         for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
                 hold_to_run.stop("revoked", now)
+            hold_to_run.shorten(now)
             hold_to_run.is_armed = False
 
     def _hold_to_run(self, control: str, terms: HoldTerms) -> HoldToRun:

@@ -36,6 +36,12 @@ STOP_EVERY_S: Final = 0.05
 """Interval between repeated stops on lossy connections, in seconds."""
 STOP_FOR_S: Final = 0.5
 """Time for which a stop is repeated on a lossy connection, in seconds."""
+LATE_STOP_S: Final = 5.0
+"""Time for which the stop after a reconnection is repeated, in seconds, if the robot may connect to
+the router later than URC."""
+LATE_STOP_EVERY_S: Final = 0.2
+"""Interval between these repeats after the first `STOP_FOR_S`, in seconds. It limits the number of
+prepared stops for robots with counters."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 StopReport = Reason | Literal["lost"]
@@ -57,6 +63,9 @@ class HoldTerms(NamedTuple):
     """Time for which motion continues after the last tick, from 0.1 to 1.0 seconds."""
     is_lossy: bool = False
     """Whether the transport may lose frames, as UDP does; if so, the stop is repeated."""
+    restored_s: float = STOP_FOR_S
+    """Time for which a stop that is still due after a reconnection is repeated on a lossy
+    connection, in seconds."""
     stops: tuple[Numbered, ...] = ()
     """Variants of the stop frame for different counter values; empty for a stop without counters.
     """
@@ -93,6 +102,7 @@ class HoldToRun:
         self._waiting: Payload | None = None
         self._expires_at = 0.0
         self._stop_at = 0.0
+        self._often_until = 0.0
         self._stop_until = 0.0
 
     @property
@@ -165,7 +175,8 @@ class HoldToRun:
         self._waiting = None
         self._stop_at = now
         is_repeated = self.terms.is_lossy and self.terms.stop != b""
-        self._stop_until = now + STOP_FOR_S if is_repeated else now
+        self._often_until = now + STOP_FOR_S
+        self._stop_until = self._often_until if is_repeated else now
 
     def due(self, now: float, *, is_clear: bool) -> Payload | None:
         """Return the frame to write now; None if no frame is due.
@@ -188,9 +199,10 @@ class HoldToRun:
     def _next_stop(self, now: float) -> Payload | None:
         if now < self._stop_at:
             return None
-        if now + STOP_EVERY_S > self._stop_until:
+        every_s = STOP_EVERY_S if now < self._often_until else LATE_STOP_EVERY_S
+        if now + every_s > self._stop_until:
             self.state = "idle"
-        self._stop_at = now + STOP_EVERY_S
+        self._stop_at = now + every_s
         self.owes_stop = False
         return self.terms.stop
 
@@ -210,3 +222,9 @@ class HoldToRun:
         """Record that the connection is restored; a stop that is still due is sent first."""
         if self.owes_stop:
             self.stop("revoked", now)
+            if self._stop_until > now:
+                self._stop_until = now + self.terms.restored_s
+
+    def shorten(self, now: float) -> None:
+        """End the repeats of a stop after the usual time, because the connection will be closed."""
+        self._stop_until = min(self._stop_until, now + STOP_FOR_S)

@@ -16,7 +16,7 @@ from urc.motion.hold_to_run import HoldTerms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime.clock import Clock
-from urc.runtime.held_commands import is_lossy, period_of
+from urc.runtime.held_commands import is_lossy, period_of, restored_s
 from urc.runtime.transport_chain import BuiltTransport, make_lines
 
 __all__ = ["start_guard_client"]
@@ -65,7 +65,12 @@ def start_guard_client(
 
 def _held(command: Command, driver: Driver) -> HeldSpec:
     line = command.transport
-    terms = HoldTerms(b"", period_s=period_of(driver, command), is_lossy=is_lossy(driver, line))
+    terms = HoldTerms(
+        b"",
+        period_s=period_of(driver, command),
+        is_lossy=is_lossy(driver, line),
+        restored_s=restored_s(driver, line),
+    )
     return HeldSpec(line, terms)
 
 

@@ -8,7 +8,7 @@ from urc.model.driver import Command, Driver
 from urc.model.exchange import Hold
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
-from urc.motion.hold_to_run import HoldTerms, StopReport
+from urc.motion.hold_to_run import LATE_STOP_S, STOP_FOR_S, HoldTerms, StopReport
 from urc.motion.slew_rate import SlewRateLimiter
 from urc.motion.stall import STALLED_S
 from urc.protocol.events import MotionEvent
@@ -21,6 +21,7 @@ __all__ = [
     "control_of",
     "is_lossy",
     "period_of",
+    "restored_s",
 ]
 
 
@@ -183,8 +184,21 @@ def period_of(driver: Driver, command: Command) -> float:
 
 _LOSSY = frozenset(("udp", "serial", "mqtt", "zenoh", "ros"))
 """Transport types that may lose a single stop frame."""
+_BRIDGES = ("rosbridge", "foxglove", "auto")
+"""Values of `via` that never reach a Zenoh router."""
 
 
 def is_lossy(driver: Driver, transport: str) -> bool:
     """Return whether written data may be lost on this transport without an error."""
     return driver.transports[transport].type in _LOSSY
+
+
+def restored_s(driver: Driver, transport: str) -> float:
+    """Return how long a stop is repeated after a reconnection on this transport, in seconds.
+
+    After a restart of a Zenoh router, the robot may connect to the router later than URC.
+    """
+    spec = driver.transports[transport]
+    via = spec.options.get("via", "rosbridge")  # a template may select zenoh
+    is_late = spec.type == "zenoh" or (spec.type == "ros" and via not in _BRIDGES)
+    return LATE_STOP_S if is_late else STOP_FOR_S

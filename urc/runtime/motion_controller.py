@@ -37,6 +37,7 @@ from urc.runtime.held_commands import (
     MotionSession,
     control_of,
     is_lossy,
+    restored_s,
 )
 
 __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
@@ -78,6 +79,9 @@ class MotionController:
         self._holds = {name: one for name, one in driver.commands.items() if one.hold is not None}
         self._is_lossy = {
             name: is_lossy(driver, one.transport) for name, one in self._holds.items()
+        }
+        self._restored_s = {
+            name: restored_s(driver, one.transport) for name, one in self._holds.items()
         }
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
         self._stops = tuple(name for name, one in driver.commands.items() if one.stops)
@@ -472,6 +476,7 @@ class MotionController:
             period_s=control.period_s,
             lease_s=control.hold.lease_s,
             is_lossy=self._is_lossy[command],
+            restored_s=self._restored_s[command],
         )
         return terms.stopped_by(stop)
 

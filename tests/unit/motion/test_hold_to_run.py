@@ -1,5 +1,6 @@
 """A held command moves while ticks come, and always stops."""
 
+import itertools
 from typing import Any
 
 import pytest
@@ -8,7 +9,14 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.model.payload import Count, FrameVariants, Numbered
-from urc.motion.hold_to_run import SHORTEST_LEASE_S, STOP_EVERY_S, STOP_FOR_S, HoldTerms, HoldToRun
+from urc.motion.hold_to_run import (
+    LATE_STOP_S,
+    SHORTEST_LEASE_S,
+    STOP_EVERY_S,
+    STOP_FOR_S,
+    HoldTerms,
+    HoldToRun,
+)
 
 STOP = b"STOP"
 
@@ -83,6 +91,60 @@ def test_where_writes_are_lost_the_stop_is_repeated_for_half_a_second() -> None:
     assert written[0] == 0.0
     assert len(written) >= 10
     assert written[-1] <= 0.5
+
+
+def repeats(held: HoldToRun, now: float) -> list[float]:
+    """Write what is due until nothing is; return when, in seconds after `now`."""
+    began, written = now, []
+    while held.deadline is not None:
+        now = max(now, held.deadline)
+        if held.due(now, is_clear=True):
+            written.append(round(now - began, 3))
+    return written
+
+
+def test_stop_of_a_restored_connection_is_repeated_for_robots_that_come_later() -> None:
+    """Densely first, like any other stop, and then at most 0.2 s apart."""
+    held = hold_to_run(is_lossy=True, restored_s=LATE_STOP_S)
+    held.tick(b"go", 1.0)
+    held.cut()
+    held.restored(9.0)
+    assert not held.tick(b"go", 9.0)
+    written = repeats(held, 9.0)
+    assert written[0] == 0.0
+    assert LATE_STOP_S - 0.25 < written[-1] <= LATE_STOP_S
+    gaps = [later - one for one, later in itertools.pairwise(written)]
+    assert max(gaps) <= 0.2 + 1e-6
+    assert max(gaps[:9]) <= STOP_EVERY_S + 1e-6
+    held.arm()
+    held.tick(b"go", 20.0)
+    held.stop("released", 20.0)
+    assert repeats(held, 20.0)[-1] <= STOP_FOR_S
+
+
+@pytest.mark.parametrize("terms", [{}, {"is_lossy": True}, {"restored_s": LATE_STOP_S}])
+def test_stop_of_a_restored_connection_is_short_elsewhere(terms: dict[str, Any]) -> None:
+    held = hold_to_run(**terms)
+    held.tick(b"go", 1.0)
+    held.cut()
+    held.restored(9.0)
+    assert repeats(held, 9.0)[-1] <= (STOP_FOR_S if "is_lossy" in terms else 0.0)
+
+
+def test_late_repeats_end_for_new_motion_and_before_a_close() -> None:
+    """The operator drives on at once; a connection that is closed waits for no late robot."""
+    held = hold_to_run(is_lossy=True, restored_s=LATE_STOP_S)
+    held.tick(b"go", 1.0)
+    held.cut()
+    held.restored(9.0)
+    assert held.due(9.0, is_clear=True) == STOP
+    held.arm()
+    assert held.tick(b"go again", 9.1)
+    assert held.due(9.1, is_clear=True) == b"go again"
+    held.cut()
+    held.restored(10.0)
+    held.shorten(10.0)
+    assert repeats(held, 10.0)[-1] <= STOP_FOR_S
 
 
 def test_ticks_after_the_lease_do_not_resume_the_motion() -> None:

@@ -9,11 +9,12 @@ from urc.guard.local_channel import LocalChannel
 from urc.guard.pipe_channel import PipeChannel
 from urc.model.driver import Driver, Message, TransportSpec
 from urc.model.payload import ReadSpec
-from urc.motion.hold_to_run import LEASE_S, HoldTerms
+from urc.motion.hold_to_run import LATE_STOP_S, LEASE_S, STOP_FOR_S, HoldTerms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime import guarding
 from urc.runtime.guarding import start_guard_client
+from urc.runtime.held_commands import restored_s
 from urc.testing.clock import FakeClock
 from urc.transports.base import TransportSetup
 
@@ -54,6 +55,25 @@ def robot(kind: str, *on_stall: str, tunnel: str = "") -> Driver:
         "wire": TransportSpec("wire", kind, tunnel=tunnel),
     }
     return Driver(specs, commands=commands)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "lasts_s"),
+    [
+        ("udp", {}, STOP_FOR_S),
+        ("mqtt", {}, STOP_FOR_S),
+        ("ros", {}, STOP_FOR_S),
+        ("ros", {"via": "foxglove"}, STOP_FOR_S),
+        ("ros", {"via": "zenoh"}, LATE_STOP_S),
+        ("ros", {"via": compile_template("{{ settings.bridge }}")}, LATE_STOP_S),
+        ("zenoh", {}, LATE_STOP_S),
+    ],
+)
+def test_stop_is_repeated_longer_where_the_robot_may_come_back_later_than_urc(
+    kind: str, options: dict[str, object], lasts_s: float
+) -> None:
+    driver = Driver({"wire": TransportSpec("wire", kind, options)})
+    assert restored_s(driver, "wire") == lasts_s
 
 
 def test_guard_is_told_the_terms_of_each_held_command() -> None:
