@@ -5,9 +5,9 @@ connection, as for MQTT. Each `open` connects a socket and creates a session of 
 connection only. `ZenohRelay` connects the two. The library can therefore neither reconnect nor
 queue motion without URC's knowledge, and TLS and tunnels are the same as for other transports.
 
-A router that was restarted knows no subscribers until the robots have connected again. A new
-connection therefore waits a moment for the subscribers of the newest messages, such as motion, so
-that a stop reaches them.
+A router that was restarted knows no subscribers until the robots have connected again. Neither a
+new connection nor its stop waits for them, because a subscriber may never appear. Instead, the
+guard repeats the stop for some seconds (`urc.motion.hold_to_run.LATE_STOP_S`).
 
 URC is a client of the router. It opens no port and sends no multicast.
 """
@@ -32,8 +32,6 @@ class ZenohTransport:
         self._options = options
         self._dialer = dialer
         self._session: ZenohSession | None = None
-        self._awaited: tuple[str, ...] = ()
-        """Keys for whose subscribers the next connection waits."""
 
     @property
     def address(self) -> str:
@@ -49,13 +47,12 @@ class ZenohTransport:
                 session = ZenohSession(self._options, stream)
                 try:
                     await session.start(timeout_s)
-                    await session.meet(self._awaited)
                 except BaseException:
                     await session.abort()
                     raise
         except TimeoutError as fault:
             raise ConnectFailed(late(self._options.where, timeout_s)) from fault
-        self._session, self._awaited = session, ()
+        self._session = session
 
     async def receive(self) -> Envelope:
         """Return the next message or response; raise `PeerClosed` when the connection has ended."""
@@ -83,14 +80,12 @@ class ZenohTransport:
         session, self._session = self._session, None
         if session is not None:
             await session.close()
-            self._awaited = session.recent()
 
     async def abort(self) -> None:
         """Close the connection immediately and discard unsent data. Never raises."""
         session, self._session = self._session, None
         if session is not None:
             await session.abort()
-            self._awaited = session.recent()
 
     async def probe(self) -> None:
         """Probe the router; return as soon as the router has replied."""

@@ -7,6 +7,7 @@ counts all bytes, so URC knows which data has not left this computer yet.
 """
 
 import asyncio
+import logging
 import os
 import shutil
 import socket
@@ -23,6 +24,8 @@ __all__ = ["ZenohRelay"]
 _PIECE_BYTES: Final = 65536
 _HAS_PATHS: Final = os.name == "posix"
 """Whether the library can connect to a socket in the file system."""
+
+log = logging.getLogger(__name__)
 
 
 class ZenohRelay:
@@ -86,20 +89,23 @@ class ZenohRelay:
         """Return the number of bytes that the router has not acknowledged."""
         return self._read - self._written + unsent_of(self._stream)
 
-    async def passed(self, count: int) -> None:
-        """Wait until the kernel has accepted the first `count` bytes, or the relay has ended."""
-        if self._written >= count or self._task is None or self._task.done():
-            return
-        reached = self._loop.create_future()
-        self._wanted[reached] = count
-        try:
-            await reached
-        finally:
-            self._wanted.pop(reached, None)
+    async def passed(self, count: int, silent_s: float) -> None:
+        """Wait until the kernel has accepted the first `count` bytes, or the relay has ended.
 
-    async def cleared(self) -> None:
-        """Wait until the kernel has accepted all bytes received from the library so far."""
-        await self.passed(self._read)
+        Raises:
+            TimeoutError: the kernel has accepted nothing for `silent_s` seconds.
+        """
+        while self._written < count and self._task is not None and not self._task.done():
+            before, reached = self._written, self._loop.create_future()
+            self._wanted[reached] = count
+            try:
+                async with asyncio.timeout(silent_s):
+                    await reached
+            except TimeoutError:
+                if self._written == before:
+                    raise
+            finally:
+                self._wanted.pop(reached, None)
 
     async def close(self) -> None:
         """Close both sides immediately. The method never raises."""
@@ -153,10 +159,12 @@ class ZenohRelay:
                 inward.add_done_callback(lambda _: outward.cancel())
         finally:
             end.close()
-            await self._stream.abort()
-        self._ended(self._fault, not self._fault)
-        self._task = None
-        self._wake()
+            try:
+                await self._stream.abort()
+            finally:
+                self._ended(self._fault, not self._fault)
+                self._task = None
+                self._wake()
 
     async def _until_ended(self, way: Coroutine[Any, Any, None]) -> None:
         """Run one direction until either side ends; keep the network's reason."""
@@ -166,6 +174,9 @@ class ZenohRelay:
             self._fault = self._fault or str(fault)
         except OSError:
             return  # the library has closed its socket
+        except Exception as bug:  # supervisor: both directions end together, with a reason
+            log.error("the relay of a Zenoh connection failed", exc_info=bug)
+            self._fault = self._fault or f"the relay failed ({type(bug).__name__}: {bug})"
 
     async def _out(self, end: socket.socket) -> None:
         while data := await self._loop.sock_recv(end, _PIECE_BYTES):

@@ -42,17 +42,12 @@ _CHECK_S: Final = 1.0
 _PASS_S: Final = 5.0
 """Time in which the library must pass a value on to the relay, in seconds."""
 _FAREWELL_S: Final = 0.5
-RECENT_S: Final = 2.0
-"""Age of a message's key at the end of a connection, in seconds, up to which a new connection waits
-for the key's subscribers."""
-MEET_S: Final = 3.0
-"""Maximum wait for subscribers on a new connection, in seconds."""
-MAX_RECENT: Final = 64
-"""Maximum number of keys for whose subscribers a new connection waits."""
-_LOOK_S: Final = 0.02
+MAX_KEY_BYTES: Final = 1024
+"""Maximum size of a received key, in bytes; samples and tokens with longer keys are ignored."""
 _LARGE_BYTES: Final = 32_768
 """Size of a value that does not fit into one batch of the library, in bytes."""
 _ENDED: Final = "the router ended the session"
+_DEAF: Final = "the router accepts no data"
 _ALIVE: Final = b'{"alive":true}'
 _GONE: Final = b'{"alive":false}'
 _NOTHING: Final = "@urc/ping"
@@ -73,9 +68,6 @@ class ZenohSession:
         """The library's subscriptions and tokens, which end when nothing refers to them."""
         self._tokens: set[str] = set()
         """Subscribed tokens that have been seen."""
-        self._put_s: dict[str, float] = {}
-        """Time of the newest message for each of the last keys, on the event loop's clock."""
-        self._ended_s = self._loop.time()
         self._turn = asyncio.Lock()
         self._gets: set[_Get] = set()
         self._is_over = threading.Event()
@@ -99,6 +91,7 @@ class ZenohSession:
             if self._options.liveliness:
                 token = self._session.liveliness().declare_token(self._options.liveliness)
                 self._declared.append(token)
+            self._raise_if_ended()
         except zenoh.ZError as fault:
             is_late = self._loop.time() >= until_s
             raise ConnectFailed(self._explain(timeout_s if is_late else None)) from fault
@@ -126,33 +119,6 @@ class ZenohSession:
             allowed_destination=zenoh.Locality.REMOTE,
         )
         await self._leave(put, len(key.encode()) + len(body) + len(attachment or b""))
-        self._put_s.pop(key, None)
-        self._put_s[key] = self._loop.time()
-        if len(self._put_s) > MAX_RECENT:
-            del self._put_s[next(iter(self._put_s))]
-
-    def recent(self) -> tuple[str, ...]:
-        """Return the keys of the messages that were sent just before the connection ended."""
-        return tuple(k for k, put_s in self._put_s.items() if put_s >= self._ended_s - RECENT_S)
-
-    async def meet(self, keys: tuple[str, ...]) -> None:
-        """Wait until each of `keys` has a subscriber, but no longer than `MEET_S`.
-
-        After a restart of the router, robots connect to it later than URC. A stop that is sent
-        earlier would be lost.
-        """
-        until_s = self._loop.time() + MEET_S
-        remote = zenoh.Locality.REMOTE
-        publishers = [self.library.declare_publisher(k, allowed_destination=remote) for k in keys]
-        try:
-            while self._loop.time() < until_s and self.queue.ended is None:
-                if all(_has_match(one) for one in publishers):
-                    return
-                await asyncio.sleep(_LOOK_S)
-        finally:
-            # While a publisher is declared, the library drops values without subscribers.
-            for one in publishers:
-                one.undeclare()
 
     async def get(self, envelope: Envelope) -> None:
         """Ask for the value of one key; the reply arrives as a response."""
@@ -236,8 +202,7 @@ class ZenohSession:
         """
         async with self._turn:
             self._raise_if_ended()
-            await self._relay.cleared()
-            self._raise_if_ended()
+            await self._passed(self._relay.read)
             target = self._relay.read + least_bytes
             try:
                 if least_bytes > _LARGE_BYTES:
@@ -246,11 +211,22 @@ class ZenohSession:
                     work()
             except zenoh.ZError as fault:
                 raise TransportError(f"zenoh cannot send ({_words(fault)})") from fault
-            try:
-                async with asyncio.timeout(_PASS_S):
-                    await self._relay.passed(target)
-            except TimeoutError as fault:
-                raise TransportError("message dropped: the router accepts no data") from fault
+            await self._passed(target)
+
+    async def _passed(self, count: int) -> None:
+        """Wait until the kernel has accepted the library's first `count` bytes.
+
+        If the kernel accepts nothing for `_PASS_S`, the connection is reset, because the library or
+        the kernel would deliver the message later.
+
+        Raises:
+            PeerClosed: the connection has ended, or has been reset.
+        """
+        try:
+            await self._relay.passed(count, _PASS_S)
+        except TimeoutError:
+            self._end(_DEAF)
+            await self._relay.abort()
         self._raise_if_ended()
 
     def _send_ping(self) -> None:
@@ -310,6 +286,8 @@ class ZenohSession:
     def _sample(self, one: KeySubscription, sample: Any) -> None:
         is_put = sample.kind == zenoh.SampleKind.PUT
         key = str(sample.key_expr)
+        if len(key.encode()) > MAX_KEY_BYTES:
+            return
         if one.is_liveliness:
             if one.topic == key:
                 self._tokens.add(key)
@@ -343,8 +321,6 @@ class ZenohSession:
 
     def _end(self, reason: str) -> None:
         """Wake all waiting tasks, and tell them why the connection ended."""
-        if not self._is_over.is_set():
-            self._ended_s = self._loop.time()
         self._is_over.set()
         self.queue.end(reason)
         if self._check is not None:
@@ -462,12 +438,6 @@ def _encoding_of(body: object) -> Any:
 def _words(fault: Exception) -> str:
     """Return the library's reason without source positions."""
     return one_line(str(fault).partition(" at /")[0])
-
-
-def _has_match(publisher: Any) -> bool:
-    """Return whether a publisher has subscribers; the library declares a boolean."""
-    status = publisher.matching_status
-    return bool(getattr(status, "matching", status))
 
 
 def _ignore(_: object) -> None:

@@ -6,7 +6,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from urc.problems import UrcError
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.server import serve as serve_robot
+from urc.transports import zenoh_session
 from urc.transports.base import (
     ConnectFailed,
     PeerClosed,
@@ -32,12 +33,16 @@ from urc.transports.base import (
 )
 from urc.transports.zenoh import from_setup
 from urc.transports.zenoh_client import ZenohTransport
-from urc.transports.zenoh_session import MAX_BYTES, MEET_S, PING_S, RECENT_S
+from urc.transports.zenoh_session import MAX_BYTES, MAX_KEY_BYTES, PING_S
 
 pytestmark = pytest.mark.anyio
 
 WAIT_S = 20.0
 OPEN_S = 10.0
+CONNECT_S = 3.0
+"""The timeout of a transport that names none."""
+HURRIED_S = 0.5
+"""The longest timeout of the guard's attempts for a stop, through a tunnel."""
 ROVER = """
 urc: 1
 kind: robot
@@ -130,13 +135,16 @@ class Device:
 
 
 @asynccontextmanager
-async def device(port: int = 0, late_s: float = 0, **settings: object) -> AsyncIterator[Device]:
-    """Run the router with its device until the context ends."""
+async def device(
+    port: int = 0, late_s: float = 0, key: str = "**", **settings: object
+) -> AsyncIterator[Device]:
+    """Run the router with its device, which subscribes to `key`, until the context ends."""
     port = port or free_port()
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "tests.e2e.transports.zenoh_device", str(port)),
         json.dumps(settings),
         str(late_s),
+        key,
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
     )
@@ -242,35 +250,71 @@ async def test_router_that_dies_is_lost_at_once_and_stays_lost() -> None:
             await transport.close()
 
 
-async def test_new_connection_waits_for_those_who_were_sent_to() -> None:
-    """Else the stop reaches nobody. It waits for the last keys only, and not for ever."""
+async def test_new_connection_waits_for_no_subscriber() -> None:
+    """A key may never have one; with the usual timeout, each attempt would fail, for ever."""
     loop = asyncio.get_running_loop()
     async with nothing_left():
-        async with device() as other:
+        async with device(key="drive") as other:
             transport = line(other.port)
-            await transport.open(OPEN_S)
-            await transport.send(said("old", b"1"))
-            await asyncio.sleep(RECENT_S + 0.2)
+            await transport.open(CONNECT_S)
+            await transport.send(said("lamp/set", b"1"))
             await transport.send(said("drive", b"1"))
             await other.next("put")
             other.signal(signal.SIGKILL)
             await ends(transport)
-        async with device(other.port, late_s=1.0) as again:
-            await transport.open(OPEN_S)
-            await transport.send(said("drive", b"0"))
-            assert (await again.next("put"))["value"] == "0"
-            again.signal(signal.SIGKILL)
-            await ends(transport)
-        async with device(other.port, late_s=60.0) as again:
-            began = loop.time()
-            await transport.open(OPEN_S)
-            assert MEET_S - 0.5 < loop.time() - began < MEET_S + 2.0
-            await transport.send(said("drive", b"0"))  # nobody hears it, and nothing waits
+        async with device(other.port, late_s=60.0):
+            for timeout_s in (CONNECT_S, HURRIED_S):
+                began = loop.time()
+                await transport.open(timeout_s)
+                await transport.send(said("drive", b"0"))
+                assert loop.time() - began < timeout_s
             await transport.close()
-            began = loop.time()
-            await transport.open(OPEN_S)
-            assert loop.time() - began < MEET_S + 2.0
-            await transport.close()
+
+
+async def films(transport: ZenohTransport, sizes: Iterator[int]) -> None:
+    for size in sizes:
+        await asyncio.wait_for(transport.send(said("film", b"x" * size)), WAIT_S)
+
+
+async def test_message_that_the_router_does_not_accept_never_arrives_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A frozen router reads on when it is thawed, but the connection has been reset."""
+    monkeypatch.setattr(zenoh_session, "_PASS_S", 1.0)  # sooner than the kernel gives up
+    sizes = iter(range(3_000_000, 3_000_040))
+    async with nothing_left(), device() as other:
+        transport = line(other.port)
+        await transport.open(OPEN_S)
+        other.signal(signal.SIGSTOP)
+        try:
+            with pytest.raises(PeerClosed, match="the router accepts no data"):
+                await films(transport, sizes)
+            assert await ends(transport) == "the router accepts no data"
+        finally:
+            other.signal(signal.SIGCONT)
+        lost = next(sizes) - 1
+        await asyncio.sleep(1.0)
+        await transport.open(OPEN_S)
+        await transport.send(said("film", b"end"))
+        arrived = []
+        while (value := (await other.next("put"))["value"]) != "end":
+            arrived.append(value)
+        assert f"{lost} bytes" not in arrived
+        await transport.close()
+
+
+async def test_key_that_is_too_long_is_ignored() -> None:
+    """Neither a value nor a token may fill the memory by its name."""
+    long = "a" * (MAX_KEY_BYTES + 1)
+    async with nothing_left(), device() as other:
+        transport = line(other.port, TopicSubscription("**"))
+        await transport.open(OPEN_S)
+        await transport.send(said("lamp/set", b"1"))
+        await other.next("put")  # the subscription has arrived before
+        other.puts(long, "1")
+        other.puts(long[:-1], "2")
+        assert (await heard(transport)).body == b"2"
+        await transport.close()
 
 
 async def test_router_that_freezes_is_lost() -> None:

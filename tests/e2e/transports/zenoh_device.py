@@ -1,4 +1,4 @@
-"""A Zenoh router with a device, as a program of its own: ``python -m … PORT [SETTINGS]``.
+"""A Zenoh router with a device, as a program: ``python -m … PORT [SETTINGS [LATE_S [KEY]]]``.
 
 Prints a line of JSON for each value, request and token that it sees. It publishes what it is told
 on its standard input: a line of JSON with a key and a value.
@@ -61,11 +61,12 @@ def main() -> None:
         **(json.loads(sys.argv[2]) if len(sys.argv) > 2 else {}),
     }
     late_s = float(sys.argv[3]) if len(sys.argv) > 3 else 0.0
+    subscribed = sys.argv[4] if len(sys.argv) > 4 else "**"
     with zenoh.open(zenoh.Config.from_json5(json.dumps(settings))) as session:
         if late_s:  # it is a router at once, and a device later
             say("ready", "")
             time.sleep(late_s)
-        session.declare_subscriber("**", zenoh.handlers.Callback(heard))
+        session.declare_subscriber(subscribed, zenoh.handlers.Callback(heard))
         session.declare_queryable("robot/*", zenoh.handlers.Callback(asked))
         session.liveliness().declare_subscriber("**", zenoh.handlers.Callback(seen), history=True)
         token = session.liveliness().declare_token("robot/alive")

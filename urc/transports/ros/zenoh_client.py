@@ -43,7 +43,7 @@ from urc.transports.ros.zenoh_names import (
     type_of_key,
 )
 from urc.transports.ros.zenoh_options import Ros2Options, Ros2Topic
-from urc.transports.zenoh_session import ZenohSession
+from urc.transports.zenoh_session import MAX_KEY_BYTES, ZenohSession
 
 __all__ = ["RosZenohTransport"]
 
@@ -94,8 +94,6 @@ class RosZenohTransport:
         """Topic, type and hash of each published topic. A new connection declares all of them, so
         that the robot's graph shows them immediately."""
         self._node: _RosNode | None = None
-        self._awaited: tuple[str, ...] = ()
-        """Keys for whose subscribers the next connection waits; see `ZenohTransport`."""
 
     @property
     def address(self) -> str:
@@ -111,7 +109,6 @@ class RosZenohTransport:
                 session = ZenohSession(self._options.zenoh, stream)
                 try:
                     await session.start(timeout_s)
-                    await session.meet(self._awaited)
                     node = _RosNode(self._options, session, self._graph, self._published)
                     node.begin()
                 except BaseException:
@@ -121,7 +118,7 @@ class RosZenohTransport:
             raise ConnectFailed(late(self._options.zenoh.where, timeout_s)) from fault
         except zenoh.ZError as fault:
             raise ConnectFailed(one_line(str(fault))) from fault
-        self._node, self._awaited = node, ()
+        self._node = node
 
     async def receive(self) -> Envelope:
         """Return the next message or definition; raise `PeerClosed` at the end."""
@@ -155,7 +152,6 @@ class RosZenohTransport:
         if node is not None:
             node.end()
             await node.session.close()
-            self._awaited = node.session.recent()
 
     async def abort(self) -> None:
         """Close the connection immediately and discard unsent data. Never raises."""
@@ -163,7 +159,6 @@ class RosZenohTransport:
         if node is not None:
             node.end()
             await node.session.abort()
-            self._awaited = node.session.recent()
 
     async def settle(self) -> str:
         """Return a line that lists the published topics without subscribers, or ""."""
@@ -312,7 +307,9 @@ class _RosNode:
 
     def _token_came(self, sample: Any) -> None:
         is_put = sample.kind == zenoh.SampleKind.PUT
-        self.session.hand_over(partial(self._token, str(sample.key_expr), is_put))
+        key = str(sample.key_expr)
+        if len(key.encode()) <= MAX_KEY_BYTES:
+            self.session.hand_over(partial(self._token, key, is_put))
 
     def _token(self, key: str, is_put: bool) -> None:
         if not is_put:
