@@ -113,6 +113,7 @@ def test_stop_of_a_restored_connection_is_repeated_for_robots_that_come_later() 
     written = repeats(held, 9.0)
     assert written[0] == 0.0
     assert LATE_STOP_S - 0.25 < written[-1] <= LATE_STOP_S
+    assert len(written) <= 35, "more than the stops that are prepared for a control with counters"
     gaps = [later - one for one, later in itertools.pairwise(written)]
     assert max(gaps) <= 0.2 + 1e-6
     assert max(gaps[:9]) <= STOP_EVERY_S + 1e-6
