@@ -93,3 +93,15 @@ def test_kept_goals_are_bounded_and_the_newest_stay() -> None:
     for number in range(MAX_GOALS + 5):
         goals.add(str(number), "/dock")
     assert goals.cancel("/dock") == [str(number) for number in range(5, MAX_GOALS + 5)]
+
+
+@pytest.mark.parametrize(("status", "reason"), [(4, None), (5, "cancelled"), (6, "aborted")])
+def test_the_status_of_a_goal_counts_more_than_its_result(status: int, reason: str | None) -> None:
+    """rosbridge_suite reports `result: true` for each goal that has ended."""
+    client = RosClient(queue := TopicReceiveQueue(), 2, UnfinishedGoals())
+    (goal,) = sent(client, DOCK)
+    client.arrived({**ended(goal, status), "result": True}, 100)
+    (response,) = told(queue)
+    assert response.attributes["ok"] == (reason is None)
+    expected = None if reason is None else f"the action was {reason}"
+    assert response.attributes.get("reason") == expected

@@ -237,6 +237,7 @@ class RosClient:
 
 
 _OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+_NOT_REACHED = (5, 6)
 _ENDS = frozenset(_OUTCOMES.values())
 
 
@@ -300,7 +301,9 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         status = message.get("status")
         if status is None and isinstance(values, dict):
             status = values.get("status")
-        done = errback if message.get("result") is False else resultback
+        # Some versions of rosbridge report `result: true` for cancelled and aborted goals, too.
+        is_ok = message.get("result") is not False and status not in _NOT_REACHED
+        done = resultback if is_ok else errback
         done({"status": status, "values": values})
 
 
