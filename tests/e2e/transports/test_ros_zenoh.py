@@ -182,6 +182,8 @@ async def test_robot_sees_a_node_with_its_topics(distro: str, tmp_path: Path) ->
         await until(lambda: isinstance(value(session, "x"), float))
         await session.command("nudge", {"speed": 0.25})
         told = await other.next("heard", topic="cmd_stamped")
+        while not any("/MP/" in key for key in other.tokens):  # printed by another thread
+            await other.next("token")
         nodes = [key for key in other.tokens if "/NN/" in key]
         assert len(nodes) == 1
         head = re.fullmatch(r"(@ros2_lv/0/[0-9a-f]{1,32}/0)/0/NN/%/%/(urc_[0-9a-f]{6})", nodes[0])
