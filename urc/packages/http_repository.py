@@ -141,5 +141,5 @@ async def _exchange(
         async for piece in response.aiter_raw():
             content += piece
             if len(content) > most:
-                raise PackageError(f"{url}: received more than the expected {most} bytes")
+                raise PackageError(f"{url}: the response is larger than the limit of {most} bytes")
         return HttpResponse(status, response.headers.get("etag", ""), bytes(content))

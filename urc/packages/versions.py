@@ -25,7 +25,7 @@ _PART = re.compile(
 
 @lru_cache(maxsize=65536)
 def parse_version(text: str) -> Version:
-    """Return a parsed version; raise `PackageError` if it is invalid or contains build metadata.
+    """Parse `text` as a version; raise `PackageError` if it is invalid or contains build metadata.
 
     With build metadata, two equal versions could have different bytes.
     """
