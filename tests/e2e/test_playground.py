@@ -36,6 +36,7 @@ GESTURES = 5
 """Gestures until the robot has moved: the first one may only take the controls, and a pause of a
 busy machine ends a gesture."""
 PLACE = "some/path/playground"
+ROOT = Path(__file__).resolve().parents[2]
 FIRST = "dash/robots/turtlebot4.yaml"
 SAMPLE = Random(22).sample(DOCUMENTS, 12)  # noqa: S311  # no secret
 """A browser takes a second for each; `tests/contract/test_stand_ins.py` compares all of them."""
@@ -138,7 +139,9 @@ async def test_an_edit_changes_the_robot_and_an_error_does_not(page: Page) -> No
     await expect(title).to_have_text("Edited robot", timeout=WITHIN_MS)
     await area.fill(text.replace("kind: robot", "kind: robbot", 1))
     problem = page.locator(".urc-editor-problems li").first
-    await expect(problem).to_contain_text("line 9", timeout=WITHIN_MS)
+    lines = (ROOT / "robots/turtlebot4.yaml").read_text("utf-8").splitlines()
+    line = lines.index("kind: robot") + 1
+    await expect(problem).to_contain_text(f"line {line}", timeout=WITHIN_MS)
     await expect(title).to_have_text("Edited robot")
 
 
