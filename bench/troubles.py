@@ -1,7 +1,7 @@
-"""Data that a driven robot received after its real server was frozen or killed.
+"""Data that a driven robot receives after its program or server is frozen or killed.
 
-Signals either freeze the server for 5 s, or kill it. A new server starts 1 s after a kill.
-Several robots are driven in parallel, each with its own server, session and guard. An interrupted
+Signals either freeze the program for 5 s, or kill it. A new program starts 1 s after a kill.
+Several robots are driven in parallel, each with its own program, session and guard. An interrupted
 run can be resumed.
 """
 
@@ -15,7 +15,7 @@ from bench.harness import Result
 from bench.kept import Kept
 from bench.rig.freeze import HEARD_MS, Freeze, freeze
 
-__all__ = ["trouble"]
+__all__ = ["measured", "trouble"]
 
 TRIALS, TRIALS_IF_FULL = 2, 200
 ROBOTS = 2
@@ -30,27 +30,50 @@ def trouble(via: str, *, full: bool) -> Sequence[Result]:
         full: whether to make as many trials as the goal requires.
     """
     wanted = TRIALS_IF_FULL if full else TRIALS
-    return [_measured(via, "freeze", wanted), _measured(via, "kill", wanted)]
+    results = []
+    for kind in ("freeze", "kill"):
+        title = f"motion_{via}: {{}} trials of “{kind}” on the server"
+        figure = f"motion_{via}_{kind}"
+        results.append(measured(figure, title, wanted, via=via, is_killed=kind == "kill"))
+    return results
 
 
-def _measured(via: str, trouble: str, wanted: int) -> Result:
-    kept = Kept(f"motion_{via}-{trouble}-{wanted}")
+def measured(
+    figure: str,
+    title: str,
+    wanted: int,
+    *,
+    via: str = "rosbridge",
+    is_killed: bool = False,
+    robot_count: int = ROBOTS,
+) -> Result:
+    """Freeze or kill programs until enough trials are valid, and compare the data with the limits.
+
+    Args:
+        figure: name of the figure.
+        title: title of the result, with a placeholder for the number of valid trials.
+        wanted: number of valid trials.
+        via: kind of program, as for `freeze`.
+        is_killed: whether to kill the program instead of freezing it.
+        robot_count: number of robots that are driven in parallel.
+    """
+    kept = Kept(f"{figure}-{wanted}")
     while (left := wanted - len(_counted(kept.rows))) > 0:
         if len(kept.rows) >= 2 * wanted:
             break  # the machine is too busy
-        at_once = min(ROBOTS, left)
+        at_once = min(robot_count, left)
         asyncio.run(
             freeze(
                 -(-left // at_once),
                 robot_count=at_once,
-                lasts_s=5.0 if trouble == "freeze" else 1.0,
+                lasts_s=1.0 if is_killed else 5.0,
                 seed=len(kept.rows),
                 via=via,
-                is_killed=trouble == "kill",
+                is_killed=is_killed,
                 told=lambda one: kept.add({**one._asdict(), "excused": one.is_excused}),
             )
         )
-    return _told(via, trouble, kept.end(), wanted)
+    return _told(figure, title, kept.end(), wanted)
 
 
 def _counted(rows: Sequence[Mapping[str, object]]) -> list[Freeze]:
@@ -61,7 +84,7 @@ def _counted(rows: Sequence[Mapping[str, object]]) -> list[Freeze]:
     ]
 
 
-def _told(via: str, trouble: str, rows: Sequence[Mapping[str, object]], wanted: int) -> Result:
+def _told(figure: str, title: str, rows: Sequence[Mapping[str, object]], wanted: int) -> Result:
     said = _counted(rows)
     bad = [one for one in said if not one.is_good]
     stop = max((one.stop_ms for one in said), default=inf)
@@ -69,7 +92,7 @@ def _told(via: str, trouble: str, rows: Sequence[Mapping[str, object]], wanted: 
     limit = said[0].limit_ms if said else inf
     tell(
         {
-            "figure": f"motion_{via}_{trouble}",
+            "figure": figure,
             "trials": len(said),
             "broken": len(bad),
             "excused": len(rows) - len(said),
@@ -78,10 +101,10 @@ def _told(via: str, trouble: str, rows: Sequence[Mapping[str, object]], wanted: 
         }
     )
     for one in bad:
-        print(json.dumps({"broken": f"motion_{via}_{trouble}", **one._asdict()}), flush=True)
+        print(json.dumps({"broken": figure, **one._asdict()}), flush=True)
     worst = max(newest / HEARD_MS, stop / limit) if len(said) >= wanted and not bad else inf
     return Result(
-        name=f"motion_{via}: {len(said)} trials of “{trouble}” on the server: worst / limit",
+        name=f"{title.format(len(said))}: worst / limit",
         ratio=round(worst, 3),
         goal=1.0,
         baseline_ms=limit,

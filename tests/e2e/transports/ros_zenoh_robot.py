@@ -1,7 +1,7 @@
-"""A ROS 2 robot on Zenoh, as a program of its own: ``python -m … PORT DISTRO``.
+"""A ROS 2 robot on Zenoh, as a separate program: ``python -m … PORT DISTRO``.
 
-The router, the talker and the listener are from the wheel, and CDR is that of rosbags. It publishes
-odometry, a map for late joiners and a type that nobody knows. It prints what it is told.
+The wheel provides the router, the publishers and the subscribers; rosbags encodes the messages. The
+program publishes odometry, a map for late joiners and an unknown type, and prints all it receives.
 """
 
 import json

@@ -4,9 +4,8 @@ import asyncio
 import json
 import re
 import struct
-import sys
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ import xxhash
 
 from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.peers.zenoh import warm_up
+from tests.e2e.transports.peers.zenoh import other_program, warm_up
 from urc.config.load import load_profile
 from urc.model.payload import Envelope
 from urc.runtime.registries import built_in_catalog
@@ -113,20 +112,10 @@ class Robot:
 @asynccontextmanager
 async def robot(distro: str, port: int = 0) -> AsyncIterator[Robot]:
     port = port or free_port()
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "tests.e2e.transports.ros_zenoh_robot", str(port), distro),
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-    )
-    try:
+    async with other_program("tests.e2e.transports.ros_zenoh_robot", str(port), distro) as process:
         made = Robot(process, port)
         await made.next("ready")
         yield made
-    finally:
-        with suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
-        process._transport.close()  # type: ignore[attr-defined] # else it is closed too late
 
 
 @asynccontextmanager
@@ -226,7 +215,7 @@ async def receives_on(line: Transport) -> None:
 
 
 async def test_message_that_the_robot_could_not_read_is_refused() -> None:
-    """A definition that differs, a type that nobody knows, a name that is none, a latched topic."""
+    """A different definition, an unknown type, an invalid name, a latched topic."""
     int32 = "RIHS01_b6578ded3c58c626cfe8d1a6fb6e04f706f97e9f03d2727c9ff4e74b1cef0deb"
     known = {"type": "std_msgs/Int32", "hash": int32, "data": b"\0\1\0\0\1\0\0\0"}
     refused = {
@@ -264,7 +253,7 @@ async def test_stop_does_not_fail_for_a_cancel_and_the_log_says_so_once() -> Non
 
 
 async def test_mistakes_are_told(tmp_path: Path) -> None:
-    """A topic that nobody reads; one that nobody publishes; a type that the topic has not."""
+    """A topic without readers, a topic without publishers, and a wrong type."""
     wrong = (
         TopicSubscription("/gone", {"type": "std_msgs/String"}),
         TopicSubscription("/odom", {"type": "nav_msgs/Path"}),

@@ -5,9 +5,8 @@ import json
 import os
 import re
 import signal
-import sys
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ from tests.e2e.ports import free_port
 from tests.e2e.transports.authority import Authority
 from tests.e2e.transports.hostile import liar
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.peers.zenoh import warm_up
+from tests.e2e.transports.peers.zenoh import other_program, warm_up
 from urc.config.load import load_profile
 from urc.model.payload import Envelope
 from urc.problems import UrcError
@@ -140,23 +139,11 @@ async def device(
 ) -> AsyncIterator[Device]:
     """Run the router with its device, which subscribes to `key`, until the context ends."""
     port = port or free_port()
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "tests.e2e.transports.zenoh_device", str(port)),
-        json.dumps(settings),
-        str(late_s),
-        key,
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-    )
-    try:
+    arguments = (str(port), json.dumps(settings), str(late_s), key)
+    async with other_program("tests.e2e.transports.zenoh_device", *arguments) as process:
         made = Device(process, port)
         await made.next("ready")
         yield made
-    finally:
-        with suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
-        process._transport.close()  # type: ignore[attr-defined] # else it is closed too late
 
 
 async def test_another_program_hears_and_is_heard() -> None:

@@ -2,6 +2,9 @@
 
 import asyncio
 import json
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import zenoh
@@ -13,11 +16,11 @@ from urc.model.payload import Envelope
 from urc.transports.base import TopicSubscription, Transport, TransportSetup
 from urc.transports.zenoh import from_setup
 
-__all__ = ["ZenohPeer", "router_config"]
+__all__ = ["ZenohPeer", "other_program", "router_config", "warm_up"]
 
 
 def router_config(port: int, **more: object) -> Any:
-    """Return the settings of a router on a port of loopback, which looks for nobody."""
+    """Return the settings of a router on a loopback port, without scouting."""
     settings = {
         "mode": "router",
         "listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
@@ -27,8 +30,25 @@ def router_config(port: int, **more: object) -> Any:
     return zenoh.Config.from_json5(json.dumps(settings))
 
 
+@asynccontextmanager
+async def other_program(module: str, *arguments: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    """Run a module in a second process, with its input and output as pipes."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", module, *arguments),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+    )
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+        process._transport.close()  # type: ignore[attr-defined] # else it is closed too late
+
+
 def warm_up() -> None:
-    """Start the threads that the library keeps for good, so that nobody counts them as left."""
+    """Start the library's permanent threads, so that tests do not count them as left behind."""
     port = free_port()
     router = zenoh.open(router_config(port))
     client = {"mode": "client", "connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]}}
