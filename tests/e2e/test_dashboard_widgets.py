@@ -227,10 +227,16 @@ MARKS = """
   const look = (selector, name) => getComputedStyle(document.querySelector(selector))[name];
   const box = (selector) => document.querySelector(`.battery-lying ${selector}`).getBBox();
   const marks = box(".battery-limits"), shell = box(".battery-shell");
+  const level = document.querySelector(".battery-level"), probe = document.createElement("i");
+  probe.style.background = "var(--battery-tint)";
+  level.append(probe);
+  const tint = getComputedStyle(probe).backgroundColor;
+  probe.remove();
   return {
+    tint,
+    inside: look(".battery-inside", "fill"),
     mark: look(".battery-limits", "fill"),
     digits: look(".battery-number", "color"),
-    halo: look(".battery-number", "textShadow").match(/[a-z-]+\\([^)]*\\)/)[0],
     surface: getComputedStyle(document.querySelector(".urc-cell")).backgroundColor,
     reach: [shell.y - marks.y, marks.y + marks.height - shell.y - shell.height],
     numbers: document.querySelectorAll(".battery-number").length,
@@ -240,11 +246,11 @@ MARKS = """
 
 
 @pytest.mark.parametrize("theme", ["light", "dark", "sunlight", "night"])
-@pytest.mark.parametrize("level", [3, 100])
+@pytest.mark.parametrize("level", [3, 12, 100])
 async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
     new_page: PageMaker, theme: str, level: int
 ) -> None:
-    """The marks stand outside the shell; the digits have a rim of the other brightness."""
+    """The marks stand outside the shell; the digits are readable on the level and beside it."""
     robot = FakeRobot(dashboard_profile())
     async with running_dashboard(robot) as address:
         page = await new_page()
@@ -257,7 +263,7 @@ async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
         seen = await page.evaluate(MARKS)
         shades = {
             name: await page.evaluate(LUMINANCE, seen[name])
-            for name in ("mark", "digits", "halo", "surface")
+            for name in ("mark", "digits", "tint", "inside", "surface")
         }
 
     def contrast(one: str, other: str) -> float:
@@ -266,7 +272,8 @@ async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
 
     assert min(seen["reach"]) >= 5
     assert contrast("mark", "surface") >= 3
-    assert contrast("digits", "halo") >= 4.5
+    assert contrast("digits", "tint") >= 4.5
+    assert contrast("digits", "inside") >= 4.5
     assert seen["numbers"] == 1
 
 
