@@ -327,7 +327,8 @@ async def _session(
             emulated_robot = EmulatedRobot(profile, settings)
             stack.enter_context(faulty.watch(profile.name, emulated_robot))
             profile = await stack.enter_async_context(stand_in(profile, settings, emulated_robot))
-        session = Session(profile, settings, transports, motion=motion)
+        # All readers of a server count themselves as viewers.
+        session = Session(profile, settings, transports, motion=motion, pauses_images=True)
         if keep is not None:
             # The recording opens first and closes last, to capture the start and end of the
             # session.

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
+from urc.runtime.image_viewers import ImageViewers
 from urc.runtime.redaction import Redactor
 
 if TYPE_CHECKING:
@@ -278,6 +279,8 @@ class Hub:
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_watchers = 0
         """Number of traffic readers; traffic is recorded only if this number is above 0."""
+        self.viewers = ImageViewers()
+        """Number of viewers of each image; a tap counts as a viewer of all images."""
         self.streams = SampleHistory()
         """Recent readings of the signals that keep every reading; empty by default."""
         self._latest: dict[str, Sample] = {}
@@ -444,7 +447,8 @@ class Hub:
             self._traffic_taps.add(tap)
             self.traffic_watchers += 1
         try:
-            yield tap
+            with self.viewers.viewing():
+                yield tap
         finally:
             self._taps.discard(tap)
             if with_traffic:

@@ -12,12 +12,12 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
 from urc.model.driver import STOPPED, Driver
-from urc.model.payload import Payload
+from urc.model.payload import Envelope, Payload
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
-from urc.protocol.events import Failed, MotionEvent, Replied, Request
+from urc.protocol.events import Failed, MotionEvent, Replied, Request, Send
 from urc.protocol.requests.bounds import GOOD_BYE_S, lines_of, longest_s
 from urc.protocol.sequences.sequence_control import PAUSE_S, Pull
 from urc.protocol.values.time_and_nonce import TimeAndNonce
@@ -27,6 +27,7 @@ from urc.runtime.command_failed import CommandFailed
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.held_commands import is_lossy
 from urc.runtime.hub import Hub
+from urc.runtime.image_demand import ImageDemand, pausable_topics
 from urc.runtime.link import Link
 from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
@@ -97,6 +98,7 @@ class Session:
         clock: Clock | None = None,
         random: Callable[[], float] = random_share,
         motion: Motion = "none",
+        pauses_images: bool = False,
     ) -> None:
         """Prepare the session without opening connections.
 
@@ -107,6 +109,8 @@ class Session:
             clock: source of time; None for the clock of the running event loop.
             random: function that returns a number in [0, 1) for the jitter of the backoff.
             motion: writer of held-command frames; see `Motion`.
+            pauses_images: whether to pause the topics of images without viewers. All readers of
+                images must then count themselves in ``hub.viewers``.
 
         Raises:
             UrcError: a setting has no value, or a transport cannot be built with the settings.
@@ -146,6 +150,12 @@ class Session:
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
+        self._demand = ImageDemand(
+            pausable_topics(driver, self.settings) if pauses_images else {},
+            self.hub,
+            self._send_message,
+            self._clock,
+        )
 
     def _make_backend(
         self, engine: Engine, transports: Table, motion: Motion
@@ -185,6 +195,9 @@ class Session:
             self._dispatcher.attach(name, link)
         return links
 
+    def _send_message(self, transport: str, envelope: Envelope) -> None:
+        self._links[transport].send(Send(transport, envelope))
+
     def _tell_motion(self, event: MotionEvent) -> None:
         if self.on_motion is not None:
             self.on_motion(event)
@@ -200,6 +213,7 @@ class Session:
         if self.backend is not None:
             self.backend.start()
         self._tasks = [self._group.create_task(link.run()) for link in self._links.values()]
+        self._tasks.append(self._group.create_task(self._demand.run()))
         self._dispatcher.wind_up()
         return self
 

@@ -173,7 +173,7 @@ class BrowserClient:
             log.warning("a client read nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
-            live.fanout.leave(self._flushed)
+            live.fanout.leave(self._flushed, self._place)
             self._service.alarm_feed.leave(self._news.set)
 
     async def _refuse(self, code: int, reason: str) -> None:
@@ -293,7 +293,7 @@ class BrowserClient:
             self._drive(asked)
         elif isinstance(asked, ImageSelection):
             self._news.set()
-            self._place.subscription.show(asked.signals)
+            live.fanout.show(self._place, asked.signals)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)
         elif isinstance(asked, ScreenName):

@@ -208,7 +208,7 @@ def test_a_client_that_left_is_not_woken() -> None:
     clock = FakeClock()
     hub, fanout = robot(clock)
     client = Watcher(fanout)
-    fanout.leave(client.wake)
+    fanout.leave(client.wake, client.place)
     put(hub, clock, a=1)
     fanout.flush()
     assert client.woken == 0

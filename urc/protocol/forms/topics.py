@@ -7,6 +7,7 @@ the end for all following levels. On Zenoh, a topic is a key expression
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
 
 from urc.expressions import ExpressionError
 from urc.key_expressions import key_matches
@@ -18,7 +19,16 @@ from urc.problems import UrcError
 from urc.protocol.ros.wanted import Path, paths_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
 
-__all__ = ["TopicReader", "frame_of", "listened", "matches", "paths_by_topic", "topic_of"]
+__all__ = [
+    "ReadTopic",
+    "TopicReader",
+    "frame_of",
+    "listened",
+    "matches",
+    "paths_by_topic",
+    "read_topics",
+    "topic_of",
+]
 
 FEEDBACK = "/feedback"
 """Suffix that turns an action's name into the name of its feedback topic."""
@@ -116,6 +126,30 @@ def listened(
             for name, value in read.listen.items():
                 mine.setdefault(name, value)
     return dict(topics)
+
+
+class ReadTopic(NamedTuple):
+    """A topic that a driver reads."""
+
+    fields: frozenset[str]
+    """Signals and other fields that the topic's messages set."""
+    is_only_listened: bool
+    """Whether messages alone read the topic: no reply, step or acknowledgement needs it."""
+
+
+def read_topics(
+    driver: Driver, transport: str, settings: Mapping[str, object]
+) -> dict[str, ReadTopic]:
+    """Return the topics that a driver reads on a transport, keyed by topic."""
+    listening = [one for one in driver.messages.values() if one.transport == transport]
+    simple = [one.read for one in listening if one.acknowledge is None]
+    found: dict[str, ReadTopic] = {}
+    for read in _reads(driver, transport):
+        if read.topic is not None and (topic := topic_of(read, settings)):
+            fields, is_only = found.get(topic, ReadTopic(frozenset(), is_only_listened=True))
+            is_simple = any(read is one for one in simple)
+            found[topic] = ReadTopic(fields | set(read.fields), is_only and is_simple)
+    return found
 
 
 def paths_by_topic(

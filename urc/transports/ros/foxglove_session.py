@@ -122,6 +122,8 @@ class FoxgloveSession:
         self._channels: dict[int, AdvertisedChannel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._topics: dict[str, _Subscription] = {}
+        self._paused: set[str] = set()
+        """Topics that the driver does not need at present."""
         self._services: dict[str, ServiceType] = {}
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
@@ -223,7 +225,8 @@ class FoxgloveSession:
         """Subscribe to the driver's topics after the channels have changed."""
         found: dict[str, AdvertisedChannel] = {}
         for channel in self._channels.values():
-            if channel.topic in self._wishes and channel.encoding in _ENCODINGS:
+            is_wanted = channel.topic in self._wishes and channel.topic not in self._paused
+            if is_wanted and channel.encoding in _ENCODINGS:
                 found.setdefault(channel.topic, channel)
         gone = [one for one in self._topics.values() if found.get(one.wish.topic) != one.channel]
         for one in gone:
@@ -401,6 +404,10 @@ class FoxgloveSession:
         elif envelope.verb == "goal":
             reason = "the Foxglove protocol has no actions; use via: rosbridge"
             self._answer(envelope.attributes.get("id"), reason)
+        elif envelope.verb in ("subscribe", "unsubscribe"):
+            change = self._paused.discard if envelope.verb == "subscribe" else self._paused.add
+            change(str(envelope.attributes.get("topic")))
+            self.reconcile()
         else:
             raise TransportError(f"this connection cannot {envelope.verb}")
 

@@ -265,7 +265,11 @@ class _Session:
             await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
-        """Send an envelope as a rosbridge operation."""
+        """Send an envelope as a rosbridge operation, or pause or resume a subscription."""
+        if envelope.verb in ("subscribe", "unsubscribe"):
+            change = self._client.resume if envelope.verb == "subscribe" else self._client.pause
+            await self._write(change(str(envelope.attributes.get("topic"))))
+            return
         frames = self._client.perform(envelope)
         if envelope.verb == "publish":
             topic = str(envelope.attributes.get("topic"))

@@ -68,6 +68,8 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals = UnfinishedGoals() if goals is None else goals
+        self._listened: dict[str, tuple[RosSubscription, _Topic]] = {}
+        """Topics that were subscribed on this connection."""
         self._told: set[str] = set()
         """Actions for which a `cancel` without a known goal was reported."""
 
@@ -94,7 +96,20 @@ class RosClient:
             reconnect_on_close=False,
         )
         topic.subscribe(lambda body: self._message(wanted.topic, body))
+        self._listened[wanted.topic] = wanted, topic
         return self._protocol.written()
+
+    def pause(self, name: str) -> list[bytes]:
+        """Unsubscribe from a topic of `listen`; return the frames to send."""
+        known = self._listened.get(name)
+        if known is not None and known[1].is_subscribed:
+            known[1].unsubscribe()
+        return self._protocol.written()
+
+    def resume(self, name: str) -> list[bytes]:
+        """Subscribe to a paused topic again; return the frames to send."""
+        known = self._listened.get(name)
+        return [] if known is None or known[1].is_subscribed else self.listen(known[0])
 
     def cancel_again(self) -> list[bytes]:
         """Repeat the cancellations without results, which an earlier connection may have lost."""

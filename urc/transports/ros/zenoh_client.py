@@ -142,6 +142,9 @@ class RosZenohTransport:
         if data.verb == "cancel":  # this connection has started no goal; STOP must not fail for it
             node.nothing_cancelled()
             return
+        if data.verb in ("subscribe", "unsubscribe"):
+            node.pause(str(data.attributes.get("topic")), is_paused=data.verb == "unsubscribe")
+            return
         if data.verb != "publish":
             raise TransportError(f"ros over zenoh cannot {data.verb}; supported: publish")
         await node.publish(data)
@@ -252,6 +255,20 @@ class _RosNode:
             remote = zenoh.Locality.REMOTE
             one.declared = self._library.declare_subscriber(keys, handler, allowed_origin=remote)
 
+    def pause(self, topic: str, *, is_paused: bool) -> None:
+        """Undeclare a subscription while the driver does not need its topic, or declare it again.
+
+        The token remains, so the node's place in the robot's graph does not change.
+        """
+        one = self._subscriptions.get(f"/{topic.strip('/')}")
+        if one is None or (one.declared is None) == is_paused:
+            return
+        if is_paused:
+            one.declared.undeclare()
+            one.declared = None
+        else:
+            self._subscribe(one)
+
     def _sample_came(self, one: _Subscription, sample: Any) -> None:
         """Hand a message over to the event loop; called from the library's threads."""
         if sample.kind == zenoh.SampleKind.PUT:
@@ -325,8 +342,9 @@ class _RosNode:
         one.is_transient = True
         before, one.declared = one.declared, None
         with suppress(zenoh.ZError, TransportError):  # the connection has ended
-            self._subscribe(one)
-            before.undeclare()
+            if before is not None:  # otherwise, it is paused
+                self._subscribe(one)
+                before.undeclare()
 
     def _check_topics(self) -> None:
         self._learn()

@@ -120,7 +120,7 @@ class EventStream:
 
     async def _write(self, send: Send) -> None:
         wake = self._news.set
-        self._live.fanout.join(wake)
+        place = self._live.fanout.join(wake)
         try:
             while True:
                 self._news.clear()
@@ -137,7 +137,7 @@ class EventStream:
                 except TimeoutError:
                     await _send(send, _COMMENT)
         finally:
-            self._live.fanout.leave(wake)
+            self._live.fanout.leave(wake, place)
 
     def _newest(self) -> bytes:
         """Return events with all changes since the last call; b"" if nothing has changed."""

@@ -16,10 +16,11 @@ from starlette.responses import Response
 from starlette.types import ASGIApp
 
 from urc.images import media_type
-from urc.model.values import BINARY_TYPES, Reading
+from urc.model.values import BINARY_TYPES, Reading, Signal
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
 from urc.runtime.contact_times import ContactTimes
+from urc.runtime.hub import Hub
 from urc.runtime.one_shot_commands import HELD, OUT_OF_SCOPE, role_refusal
 from urc.web.api.describe import robot_info, summary
 from urc.web.api.documents import document_of
@@ -160,6 +161,8 @@ class RobotCalls:
             live = await opened(service, self._peer(request, name), stack)
             hub = live.session.hub
             await _first(service, live, lambda: hub.latest(wanted) is not None)
+            if signal.type in BINARY_TYPES:
+                await _renewed(service, live, signal)
             sample, now_s = hub.latest(wanted), service.clock.now()
         if signal.type not in BINARY_TYPES:
             return answer(value_of(signal, sample, now_s))
@@ -306,14 +309,30 @@ class RobotCalls:
         return self.sessions.find(secret, service, visitor_of(request).identity)
 
 
+async def _renewed(service: RobotService, live: LiveSession, signal: Signal) -> None:
+    """Wait for a new image if the newest is stale, because images without viewers are paused."""
+    hub, clock = live.session.hub, service.clock
+    hub.viewers.glance(signal.name, clock.now())
+    old = hub.latest(signal.name)
+    if old is None or clock.now() - old.time_s <= signal.stale_after_s:
+        return
+    await _awaited(service, hub, FIRST_VALUE_S, lambda: hub.latest(signal.name) is not old)
+
+
 async def _first(service: RobotService, live: LiveSession, is_there: Callable[[], bool]) -> None:
     """Wait for the first value, for at most `FIRST_VALUE_S` seconds after connecting."""
     hub = live.session.hub
     left_s = live.began_s + FIRST_VALUE_S - service.clock.now()
-    if is_there() or left_s <= 0:
-        return
+    if not is_there() and left_s > 0:
+        await _awaited(service, hub, left_s, is_there)
+
+
+async def _awaited(
+    service: RobotService, hub: Hub, most_s: float, is_there: Callable[[], bool]
+) -> None:
+    """Wait for a change of the hub, for at most `most_s` seconds."""
     with suppress(TimeoutError), hub.subscribe() as subscription:
-        async with within(service.clock, left_s):
+        async with within(service.clock, most_s):
             while not is_there():
                 subscription.seen = hub.revision
                 await subscription.changed()

@@ -154,9 +154,17 @@ class Fanout:
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
 
-    def leave(self, wake: Callable[[], None]) -> None:
-        """Stop calling `wake`."""
+    def show(self, place: Place, names: Iterable[str]) -> None:
+        """Set the images that a client shows, and count the client as their viewer."""
+        viewers, subscription = self.hub.viewers, place.subscription
+        viewers.remove(subscription.names)
+        subscription.show(names)
+        viewers.add(subscription.names)
+
+    def leave(self, wake: Callable[[], None], place: Place) -> None:
+        """Stop calling `wake`; the client at `place` has left."""
         self._wakes.discard(wake)
+        self.show(place, ())
 
     def frames_for(self, place: Place) -> bytes:
         """Return the frames that the client at `place` lacks, and advance `place`."""

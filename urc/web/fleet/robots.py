@@ -307,7 +307,13 @@ class RobotService:
         if self.robot.glimpse is not None and not self.robot.profile.picture:
             return self.robot.glimpse()
         live = self.open_session
-        return _view(live.session.hub) if live is not None else self._last_picture
+        if live is None:
+            return self._last_picture
+        hub = live.session.hub
+        name = _first_image(hub)
+        if name:
+            hub.viewers.glance(name, self.clock.now())
+        return _view(hub)
 
     def _keep_picture(self, hub: Hub) -> None:
         """Store the last image of a session for the menu."""
@@ -511,9 +517,18 @@ class RobotService:
             coming.exception()  # marks the exception as retrieved
 
 
+def _first_image(hub: Hub) -> str:
+    """Return the name of the first signal with an image; "" if no image has arrived."""
+    samples = ((name, hub.latest(name)) for name in hub.signals)
+    return next(
+        (name for name, one in samples if one is not None and isinstance(one.value, bytes)), ""
+    )
+
+
 def _view(hub: Hub) -> Glimpse:
     """Return a robot's first image, or its values if it has no image; None without data."""
+    image = hub.latest(_first_image(hub))
+    if image is not None:
+        return image.value if isinstance(image.value, bytes) else None
     samples = {name: hub.latest(name) for name in hub.signals}
-    values = {name: one.value for name, one in samples.items() if one is not None}
-    pictures = (value for value in values.values() if isinstance(value, bytes))
-    return next(pictures, None) or values or None
+    return {name: one.value for name, one in samples.items() if one is not None} or None

@@ -44,6 +44,8 @@ class RobotFeed:
         """Number of connection state changes at the last check."""
         self._dropped = 0
         self._hub: Hub | None = None
+        self._viewed: tuple[str, ...] = ()
+        """Signals of which this client counts as a viewer."""
         self._messages: HubMessages | None = None
 
     @property
@@ -98,6 +100,7 @@ class RobotFeed:
             with hub.passed_to(self._arrived), hub.heed(self._changed):
                 yield
         finally:
+            self._view(hub, ())
             self._hub = self._messages = None
             self._ready.clear()
             for waiting in self._waiting.values():
@@ -124,6 +127,13 @@ class RobotFeed:
                 names = set(self._messages.signals_of(source.name) if self._messages else ())
             for name in names:
                 self._sources.setdefault(name, []).append(source)
+        if self._hub is not None:
+            self._view(self._hub, tuple(self._sources))
+
+    def _view(self, hub: Hub, names: tuple[str, ...]) -> None:
+        hub.viewers.remove(self._viewed)
+        hub.viewers.add(names)
+        self._viewed = names
 
     def _arrived(self, samples: Sequence[Sample]) -> None:
         """Collect the readings of subscribed signals, and the messages of changed slots."""
