@@ -109,8 +109,7 @@ class Session:
             clock: source of time; None for the clock of the running event loop.
             random: function that returns a number in [0, 1) for the jitter of the backoff.
             motion: writer of held-command frames; see `Motion`.
-            pauses_images: whether to pause the topics of images without viewers. All readers of
-                images must then count themselves in ``hub.viewers``.
+            pauses_images: whether to pause topics of images without viewers in ``hub.viewers``.
 
         Raises:
             UrcError: a setting has no value, or a transport cannot be built with the settings.
@@ -144,18 +143,11 @@ class Session:
         """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links whose first connection attempt has not ended; commands wait for it in order of
-        arrival.
-        """
+        """Links before the end of their first attempt; commands wait for it in order of arrival."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
-        self._demand = ImageDemand(
-            pausable_topics(driver, self.settings) if pauses_images else {},
-            self.hub,
-            self._send_message,
-            self._clock,
-        )
+        self._pauses_images = pauses_images
 
     def _make_backend(
         self, engine: Engine, transports: Table, motion: Motion
@@ -213,7 +205,10 @@ class Session:
         if self.backend is not None:
             self.backend.start()
         self._tasks = [self._group.create_task(link.run()) for link in self._links.values()]
-        self._tasks.append(self._group.create_task(self._demand.run()))
+        if self._pauses_images:
+            topics = pausable_topics(self.profile.driver, self.settings)
+            demand = ImageDemand(topics, self.hub, self._send_message, self._clock)
+            self._tasks.append(self._group.create_task(demand.run()))
         self._dispatcher.wind_up()
         return self
 
