@@ -29,6 +29,7 @@ from urc.protocol.events import (
 )
 from urc.protocol.sequences.sequence_control import Pull, SequenceControl
 from urc.runtime.clock import Clock, Timer
+from urc.runtime.grid_encoder import GridEncoder
 from urc.runtime.hub import Hub, LogEntry, SequenceProgress
 
 __all__ = ["MAX_WAITING", "Dispatcher", "EngineLike", "LinkPort"]
@@ -199,6 +200,7 @@ class Dispatcher:
         limit_s: Callable[[str], float],
         sequence_control: Mapping[str, SequenceControl] = NOTHING,
         motion: Callable[[MotionEvent], None] | None = None,
+        grids: GridEncoder | None = None,
     ) -> None:
         """Create the dispatcher for an engine.
 
@@ -211,6 +213,8 @@ class Dispatcher:
                 the engine is still working on it.
             sequence_control: state and controls of each sequence, by sequence name.
             motion: handler of held-command events; None ignores the events.
+            grids: encoder of the occupancy grids that the engine does not encode; None if the
+                engine encodes all grids.
         """
         self._engine = engine
         self._hub = hub
@@ -219,6 +223,7 @@ class Dispatcher:
         self._ports: dict[str, LinkPort] = {}
         self._waiting = PendingCommands(clock, limit_s)
         self._motion = motion
+        self._grids = grids
         self._sequence_control = dict(sequence_control)
         self._seen = dict.fromkeys(sequence_control, 0)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -313,6 +318,8 @@ class Dispatcher:
         if self._alarm is not None:
             self._alarm.cancel()
         self._waiting.close(reason)
+        if self._grids is not None:
+            self._grids.close()
 
     def _refusal(self, request: Request) -> Failed:
         """Return the failure of a request that is refused before it reaches the engine."""
@@ -359,6 +366,8 @@ class Dispatcher:
             else:
                 is_changed = True
                 self._change(event)
+        if samples and self._grids is not None:
+            samples = self._grids.take(samples)
         if samples:
             self._hub.publish(samples)
         # After the hub, because a caller that receives a reply must find the readings there.

@@ -25,6 +25,7 @@ from urc.registry import Table
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.command_failed import CommandFailed
 from urc.runtime.dispatcher import Dispatcher
+from urc.runtime.grid_encoder import GridEncoder
 from urc.runtime.held_commands import is_lossy
 from urc.runtime.hub import Hub
 from urc.runtime.image_demand import ImageDemand, pausable_topics
@@ -137,6 +138,7 @@ class Session:
             partial(_limit_s, driver),
             {name: program.sequence_control for name, program in engine.programs.items()},
             self._tell_motion,
+            self._made_encoder(engine),
         )
         self._links = self._made_links(transports, random)
         self.on_motion: Callable[[MotionEvent], None] | None = None
@@ -163,6 +165,13 @@ class Session:
         engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
         backend.on_stand = partial(self._counters_told, engine)
         return backend
+
+    def _made_encoder(self, engine: Engine) -> GridEncoder | None:
+        """Return the encoder of the robot's occupancy grids; None for a robot without grids."""
+        if all(one.type != "occupancy_grid" for one in self.profile.driver.signals.values()):
+            return None
+        engine.readings.defer_grids()
+        return GridEncoder(self.hub.publish)
 
     def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
         driver = self.profile.driver

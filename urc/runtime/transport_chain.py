@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 
 from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
-from urc.protocol.forms.topics import listened
+from urc.protocol.forms.topics import listened, packed_topics
 from urc.registry import Table
 from urc.runtime.settings import options_of
 from urc.transports.base import TopicSubscription, Transport, TransportSetup, Tunnel
@@ -46,6 +46,8 @@ def make_lines(
             options, topics = options_of(spec, settings), listened(driver, name, settings)
             if spec.type == "ros" and options.get("via") == "zenoh":
                 topics = _with_hashes(topics)
+            elif spec.type == "ros":
+                topics = _with_packed(topics, packed_topics(driver, name, settings))
             setup = TransportSetup(
                 name,
                 options,
@@ -68,6 +70,15 @@ def _with_hashes(topics: dict[str, Mapping[str, Value]]) -> dict[str, Mapping[st
     return {
         topic: {**how, "hash": known_hash(str(how["type"]))} if "type" in how else how
         for topic, how in topics.items()
+    }
+
+
+def _with_packed(
+    topics: dict[str, Mapping[str, Value]], packed: frozenset[str]
+) -> dict[str, Mapping[str, Value]]:
+    """Mark the topics whose cells the driver reads as bytes."""
+    return {
+        topic: {**how, "packed": True} if topic in packed else how for topic, how in topics.items()
     }
 
 

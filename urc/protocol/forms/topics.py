@@ -16,7 +16,7 @@ from urc.model.payload import Envelope, Payload, ReadSpec
 from urc.model.sequence import ExpectStep, all_steps
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.protocol.ros.wanted import Path, paths_of
+from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "frame_of",
     "listened",
     "matches",
+    "packed_topics",
     "paths_by_topic",
     "read_topics",
     "topic_of",
@@ -162,6 +163,18 @@ def paths_by_topic(
             grids = {name for name, one in driver.signals.items() if one.type == "occupancy_grid"}
             found.setdefault(topic_of(read, settings), []).extend(paths_of(read, grids))
     return found
+
+
+def packed_topics(driver: Driver, transport: str, settings: Mapping[str, object]) -> frozenset[str]:
+    """Return the topics of occupancy grids whose cells no declaration reads as numbers."""
+    grids = any(one.type == "occupancy_grid" for one in driver.signals.values())
+    found = paths_by_topic(driver, transport, settings) if grids else {}
+    wanted = {topic: wanted_of(set(paths)) for topic, paths in found.items()}
+    return frozenset(
+        topic
+        for topic, parts in wanted.items()
+        if isinstance(parts, dict) and parts.get("data") == {PACKED: ALL}
+    )
 
 
 def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:

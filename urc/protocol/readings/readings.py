@@ -48,6 +48,8 @@ class Readings:
         self.signals = signals
         self.settings: Mapping[str, object] = names.get("settings", NOTHING)  # type: ignore[assignment]
         self._converters: dict[str, Convert] = {}
+        self._defers_grids = False
+        self._kept: frozenset[str] = frozenset()  # `_in_order` below creates converters
         self._alarm_monitors = {
             name: AlarmMonitor(one.limits)
             for name, one in signals.items()
@@ -101,6 +103,13 @@ class Readings:
             convert = self._converters.get(name)
             if isinstance(convert, GridConverter):
                 convert.forget()
+
+    def defer_grids(self) -> None:
+        """Return occupancy grids as `UnencodedGrid` from now on, except those that formulas use."""
+        self._defers_grids = True
+        for name, convert in self._converters.items():
+            if isinstance(convert, GridConverter):
+                convert.is_deferring = name not in self._kept
 
     def set_values(
         self, values: Mapping[str, object], now: float
@@ -209,7 +218,9 @@ class Readings:
 
     def _converter(self, name: str) -> Convert:
         if name not in self._converters:
-            self._converters[name] = build_converter(self.signals[name])
+            convert = self._converters[name] = build_converter(self.signals[name])
+            if isinstance(convert, GridConverter):
+                convert.is_deferring = self._defers_grids and name not in self._kept
         return self._converters[name]
 
     def _in_order(self) -> Iterable[_Computed]:

@@ -1,7 +1,8 @@
 """Occupancy grids: a ROS message on one side, an indexed PNG image on the other.
 
 Pure. The value of a signal of type ``occupancy_grid`` is a PNG image with one pixel per cell. The
-image is encoded once, when the message arrives, and then travels like a camera image. A palette
+image is encoded once, and then travels like a camera image. Encoding a large grid takes long, so a
+live session receives the grid as an `UnencodedGrid`, and encodes it in a thread. A palette
 index is the cell's byte in the message: 0 to 100 is the occupancy in percent, and 255 (−1) is
 unknown. The first row of the image is the far end of the grid's y axis, so that every image viewer
 shows the map upright. The text chunk `KEYWORD` contains the frame, the resolution and the origin as
@@ -27,12 +28,12 @@ from urc.expressions import quoted
 from urc.model.values import Reading
 from urc.protocol.values.convert import BadValue, Unusable
 
-__all__ = ["KEYWORD", "MAX_CELLS", "MAX_SIDE", "Grid", "GridConverter", "encode_grid"]
-__all__ += ["grid_message", "read_grid"]
+__all__ = ["KEYWORD", "MAX_CELLS", "MAX_SIDE", "Grid", "GridConverter", "UnencodedGrid"]
+__all__ += ["encode_grid", "grid_message", "read_grid"]
 
 MAX_CELLS: Final = 4_000_000
-"""Maximum number of cells in an occupancy grid. Encoding this many cells takes up to 100 ms, or
-150 ms if they arrive as numbers."""
+"""Maximum number of cells in an occupancy grid. A thread encodes this many cells in up to 0.5 s;
+meanwhile, the server works on."""
 MAX_SIDE: Final = 8192
 """Maximum number of cells along one side of an occupancy grid. Larger images can't be drawn by the
 graphics hardware of many phones."""
@@ -69,6 +70,16 @@ class Grid(NamedTuple):
     """One byte per cell, row by row from the origin; 255 means unknown."""
 
 
+class UnencodedGrid:
+    """A grid in place of its image, as the value of a sample that still has to be encoded."""
+
+    __slots__ = ("grid",)
+
+    def __init__(self, grid: Grid) -> None:
+        """Store the grid; the same grid always means the same image."""
+        self.grid = grid
+
+
 class GridConverter:
     """The conversion of grids and updates to images, for one signal of one connection.
 
@@ -78,6 +89,8 @@ class GridConverter:
     def __init__(self) -> None:
         self._last: Grid | None = None
         self._image = b""
+        self.is_deferring = False
+        """Whether values are `UnencodedGrid` objects instead of images."""
 
     def __call__(self, raw: object) -> Reading:
         """Return the image of a message, or of the last grid with an update.
@@ -101,8 +114,11 @@ class GridConverter:
                 return None
         else:
             grid = self._updated(raw)
-        if grid != self._last:
-            self._last, self._image = grid, encode_grid(grid)
+        if self._last is None or grid != self._last:
+            self._last, self._image = grid, b""
+        if self.is_deferring:
+            return cast("Reading", UnencodedGrid(self._last))
+        self._image = self._image or encode_grid(self._last)
         return self._image
 
     def forget(self) -> None:

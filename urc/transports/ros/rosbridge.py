@@ -39,6 +39,7 @@ from urc.transports.base import (
 )
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph, version_of
+from urc.transports.ros.rosbridge_cells import LARGE_BYTES, packed_operation
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -102,7 +103,8 @@ class RosbridgeTransport:
 
     async def begin(self, timeout_s: float) -> None:
         """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
-        session = self._session = _Session(self._wire, self._ros, self._graph, self._goals)
+        packed = frozenset(one.topic for one in self._subscriptions if one.is_packed)
+        session = self._session = _Session(self._wire, self._ros, self._graph, self._goals, packed)
         try:
             async with asyncio.timeout(timeout_s):
                 await session.start(self._subscriptions, min(_ANSWER_S, timeout_s * _PART))
@@ -204,6 +206,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
         number("throttle", 1000),
         number("queue_length"),
         str(compression),
+        attributes.get("packed") is True,
     )
 
 
@@ -231,12 +234,14 @@ class _Session:
         ros: int | Literal["auto"] | None,
         graph: TopicGraph,
         goals: UnfinishedGoals,
+        packed: frozenset[str],
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
         self._client = RosClient(self.queue, None if ros == AUTO else ros, goals)
         self._is_auto = ros == AUTO
-        self._frames = OperationReader()
+        self._frames = OperationReader(packed)
+        self._packed = packed
         self._graph = graph
         self._learnt = asyncio.Event()
         """Event that is set after rosapi has listed the topics, or has failed."""
@@ -349,7 +354,11 @@ class _Session:
         began_s = clock()
         try:
             while True:
-                self._receive(await self._wire.receive())
+                frame = await self._wire.receive()
+                operation = None
+                if self._packed and len(frame) > LARGE_BYTES and frame.startswith(b"{"):
+                    operation = await packed_operation(frame, self._packed)
+                self._receive(frame, operation)
                 # Buffered frames need no waiting, and some take a long time to parse.
                 if self.queue.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
@@ -357,9 +366,10 @@ class _Session:
         except TransportError as ended:
             self.queue.end(str(ended))
 
-    def _receive(self, frame: bytes) -> None:
+    def _receive(self, frame: bytes, operation: dict[str, Any] | None) -> None:
+        """Process a frame; `operation` is the frame's operation if it is already decoded."""
         try:
-            operation = self._frames.read(frame)
+            operation = operation or self._frames.read(frame)
             if operation is not None:
                 self._client.arrived(operation, len(frame))
         except BadOperation as problem:

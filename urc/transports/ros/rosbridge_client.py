@@ -45,6 +45,8 @@ class RosSubscription(NamedTuple):
     throttle_ms: int = 0
     queue_length: int = 0
     compression: str = "none"
+    is_packed: bool = False
+    """Whether arrays of ``int8`` in the topic's messages are wanted as bytes."""
 
 
 class RosClient:

@@ -11,6 +11,7 @@ import binascii
 import math
 import struct
 import zlib
+from array import array
 from collections.abc import Mapping
 from typing import Any
 
@@ -66,7 +67,9 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
 class OperationReader:
     """Decodes the frames of one connection, and joins fragmented operations."""
 
-    def __init__(self) -> None:
+    def __init__(self, packed: frozenset[str] = frozenset()) -> None:
+        """Create a reader; typed arrays of ``int8`` stay bytes in CBOR of the topics `packed`."""
+        self._packed = packed
         self._halves: dict[str, dict[int, str]] = {}
         """Fragments of each incomplete operation, keyed by operation id and fragment number."""
         self._sizes: dict[str, int] = {}
@@ -80,7 +83,7 @@ class OperationReader:
             BadOperation: the frame is invalid.
         """
         if frame[:1] >= _CBOR_MAP:
-            return _operation(_read_cbor(frame))
+            return _operation(_read_cbor(frame, self._packed))
         operation = _read_json(frame)
         # At most two levels of nesting: fragments of a PNG.
         for _ in range(2):
@@ -139,11 +142,13 @@ def _read_json(text: bytes | str) -> dict[str, Any]:
         raise BadOperation(f"a frame is not JSON ({problem})") from problem
 
 
-def _read_cbor(data: bytes) -> object:
+def _read_cbor(data: bytes, packed: frozenset[str]) -> object:
     import cbor2  # needed only for subscriptions with CBOR
 
     try:
-        return _Plain(len(data)).of(cbor2.loads(data, tag_hook=_tagged))
+        found = cbor2.loads(data, tag_hook=_tagged)
+        topic = found.get("topic") if isinstance(found, dict) else None
+        return _Plain(len(data), is_packed=isinstance(topic, str) and topic in packed).of(found)
     except (cbor2.CBORError, ValueError, RecursionError, MemoryError) as problem:
         raise BadOperation(f"a frame is not CBOR ({problem})") from problem
 
@@ -154,6 +159,8 @@ def _tagged(first: Any, second: Any) -> object:
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
         raise ValueError(f"the CBOR tag {tag.tag} is unknown")
+    if code == "b":
+        return _Signed(data)
     found = _Numbers if code in _WHOLE else list
     return found(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
 
@@ -162,14 +169,25 @@ class _Numbers(list[int]):
     """A typed array of integers, which needs no conversion: a map has a million of them."""
 
 
+class _Signed:
+    """A typed array of numbers from −128 to 127, not unpacked yet."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+
 class _Plain:
     """Converts CBOR values to JSON-like values, up to a maximum size of the result.
 
     References in CBOR data may be nested, so a few bytes could expand without limit.
     """
 
-    def __init__(self, size: int) -> None:
-        """Prepare the conversion of a frame of `size` bytes; each value takes at least one byte."""
+    def __init__(self, size: int, *, is_packed: bool = False) -> None:
+        """Prepare the conversion of a frame of `size` bytes; each value takes at least one byte.
+
+        If `is_packed`, arrays of ``int8`` stay bytes.
+        """
+        self._is_packed = is_packed
         self._room = MAX_BYTES
         """Remaining size of the result, in bytes; each value counts as at least one byte."""
         self._values = max(size, _MANY_VALUES)
@@ -179,6 +197,8 @@ class _Plain:
 
     def of(self, value: Any) -> Any:
         """Return `value` with null in place of numbers that JSON cannot express."""
+        if isinstance(value, _Signed):
+            value = value.data if self._is_packed else _Numbers(array("b", value.data))
         self._room -= 1 + (len(value) if isinstance(value, str | bytes | _Numbers) else 0)
         if self._room < 0:
             raise ValueError(f"the frame expands to more than {MAX_BYTES} bytes")
