@@ -1,7 +1,7 @@
 """Encoding of occupancy grids in a thread, because a large grid would hold up the event loop.
 
-Theory of operation. One thread serves all robots of the process. Each robot has at most one grid in
-the thread, and one waiting grid for each signal. A newer grid replaces the waiting grid. Signals
+Theory of operation. One grid of the process is encoded at a time. Each robot has at most one grid
+in a thread, and one waiting grid for each signal. A newer grid replaces the waiting grid. Signals
 take turns, so a fast costmap cannot delay a map for ever. The time of an image is the time at which
 the message arrived, so pages show the age of the data. A value without a grid, such as “not
 available”, is published at once. Older grids of its signal are then dropped.
@@ -10,15 +10,18 @@ available”, is published at once. Older grids of its signal are then dropped.
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from threading import Lock
 from typing import Final, cast
 
+from urc._daemon import in_daemon
 from urc.model.values import Sample
 from urc.protocol.values.occupancy_grid import Grid, UnencodedGrid, encode_grid
 
 __all__ = ["GridEncoder"]
 
-_THREAD: Final = ThreadPoolExecutor(1, "urc-grids")
+_TURN: Final = Lock()
+"""Lock that lets one thread encode at a time, so that large maps leave a processor free."""
 
 log = logging.getLogger(__name__)
 
@@ -78,20 +81,23 @@ class GridEncoder:
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._run())
 
+    def _encoded(self, grid: Grid) -> bytes:
+        with _TURN:
+            return self._encode(grid)
+
     def _overtake(self, signal: str) -> None:
         self._waiting.pop(signal, None)
         self._overtaken |= signal == self._running
 
     async def _run(self) -> None:
         """Encode all waiting grids."""
-        loop = asyncio.get_running_loop()
         while self._waiting:
             signal = next(iter(self._waiting))
             sample = self._waiting.pop(signal)
             grid = cast("UnencodedGrid", sample.value).grid
             self._running, self._overtaken = signal, False
             try:
-                image = await loop.run_in_executor(_THREAD, self._encode, grid)
+                image = await in_daemon(partial(self._encoded, grid), "urc-grid")
             except Exception:  # supervisor: the other grids must go on
                 log.exception("the grid of %s cannot be encoded", signal)
                 continue
