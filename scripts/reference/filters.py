@@ -56,6 +56,10 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "numbers": ("'4f4b' | hexbytes | numbers('u8')", "list of numbers, decoded from bytes"),
     "pad": ("7 | pad(4)", "text padded on the left with zeros or another character"),
     "pitch": ("[0, 0, 0, 1] | pitch", "pitch of a quaternion [x, y, z, w], in radians"),
+    "poses": (
+        "[1] | poses([2])",
+        "list of ROS poses, from lists of x, y and angles, stamped if a frame is named",
+    ),
     "radians": ("0 | radians", "angle in radians, converted from degrees"),
     "ramp": ("0 | ramp(0.5, 3)", "list of numbers that increase by a fixed step"),
     "replace": ("'a-b' | replace('-', '_')", "text with replaced parts"),

@@ -67,3 +67,34 @@ async def test_a_goal_on_the_map_is_driven_to_and_stop_cancels_it(
     there = await until_still(page)
     await page.wait_for_timeout(2000)
     assert await page.evaluate(PLACE) == there
+
+
+async def test_a_route_on_the_map_is_paused_and_continued_and_stop_cancels_it(
+    new_page: PageMaker, urc_process: Start, tmp_path: Path
+) -> None:
+    page = await new_page("desktop")
+    await opened(page, urc_process, tmp_path / "data")
+    words = page.locator(".map-words")
+    x, y = await centre(page, ".map-area")
+    await page.get_by_role("button", name="Draw a route").click()
+    for right, down in ((-150, 60), (100, 60), (150, 0)):
+        await page.mouse.click(x + right, y + down)
+    await page.get_by_role("button", name="Send …").click()
+    await page.get_by_role("button", name="Send", exact=True).click()
+    await expect(words).to_contain_text("On the way to waypoint 1 of 3")
+    began = await page.evaluate(PLACE)
+    await page.wait_for_function(f"() => {PLACE} !== {began!r}", timeout=30_000)
+    await page.get_by_role("button", name="Pause", exact=True).click()
+    await expect(words).to_contain_text("Paused · Waypoints left: 3", timeout=10_000)
+    paused = await until_still(page)
+    await page.wait_for_timeout(2000)
+    assert await page.evaluate(PLACE) == paused
+    await page.get_by_role("button", name="Continue …").click()
+    await page.get_by_role("button", name="Send", exact=True).click()
+    await page.wait_for_function(f"() => {PLACE} !== {paused!r}", timeout=30_000)
+    await page.locator(STOP).first.click()
+    await expect(words).to_contain_text("cancelled", timeout=10_000)
+    await expect(words).to_contain_text("Waypoints left: 3")
+    there = await until_still(page)
+    await page.wait_for_timeout(2000)
+    assert await page.evaluate(PLACE) == there

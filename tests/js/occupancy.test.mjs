@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { inflateSync } from "node:zlib";
 
-import { arrowOf, ellipseOf, pairsOf, wrapped } from "../../widgets/map/geo.js";
+import { arrowOf, ellipseOf, pairsOf, posesOf, wrapped } from "../../widgets/map/geo.js";
 import { between, cornersOf, crc32, partsOf, placeOfGrid, recoloured, sizeText } from "../../widgets/map/grid_image.js";
 
 // A grid of 3 by 2 cells as the server sends it: 50 99 1 above 0 100 -1.
@@ -118,4 +118,10 @@ test("an arrow points where the yaw says", () => {
   assert.deepEqual(start, [1, 2]);
   assert.ok(Math.abs((end?.[0] ?? 0) - 4) < 1e-9 && Math.abs((end?.[1] ?? 0) - 2) < 1e-9);
   assert.ok(Math.abs(wrapped(3.5) - (3.5 - 2 * Math.PI)) < 1e-9);
+});
+
+test("poses are read with their directions, without invalid ones", () => {
+  assert.deepEqual(posesOf([1, 2, 1, 0, 3, 4, 0, 1]), [{ place: [2, 1], yaw: Math.PI }, { place: [4, 3], yaw: 0 }]);
+  assert.deepEqual(posesOf([1, 2, null, 0, 1e9, 4, 0, 1, Number.NaN, 1, 0, 1, 1, 2, 0]), []);
+  for (const value of [null, "x", 5, {}]) assert.deepEqual(posesOf(value), []);
 });

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from urc import _checksum_math, _rotation
 from urc._formatting import spelt
 from urc._number_types import NUMBER_NAMES
-from urc.filters import binary, lists, math, parse
+from urc.filters import binary, lists, math, parse, poses
 
 __all__ = ["FILTERS", "SCOPE", "filter_names"]
 
@@ -231,6 +231,7 @@ FILTERS: dict[str, Filter] = {
     "lower": Filter(lambda value: _require_text(value).lower(), (0, 0)),
     "pad": Filter(_pad, (1, 2)),
     "pitch": Filter(_rotation.pitch, (0, 0)),
+    "poses": Filter(poses.poses, (1, 3)),
     "replace": Filter(_replace, (2, 2)),
     "roll": Filter(_rotation.roll, (0, 0)),
     "round": Filter(_round, (0, 1)),

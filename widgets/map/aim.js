@@ -14,13 +14,17 @@ export class Aim {
    * @param {AbortSignal} signal
    * @param {(place: Place, yaw: number | null) => void} aimed called during the gesture; the yaw is
    *   null while the gesture has no direction
+   * @param {() => void} undone called when a second finger turns the gesture into a move of the map
    */
-  constructor(map, signal, aimed) {
+  constructor(map, signal, aimed, undone) {
     this.map = map;
     this.aimed = aimed;
+    this.undone = undone;
     this.isOn = false;
     /** Pointer of the running gesture. */
     this.pointer = -1;
+    /** Pointers on the map. @type {Set<number>} */
+    this.down = new Set();
     /** @type {Place} */
     this.place = [0, 0];
     this.start = { x: 0, y: 0 };
@@ -28,7 +32,7 @@ export class Aim {
     area.addEventListener("pointerdown", (event) => this.begin(event), { signal, capture: true });
     area.addEventListener("pointermove", (event) => this.move(event), { signal });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      area.addEventListener(end, () => { this.pointer = -1; }, { signal });
+      area.addEventListener(end, (event) => this.lift(/** @type {PointerEvent} */ (event)), { signal });
     }
   }
 
@@ -37,13 +41,20 @@ export class Aim {
     if (isOn === this.isOn) return;
     this.isOn = isOn;
     this.pointer = -1;
+    this.down.clear();
     if (isOn) this.map.dragging.disable();
     else this.map.dragging.enable();
   }
 
   /** @param {PointerEvent} event */
   begin(event) {
-    if (!this.isOn || this.pointer !== -1 || event.button > 0) return;
+    if (!this.isOn || event.button > 0) return;
+    this.down.add(event.pointerId);
+    if (this.down.size > 1) {
+      if (this.pointer !== -1) this.undone();
+      this.pointer = -1;
+      return;
+    }
     this.pointer = event.pointerId;
     const area = this.map.getContainer();
     area.setPointerCapture(event.pointerId);
@@ -55,9 +66,15 @@ export class Aim {
   }
 
   /** @param {PointerEvent} event */
+  lift(event) {
+    this.down.delete(event.pointerId);
+    if (event.pointerId === this.pointer) this.pointer = -1;
+  }
+
+  /** @param {PointerEvent} event */
   move(event) {
     if (event.pointerId !== this.pointer) return;
     const [right, down] = [event.clientX - this.start.x, event.clientY - this.start.y];
-    if (Math.hypot(right, down) >= FAR) this.aimed(this.place, Math.atan2(-down, right));
+    if (Math.hypot(right, down) >= FAR) this.aimed(this.place, Math.atan2(0 - down, right));
   }
 }

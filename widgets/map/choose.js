@@ -2,15 +2,18 @@
 /**
  * Choice of a place or a route, with a confirmation. Independent of Leaflet: a listener draws the choice.
  *
+ * A sent route is *active* until its command ends. If the operator ends it, STOP cancels it, or it
+ * fails, the waypoints that are left are *kept*. The robot continues only after a new confirmation.
+ *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
  * @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet
  */
 import { attribute, button, write } from "urc/kit";
 import { distance, distanceText, isInside, lengthOf, placeText, wrapped } from "./geo.js";
+import { Route } from "./route.js";
+import { RouteList } from "./route_list.js";
 
-/** Maximum number of places of a route; a longer route is not drawn by hand. */
-const MOST = 200;
 /** Time after which a command counts as one that takes long, such as a goal, in milliseconds. */
 const SOON_MS = 1000;
 /** Turn of one press, in radians. */
@@ -41,8 +44,20 @@ export class Choice {
     this.robotYaw = null;
     /** @type {"look" | "place" | "way" | "sure"} */
     this.mode = "look";
-    /** @type {Place[]} */
-    this.places = [];
+    /** Chosen place, outside a route. @type {Place | null} */
+    this.spot = null;
+    /** Route that the operator edits. */
+    this.route = new Route();
+    /**
+     * Sent route whose command has not ended. `at` is the waypoint to which the robot is on its way;
+     * `serial` is that of the progress before the route; `end` is why the operator ends it.
+     * @type {{route: Route, number: number, at: number, serial: number, end: "" | "pause" | "clear"} | null}
+     */
+    this.active = null;
+    /** Waypoints that are left of a route that has ended early. @type {Route | null} */
+    this.kept = null;
+    /** Serial number of the newest progress. */
+    this.serial = 0;
     /** @type {Place | null} */
     this.robot = null;
     this.outcome = "";
@@ -55,6 +70,8 @@ export class Choice {
     this.waypoints = undefined;
     /** @type {Outlet | undefined} */
     this.pose = undefined;
+    /** @type {Outlet | undefined} */
+    this.end = undefined;
     this.bar = document.createElement("div");
     this.bar.className = "map-bar";
     this.bar.setAttribute("role", "group");
@@ -62,13 +79,16 @@ export class Choice {
     this.words = document.createElement("p");
     this.words.className = "map-words";
     this.words.setAttribute("role", "status");
+    this.list = new RouteList({ t, signal, route: () => this.route, changed: () => this.edited() });
     this.no = this.button(t("Cancel"), () => this.clear(), signal);
+    this.drop = this.button(t("Clear"), () => void this.forget(), signal);
+    this.pause = this.button(t("Pause"), () => void this.finish("pause"), signal);
     this.undo = this.button(t("Undo"), () => this.back(), signal);
     this.left = this.button("↺", () => this.turn(STEP), signal, t("Turn left by 15°"));
     this.right = this.button("↻", () => this.turn(-STEP), signal, t("Turn right by 15°"));
     this.yes = this.button("", () => void this.go(), signal);
     this.yes.classList.add("map-yes");
-    this.bar.append(this.words, this.no, this.undo, this.left, this.right, this.yes);
+    this.bar.append(this.words, this.list.element, this.no, this.drop, this.undo, this.left, this.right, this.pause, this.yes);
     root.append(this.bar);
     this.show();
   }
@@ -87,14 +107,54 @@ export class Choice {
    * @param {Readonly<Record<string, Outlet>>} outputs
    * @param {Place | null} robot
    * @param {number | null} yaw direction of the robot
+   * @param {{value: number, serial: number} | null} progress number of the waypoint to which the robot is on its way
    */
-  update(outputs, robot, yaw) {
+  update(outputs, robot, yaw, progress) {
     this.goto = outputs["goto"];
     this.waypoints = outputs["waypoints"];
     this.pose = outputs["initial_pose"];
+    this.end = outputs["end_route"];
+    if (progress) this.advance(progress);
     this.robotYaw = yaw;
     this.robot = robot;
     this.show();
+  }
+
+  /** Note the progress of the active route. @param {{value: number, serial: number}} progress */
+  advance({ value, serial }) {
+    const { active } = this;
+    this.serial = serial;
+    if (!active || serial <= active.serial) return; // told of an earlier route
+    const at = Math.min(Math.max(0, Math.round(value)), active.route.size - 1);
+    if (at === active.at) return;
+    active.at = at;
+    this.changed();
+  }
+
+  /** Places to draw, in order. @returns {readonly Place[]} */
+  get places() {
+    if (this.mode === "place") return this.spot ? [this.spot] : [];
+    if (this.mode !== "look") return this.route.places;
+    return this.active ? this.active.route.places.slice(this.active.at) : this.kept?.places ?? [];
+  }
+
+  /** Directions to draw, for each place; [] without directions. @returns {readonly number[]} */
+  get angles() {
+    if (this.mode === "place") return this.yaw === null ? [] : [this.yaw];
+    if (!this.turns.has("waypoints")) return [];
+    if (this.mode !== "look") return this.directions(this.route);
+    if (this.active) return this.directions(this.active.route).slice(this.active.at);
+    return this.kept ? this.directions(this.kept) : [];
+  }
+
+  /** @param {Route} route */
+  directions(route) {
+    return route.directions(this.robot, this.robotYaw ?? 0);
+  }
+
+  /** Whether a press on the map begins a gesture instead of a move of the map. */
+  get isAiming() {
+    return this.aiming !== "" || (this.mode === "way" && this.turns.has("waypoints"));
   }
 
   /** @param {Place} place */
@@ -102,15 +162,15 @@ export class Choice {
     if (this.isBusy || this.aiming) return; // a gesture has set the place
     this.outcome = "";
     if (this.mode === "way") {
-      if (this.places.length < MOST) this.places.push(place);
+      this.route.add(place);
     } else if (this.goto && this.mode !== "sure") {
       this.mode = "place";
       this.target = "goto";
-      this.places = [place];
+      this.spot = place;
       this.yaw = this.usualYaw();
     }
-    this.show();
-    this.changed();
+    this.edited();
+    this.list.reveal();
   }
 
   /**
@@ -120,14 +180,26 @@ export class Choice {
    * @param {number | null} yaw null while the gesture has no direction
    */
   aim(place, yaw) {
-    if (this.isBusy || !this.aiming) return;
-    this.outcome = "";
-    this.mode = "place";
-    this.target = this.aiming;
-    this.places = [place];
-    this.yaw = yaw ?? this.usualYaw();
-    this.show();
-    this.changed();
+    if (this.isBusy || !this.isAiming) return;
+    if (this.mode === "way") {
+      if (yaw === null) this.tap(place);
+      else this.route.aim(yaw);
+    } else if (this.aiming) {
+      this.outcome = "";
+      this.mode = "place";
+      this.target = this.aiming;
+      this.spot = place;
+      this.yaw = yaw ?? this.usualYaw();
+    }
+    this.edited();
+  }
+
+  /** Take back the place of a gesture that a second finger has turned into a move of the map. */
+  unaim() {
+    if (this.isBusy) return;
+    if (this.mode === "way") this.route.remove(this.route.size - 1);
+    else if (this.mode === "place") this.mode = "look";
+    this.edited();
   }
 
   /** Start or end gestures for an output. @param {"goto" | "initial_pose"} output */
@@ -135,37 +207,41 @@ export class Choice {
     const isOn = this.aiming === output;
     this.clear();
     this.aiming = isOn ? "" : output;
-    this.show();
-    this.changed();
+    this.edited();
   }
 
   /** Turn the chosen direction. @param {number} angle in radians, counter-clockwise */
   turn(angle) {
-    if (this.isBusy || this.yaw === null) return;
-    this.yaw = wrapped(this.yaw + angle);
-    this.show();
-    this.changed();
+    if (this.isBusy) return;
+    if (this.mode === "way") this.route.aim(wrapped((this.directions(this.route)[this.route.chosen] ?? 0) + angle));
+    else if (this.yaw !== null) this.yaw = wrapped(this.yaw + angle);
+    this.edited();
   }
 
   /** Return the direction of a place without a gesture: the direction of travel, or that of the robot. */
   usualYaw() {
-    const [place] = this.places;
-    if (!place || !this.turns.has(this.target)) return null;
-    const way = this.robot && this.target === "goto" ? Math.atan2(place[0] - this.robot[0], place[1] - this.robot[1]) : null;
+    const { spot } = this;
+    if (!spot || !this.turns.has(this.target)) return null;
+    const way = this.robot && this.target === "goto" ? Math.atan2(spot[0] - this.robot[0], spot[1] - this.robot[1]) : null;
     return way ?? this.robotYaw ?? 0;
   }
 
-  /** Start or end the drawing of a route. */
+  /** Start or end the drawing of a route; a route that has ended early is edited. */
   toggleWay() {
     const isWay = this.mode === "way" || this.mode === "sure";
     this.clear();
     if (!isWay) this.mode = "way";
-    this.show();
+    this.edited();
   }
 
   back() {
     if (this.mode === "sure") this.mode = "way";
-    else this.places.pop();
+    else this.route.remove(this.route.size - 1);
+    this.edited();
+  }
+
+  /** Show a change of the choice. */
+  edited() {
     this.show();
     this.changed();
   }
@@ -174,16 +250,50 @@ export class Choice {
     this.mode = "look";
     this.aiming = "";
     this.yaw = null;
-    this.places = [];
+    this.spot = null;
+    this.route = this.kept ?? new Route();
     this.outcome = "";
+    this.edited();
+  }
+
+  /** Delete all waypoints; an active route is ended. */
+  async forget() {
+    if (this.isBusy) return;
+    if (this.mode === "look" && this.active) {
+      await this.finish("clear");
+      return;
+    }
+    this.kept = null;
+    const { mode } = this;
+    this.clear();
+    if (mode === "way") this.mode = "way";
+    this.edited();
+  }
+
+  /**
+   * End the active route.
+   *
+   * @param {"pause" | "clear"} end whether to keep the waypoints that are left
+   */
+  async finish(end) {
+    const { active } = this;
+    if (!active || active.end) return;
+    active.end = end;
     this.show();
-    this.changed();
+    try {
+      await this.send("end_route", {});
+    } catch (error) {
+      active.end = ""; // the robot goes on, so the buttons remain
+      this.outcome = `▲ ${error instanceof Error ? error.message : error}`;
+    }
+    this.show();
   }
 
   /** Return the reason why the choice cannot be sent, or "". */
   hindrance() {
     const outlet = this.mode !== "place" ? this.waypoints : this.target === "goto" ? this.goto : this.pose;
-    if (this.places.some((place) => !isInside(place, this.fence))) return this.t("outside the fence");
+    const places = this.mode === "look" ? [] : this.places;
+    if (places.some((place) => !isInside(place, this.fence))) return this.t("outside the fence");
     return outlet?.reason ?? "";
   }
 
@@ -191,32 +301,58 @@ export class Choice {
     const { mode, places, t } = this;
     const isWay = mode === "way" || mode === "sure";
     const isIdle = mode === "look" && !this.aiming;
-    const hasTurn = mode === "place" && this.yaw !== null;
-    attribute(this.bar, "hidden", isIdle && !this.outcome ? "" : null);
-    attribute(this.no, "hidden", isIdle ? "" : null);
+    const [active, kept] = [isIdle ? this.active : null, isIdle && !this.active ? this.kept : null];
+    const isTurned = (mode === "place" && this.yaw !== null) || (mode === "way" && places.length > 0 && this.turns.has("waypoints"));
+    const hide = (/** @type {Element} */ part, /** @type {boolean} */ isShown) => attribute(part, "hidden", isShown ? null : "");
+    const disable = (/** @type {Element} */ part, /** @type {boolean} */ isOff) => attribute(part, "disabled", isOff ? "" : null);
+    hide(this.bar, !isIdle || this.outcome !== "" || active !== null || kept !== null);
+    hide(this.no, !isIdle);
+    disable(this.no, this.isBusy);
     for (const one of [this.left, this.right]) {
-      attribute(one, "hidden", hasTurn ? null : "");
-      attribute(one, "disabled", this.isBusy ? "" : null);
+      hide(one, isTurned);
+      disable(one, this.isBusy);
     }
-    attribute(this.undo, "hidden", isWay ? null : "");
-    attribute(this.undo, "disabled", places.length === 0 || this.isBusy ? "" : null);
-    attribute(this.yes, "hidden", mode === "look" ? "" : null);
-    attribute(this.no, "disabled", this.isBusy ? "" : null);
+    hide(this.undo, isWay);
+    disable(this.undo, places.length === 0 || this.isBusy);
+    const canEnd = active !== null && this.end !== undefined;
+    const isEnding = active !== null && (active.end !== "" || (this.end?.reason ?? "") !== "");
+    hide(this.pause, canEnd);
+    disable(this.pause, isEnding);
+    hide(this.drop, canEnd || kept !== null || (mode === "way" && places.length > 0));
+    disable(this.drop, isEnding || this.isBusy);
+    this.showList(mode === "way");
     const reason = mode === "look" ? "" : this.hindrance();
-    const isShort = mode === "way" ? places.length < 2 : places.length < 1;
-    attribute(this.yes, "disabled", reason !== "" || isShort || this.isBusy ? "" : null);
-    write(this.yes, mode === "way" ? t("Send …") : mode === "sure" ? t("Send") : this.target === "initial_pose" ? t("It is here") : t("Go there"));
+    const isShort = mode === "way" ? places.length < (this.end ? 1 : 2) : places.length < 1;
+    hide(this.yes, mode !== "look" || kept !== null);
+    disable(this.yes, reason !== "" || isShort || this.isBusy);
+    const send = { look: t("Continue …"), way: t("Send …"), sure: t("Send"), place: t("Go there") }[mode];
+    write(this.yes, mode === "place" && this.target === "initial_pose" ? t("It is here") : send);
     attribute(this.bar, "data-mode", mode);
     const text = reason && places.length > 0 ? `▲ ${reason}` : this.question();
-    write(this.words, this.outcome || text);
+    write(this.words, this.outcome ? [this.outcome, kept ? text : ""].filter(Boolean).join(" · ") : text);
+  }
+
+  /** @param {boolean} isShown */
+  showList(isShown) {
+    const angles = isShown ? this.angles : [];
+    const texts = isShown ? this.route.places.map((place, index) => this.placeText(place, angles[index] ?? null)) : [];
+    attribute(this.list.element, "hidden", texts.length > 0 ? null : "");
+    this.list.show(texts, this.isBusy);
+  }
+
+  /**
+   * @param {Place} place
+   * @param {number | null} yaw
+   */
+  placeText(place, yaw) {
+    return placeText(place, this.form, this.isLocal) + (yaw === null ? "" : `, ∠ ${Math.round((yaw * 180) / Math.PI)}°`);
   }
 
   question() {
-    const { mode, places, t, isLocal, robot, yaw } = this;
+    const { mode, places, t, isLocal, robot, yaw, active, kept } = this;
     const [place] = places;
     if (mode === "place" && place) {
-      const angle = yaw === null ? "" : `, ∠ ${Math.round((yaw * 180) / Math.PI)}°`;
-      const names = { place: placeText(place, this.form, isLocal) + angle };
+      const names = { place: this.placeText(place, yaw) };
       if (this.target === "initial_pose") return t("Is the robot at {place}?", names);
       const question = t("Go to {place}?", names);
       if (!robot) return question;
@@ -226,25 +362,34 @@ export class Choice {
     const names = { count: places.length, length: distanceText(lengthOf(places, isLocal)) };
     if (mode === "sure") return t("Send the robot to {count} places in order ({length})?", names);
     if (mode === "look" && this.aiming) return t("Press on the place, and drag in the direction.");
+    if (mode === "look" && active) return t("On the way to waypoint {number} of {count}", { number: active.at + 1, count: active.route.size });
+    if (mode === "look" && kept) return t("Waypoints left: {count}", names);
     if (mode !== "way") return "";
-    return places.length === 0 ? t("Tap the places in order.") : t("{count} places, {length}", names);
+    if (places.length > 0) return t("{count} places, {length}", names);
+    return this.turns.has("waypoints") ? t("Tap the places in order; drag for a direction.") : t("Tap the places in order.");
   }
 
   async go() {
     if (this.yes.disabled) return;
-    if (this.mode === "way") {
+    if (this.mode === "look" && this.kept) this.route = this.kept;
+    if (this.mode === "look" || this.mode === "way") {
       this.mode = "sure"; // a route needs a second confirmation
-      this.show();
+      this.outcome = "";
+      this.edited();
       return;
     }
     const isPlace = this.mode === "place";
     const number = (this.sent += 1);
+    const given = isPlace ? this.one() : this.all();
+    if (!isPlace) {
+      this.active = { route: this.route.rest(0), number, at: 0, serial: this.serial, end: "" };
+    }
     this.isBusy = true;
     this.outcome = `… ${this.t("sending")}`;
     this.show();
     const timer = setTimeout(() => this.leave(number), SOON_MS);
     try {
-      await this.send(isPlace ? this.target : "waypoints", isPlace ? this.one() : this.all());
+      await this.send(isPlace ? this.target : "waypoints", given);
       this.ended(number, "");
     } catch (error) {
       this.ended(number, `▲ ${error instanceof Error ? error.message : error}`);
@@ -256,9 +401,11 @@ export class Choice {
   /** Let the operator choose again while the robot is on its way. @param {number} number */
   leave(number) {
     if (number !== this.sent || !this.isBusy) return;
+    const isRoute = this.active?.number === number;
     this.isBusy = false;
+    if (isRoute) this.kept = null;
     this.clear();
-    this.outcome = `… ${this.t("on the way")}`;
+    this.outcome = isRoute && this.end ? "" : `… ${this.t("on the way")}`;
     this.show();
   }
 
@@ -269,14 +416,28 @@ export class Choice {
    * @param {string} fault "" if the robot has done it
    */
   ended(number, fault) {
-    if (number !== this.sent) return;
-    const isQuick = this.isBusy;
-    this.isBusy = false;
-    if (isQuick && !fault) this.clear();
-    if (isQuick || (this.mode === "look" && !this.aiming)) {
-      this.outcome = fault || (isQuick ? `✓ ${this.t("sent")}` : this.t("✓ done"));
+    const isLast = number === this.sent;
+    const isQuick = isLast && this.isBusy;
+    const { active } = this;
+    const end = active?.number === number ? active.end : "";
+    if (active?.number === number) {
+      this.active = null;
+      if (!fault && isQuick) this.kept = null;
+      if (fault && !isQuick && this.end && end !== "clear") this.keep(active.route.rest(active.at));
     }
-    this.show();
+    if (isLast) this.isBusy = false;
+    if (isQuick && !fault) this.clear();
+    if (isLast && (isQuick || (this.mode === "look" && !this.aiming))) {
+      const done = isQuick ? `✓ ${this.t("sent")}` : this.t("✓ done");
+      this.outcome = end === "" || !fault ? fault || done : end === "pause" ? this.t("Paused") : "";
+    }
+    this.edited();
+  }
+
+  /** Keep the waypoints that are left of a route. @param {Route} rest */
+  keep(rest) {
+    this.kept = rest;
+    if (this.mode === "look") this.route = rest;
   }
 
   one() {
@@ -289,7 +450,9 @@ export class Choice {
   all() {
     const places = this.places.map((place) => rounded(place, this.isLocal));
     const [firsts, seconds] = [places.map(([first]) => first), places.map(([, second]) => second)];
-    return this.isLocal ? { xs: seconds, ys: firsts } : { latitudes: firsts, longitudes: seconds };
+    if (!this.isLocal) return { latitudes: firsts, longitudes: seconds };
+    const yaws = this.angles.map((yaw) => Math.round(yaw * 1e4) / 1e4);
+    return { xs: seconds, ys: firsts, ...(this.turns.has("waypoints") ? { yaws } : {}) };
   }
 }
 

@@ -245,6 +245,25 @@ export function pairsOf(value) {
 }
 
 /**
+ * Return the places and directions in an array of x, y, and the z and w of the orientation in turn,
+ * without invalid poses.
+ *
+ * @param {unknown} value
+ * @returns {{place: Place, yaw: number}[]}
+ */
+export function posesOf(value) {
+  if (!Array.isArray(value)) return [];
+  const found = [];
+  for (let index = 0; index + 3 < value.length; index += 4) {
+    const [x, y, z, w] = value.slice(index, index + 4);
+    if (![x, y, z, w].every((one) => typeof one === "number") || !isInMap([y, x])) continue;
+    const yaw = 2 * Math.atan2(z, w);
+    if (Number.isFinite(yaw)) found.push({ place: /** @type {Place} */ ([y, x]), yaw });
+  }
+  return found;
+}
+
+/**
  * Return the corners of the ellipse that contains the position with a probability of 95 %.
  *
  * @param {Place} place

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Paths, areas, points, the goal, and the uncertainty of the position, on the robot's own map.
+ * Paths, areas, points, poses, the goal, and the uncertainty of the position, on the robot's own map.
  *
  * Paths and areas are arrays of x and y in turn. The lines of several paths differ by dashes too.
  */
@@ -9,7 +9,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./geo.js").Place} Place */
 import { many, number } from "urc/kit";
-import { arrowOf, ellipseOf, isInMap, pairsOf } from "./geo.js";
+import { arrowOf, ellipseOf, isInMap, pairsOf, posesOf } from "./geo.js";
 
 /** Dashes of the first, second, third and each further path. */
 const DASHES = ["", "10 6", "2 6", "12 4 2 4"];
@@ -17,6 +17,8 @@ const SERIES = /** @type {const} */ (["series-1", "series-2", "series-4", "serie
 /** Maximum number of drawn points; a cloud of particles looks the same with fewer. */
 const MOST_POINTS = 5000;
 const POINT = 3;
+/** Length of a pose's line in pixels. */
+const POSE = 9;
 
 /**
  * @typedef {Record<"text" | "series-1" | "series-2" | "series-4" | "series-5", string>} Inks
@@ -43,6 +45,8 @@ export class Shapes {
     this.goalYaw = null;
     /** @type {readonly Reading[]} */
     this.points = [];
+    /** @type {readonly Reading[]} */
+    this.poses = [];
     /** Serial numbers at the last drawing. */
     this.seen = "";
     /** @type {Readonly<Record<string, any>>} */
@@ -70,6 +74,7 @@ export class Shapes {
     [this.readings, this.robot] = [readings, robot];
     const [paths, areas] = [many(readings["paths"]), many(readings["areas"])];
     this.points = many(readings["points"]);
+    this.poses = many(readings["poses"]);
     const names = ["goal_x", "goal_y", "goal_yaw", "covariance"];
     const all = [...paths, ...areas, ...names.map((name) => readings[name])];
     const seen = [...all.map((one) => (one ? `${one.serial}${one.state}` : "")), robot].join();
@@ -133,7 +138,28 @@ export class Shapes {
       }
       pen.fill();
     }
+    for (const poses of this.poses) if (poses.value !== null) this.paintPoses(pen, poses);
     pen.globalAlpha = 1;
+  }
+
+  /**
+   * Draw a dot for each pose, and a line in its direction.
+   *
+   * @param {CanvasRenderingContext2D} pen
+   * @param {Reading} poses
+   */
+  paintPoses(pen, poses) {
+    pen.fillStyle = pen.strokeStyle = this.inks?.["series-5"] ?? "";
+    pen.globalAlpha = poses.state === "live" ? 0.8 : 0.35;
+    pen.lineWidth = 1;
+    pen.beginPath();
+    for (const { place, yaw } of posesOf(poses.value).slice(0, MOST_POINTS)) {
+      const { x, y } = this.map.latLngToContainerPoint(place);
+      pen.fillRect(x - POINT / 2, y - POINT / 2, POINT, POINT);
+      pen.moveTo(x, y);
+      pen.lineTo(x + POSE * Math.cos(yaw), y - POSE * Math.sin(yaw));
+    }
+    pen.stroke();
   }
 }
 

@@ -15,7 +15,7 @@ import { Occupancy } from "./occupancy.js";
 import { Shapes, metresOf } from "./shapes.js";
 
 /** Inputs of which one is enough for the robot's own map. */
-const LOCAL = ["x", "paths", "areas", "points", "goal_x"];
+const LOCAL = ["x", "paths", "areas", "points", "poses", "goal_x"];
 
 export default {
   /**
@@ -125,7 +125,8 @@ class Chart {
     const { fence, form } = this;
     this.grid = new Grid(this.map, part(this.root, ".map-scale"), isLocal);
     if (this.fence[0]) this.grid.setOrigin(this.fence[0]);
-    const turns = new Set(Object.keys(outputs).filter((name) => isLocal && this.ctx.command(name)?.arguments["yaw"]));
+    const turned = (/** @type {string} */ name) => this.ctx.command(name)?.arguments[name === "waypoints" ? "yaws" : "yaw"];
+    const turns = new Set(Object.keys(outputs).filter((name) => isLocal && turned(name)));
     this.choice = new Choice(part(this.root, ".map-frame"), this.ctx, {
       isLocal,
       form,
@@ -134,7 +135,7 @@ class Chart {
       turns,
     });
     if (isLocal) this.shapes = new Shapes(this.leaflet, this.map);
-    this.aim = new Aim(this.map, this.signal, (place, yaw) => this.choice?.aim(place, yaw));
+    this.aim = new Aim(this.map, this.signal, (place, yaw) => this.choice?.aim(place, yaw), () => this.choice?.unaim());
     this.grid.under = (pen) => {
       this.occupancy.paint(pen, this.map);
       this.shapes?.paint(pen);
@@ -155,7 +156,9 @@ class Chart {
   }
 
   listen() {
-    this.map.on("click", (event) => this.choice?.tap([event.latlng.lat, event.latlng.lng]));
+    this.map.on("click", ({ latlng: { lat, lng } }) => {
+      if (!this.choice?.isAiming) this.choice?.tap([lat, lng]); // otherwise, the gesture has set the place
+    });
     const key = (/** @type {KeyboardEvent} */ event) => {
       if (event.key === "Enter" && event.target === this.map.getContainer() && !event.repeat) {
         const { lat, lng } = this.map.getCenter();
@@ -275,7 +278,7 @@ class Chart {
       turn: line({ weight: 4 }),
       ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
       robot: new leaflet.Marker([0, 0], { icon, interactive: false, keyboard: false }),
-      /** @type {import("leaflet").CircleMarker[]} */
+      /** @type {(import("leaflet").CircleMarker | import("leaflet").Marker)[]} */
       marks: [],
     };
   }
@@ -314,10 +317,12 @@ class Chart {
     this.reading = reading;
     this.describe();
     this.shapes?.update(readings, place);
-    const points = many(readings["points"]).map(({ serial, state }) => `${serial}${state}`).join();
+    const drawn = [...many(readings["points"]), ...many(readings["poses"])];
+    const points = drawn.map(({ serial, state }) => `${serial}${state}`).join();
     if (points !== this.seenPoints) this.grid?.ask();
     this.seenPoints = points;
-    this.choice?.update(outputs, place, yaw);
+    const [waypoint, serial] = [number(readings["waypoint"]), readings["waypoint"]?.serial ?? 0];
+    this.choice?.update(outputs, place, yaw, waypoint === null ? null : { value: waypoint, serial });
   }
 
   /** Write the place of the robot, and what is wrong with it or with the grids. */
@@ -381,24 +386,43 @@ class Chart {
     this.drawn = look; // after the end of the move, which clears it
   }
 
+  /**
+   * Return the mark of a chosen place; the waypoints of a route have numbers.
+   *
+   * @param {Place} place
+   * @param {number} index
+   * @returns {import("leaflet").CircleMarker | import("leaflet").Marker}
+   */
+  markOf(place, index) {
+    const { choice, leaflet, ink } = this;
+    const isIn = isInside(place, this.fence);
+    const isRoute = choice !== undefined && choice.mode !== "place" && choice.places.length <= NUMBERED;
+    if (!isRoute) {
+      const color = (isIn ? ink?.text : ink?.caution) ?? "";
+      return new leaflet.CircleMarker(place, { radius: 9, weight: 3, color, fillOpacity: 0, interactive: false });
+    }
+    const mark = document.createElement("div");
+    mark.className = "map-mark";
+    mark.textContent = String(index + 1 + (choice.mode === "look" ? choice.active?.at ?? 0 : 0));
+    attribute(mark, "data-fence", isIn ? null : "out");
+    attribute(mark, "data-chosen", choice.mode === "way" && index === choice.route.chosen ? "" : null);
+    const icon = new leaflet.DivIcon({ html: mark, className: "map-pin", iconSize: [28, 28] });
+    return new leaflet.Marker(place, { icon, interactive: false, keyboard: false });
+  }
+
   drawChoice() {
     const { layers, choice, leaflet, ink } = this;
     if (!layers || !choice || !ink) return;
     for (const mark of layers.marks) mark.remove();
-    layers.marks = choice.places.map((place) => {
-      const isIn = isInside(place, this.fence);
-      const look = { radius: 9, weight: 3, color: isIn ? ink.text : ink.caution, fillOpacity: 0, interactive: false };
-      return new leaflet.CircleMarker(place, look).addTo(this.map);
-    });
+    layers.marks = choice.places.map((place, index) => this.markOf(place, index).addTo(this.map));
     const from = this.trail.places.at(-1);
-    const way = from && this.hasPlace ? [from, ...choice.places] : choice.places;
+    const way = from && this.hasPlace ? [from, ...choice.places] : [...choice.places];
     layers.way.setLatLngs(choice.places.length > 0 ? way : []).setStyle({ color: ink.text });
-    const { places: [place], yaw } = choice;
-    const hasTurn = place !== undefined && yaw !== null && choice.mode === "place";
-    layers.turn.setLatLngs(hasTurn ? arrowOf(place, yaw, metresOf(this.map, 48)) : []).setStyle({ color: ink.text });
-    this.aim?.set(choice.aiming !== "");
+    const arrows = choice.angles.map((yaw, index) => arrowOf(choice.places[index] ?? [0, 0], yaw, metresOf(this.map, 48)));
+    layers.turn.setLatLngs(arrows).setStyle({ color: ink.text });
+    this.aim?.set(choice.isAiming);
     for (const [output, made] of this.aims ?? []) attribute(made, "aria-pressed", String(choice.aiming === output));
-    attribute(this.root, "data-aim", choice.aiming || null);
+    attribute(this.root, "data-aim", choice.isAiming ? choice.aiming || "waypoints" : null);
     attribute(this.root, "data-mode", choice.mode);
     if (this.wayButton) {
       const isWay = choice.mode === "way" || choice.mode === "sure";
@@ -406,6 +430,9 @@ class Chart {
     }
   }
 }
+
+/** Maximum number of waypoints with numbers on the map; more numbers would cover each other. */
+const NUMBERED = 30;
 
 const RANK = ["live", "stale", "gone", "none"];
 
