@@ -234,6 +234,9 @@ class Engine:
         self.known.latch(reason)
         if not reason:
             return []
+        for line in self._all_lines:
+            if line.codec is not None:
+                line.codec.stop_goals()
         for runner in self._runners:
             if runner.program.label in self.programs and not runner.privileged_on:
                 runner.stop("stopped", reason)

@@ -126,7 +126,7 @@ async def test_a_large_map_a_plan_and_a_pose_arrive_over_the_real_server() -> No
             assert (grid.width, grid.height, grid.frame) == (WIDTH, HEIGHT, "map")
             assert (grid.x, grid.y, grid.yaw) == pytest.approx((-50, -20, 0.3))
             assert grid.cells == cells.tobytes()
-            with pytest.raises(CommandFailed, match="the Foxglove protocol has no actions"):
+            with pytest.raises(CommandFailed, match="start it with include_hidden: true"):
                 await robot.command("navigate", to_x=1.0, to_y=1.0)
             await robot.command("stop_navigation")
     finally:

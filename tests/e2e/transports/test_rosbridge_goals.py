@@ -128,14 +128,22 @@ def value(session: Session, name: str) -> object:
 
 
 @asynccontextmanager
-async def cable(port: int) -> AsyncIterator[tuple[int, Callable[[], None]]]:
-    """Carry connections to `port`; yield the near port, and a function that cuts them all."""
+async def cable(
+    port: int, loses: asyncio.Event | None = None, flows: asyncio.Event | None = None
+) -> AsyncIterator[tuple[int, Callable[[], None]]]:
+    """Carry connections to `port`; yield the near port, and a function that cuts them all.
+
+    While `loses` is set, data is accepted and lost. While `flows` is not set, data waits.
+    """
     ends: list[asyncio.StreamWriter] = []
 
     async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(OSError):
             while data := await reader.read(65536):
-                writer.write(data)
+                if flows is not None:
+                    await flows.wait()
+                if loses is None or not loses.is_set():
+                    writer.write(data)
         writer.close()
 
     async def meet(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -1,13 +1,10 @@
 """The Foxglove protocol of one connection, without a socket."""
 
-import asyncio
 import json
 import math
 from collections.abc import Mapping
 from typing import Any
 
-from urc.model.payload import Envelope
-from urc.transports.base import NOTICE
 from urc.transports.ros.foxglove_session import MAX_RETRIES, FoxgloveSession, TopicWish
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -83,28 +80,3 @@ def test_a_topic_with_messages_was_not_refused() -> None:
     session.arrived(b"\x01" + (1).to_bytes(4, "little") + (7).to_bytes(8, "little") + b"{}")
     refuse(session)
     assert subscribed(session) == []
-
-
-def test_a_goal_fails_at_once_and_stop_does_not_fail_for_its_cancel() -> None:
-    """The protocol has no actions, so there is never a goal to cancel."""
-    queue = TopicReceiveQueue()
-    session = FoxgloveSession(
-        queue,
-        (),
-        TopicGraph(lambda _: None, 2),
-        call_at=lambda _, __: None,
-        clock=lambda: math.inf,
-        published={},
-    )
-    for _ in range(2):  # the second one adds no line to the log
-        session.perform(Envelope("cancel", {"action": "/navigate_to_pose"}))
-    assert not list(session.written())
-    session.perform(Envelope("goal", {"action": "/navigate_to_pose", "id": 4}, {}))
-    notice = asyncio.run(queue.pop())
-    assert (notice.verb, notice.body) == (
-        NOTICE,
-        "the Foxglove protocol has no actions: no goal is cancelled",
-    )
-    answer = asyncio.run(queue.pop())
-    assert (answer.attributes["id"], answer.attributes["ok"]) == (4, False)
-    assert "no actions" in str(answer.attributes["reason"])

@@ -14,13 +14,21 @@ keeps its plain body, so it also works with rosbridge.
 Over Zenoh, a robot sends the hash of each type instead of its definition. The codec then uses its
 own definition (`urc.protocol.ros.known_types`) if the hash is the same.
 
+The goals of actions are calls of hidden services (`urc.transports.ros.foxglove_actions`). A goal
+that was sent before STOP is not encoded any more. In the definitions of ROS 2, a goal lies next to
+its id, in a field of its own. A bridge may also list the fields of the goal after the id, because
+the bytes are the same. Results and feedback are defined in both ways, too. The codec returns their
+inner part, as rosbridge does.
+
 Services have their own definitions, which the transport delivers with the first call. The transport
 returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple, cast
 
+from urc.model.driver import STOPPED
 from urc.model.payload import Envelope, Payload
 from urc.problems import UrcError, printable
 from urc.protocol.ros.common_types import common_types
@@ -124,6 +132,14 @@ class TopicCodec:
         self._known: dict[str, Definitions] = {}
         """Definitions from the robot, keyed by the type's short name."""
         self._writers: dict[tuple[str, bool], Writer | None] = {}
+        self._nested: set[str] = set()
+        """Topics and services whose messages contain the feedback or the result in a field."""
+        self._stops = 0
+        """Number of presses of STOP."""
+
+    def stop_goals(self) -> None:
+        """Refuse all goals that are not encoded yet, after a press of STOP."""
+        self._stops += 1
 
     def reset(self) -> None:
         """Discard the definitions of the previous connection."""
@@ -132,6 +148,7 @@ class TopicCodec:
         self._compiled.clear()
         self._known.clear()
         self._writers.clear()
+        self._nested.clear()
 
     # -- received envelopes
 
@@ -152,6 +169,7 @@ class TopicCodec:
         said = envelope.attributes
         topic = str(said.get("topic"))
         self._sources.pop(topic, None)
+        self._nested.discard(topic)
         schema = _Schema(
             str(said.get("type")),
             str(said.get("encoding")),
@@ -163,7 +181,20 @@ class TopicCodec:
         if schema.encoding == "json":
             return  # the form ``json`` reads bytes
         self._is_ros1 = schema.encoding == "ros1"
-        self._sources[topic] = self._source(schema, self._wanted.get(topic, ALL))
+        wanted = self._wanted.get(topic, ALL)
+        if schema.type.endswith(_FEEDBACK) and self._is_nested(schema, "feedback"):
+            wanted = {"feedback": wanted}
+            self._nested.add(topic)
+        self._sources[topic] = self._source(schema, wanted)
+
+    def _is_nested(self, schema: _Schema, name: str) -> bool:
+        """Return whether a type of an action has its content in the field `name`."""
+        self._layout(schema)
+        short = plain_name(schema.type)
+        fields = self._known.get(short, {})[short].fields
+        return any(
+            one.name == name and one.type.endswith(f"_{name.capitalize()}") for one in fields
+        )
 
     def _source(self, schema: _Schema, wanted: Wanted) -> _Source:
         key = (schema, repr(wanted))
@@ -196,15 +227,30 @@ class TopicCodec:
     def _plain(self, envelope: Envelope) -> Envelope:
         said, body = envelope.attributes, envelope.body
         encoding = said.get("encoding")
-        if encoding is None or encoding == "json" or not isinstance(body, bytes):
+        if encoding is None or not isinstance(body, bytes):
             return envelope
+        is_message = envelope.verb == "message"
+        name = str(said.get("topic" if is_message else "service"))
+        is_feedback = is_message and name in self._nested
+        if encoding != "json":
+            plain = envelope._replace(body=self._read(envelope, body))
+        elif "result_of" in said:
+            plain = envelope._replace(body=_from_json(body))
+        else:
+            return envelope
+        if is_feedback:
+            return plain._replace(body=_part(plain.body, "feedback"))
+        return _result(plain, is_nested=name in self._nested) if "result_of" in said else plain
+
+    def _read(self, envelope: Envelope, body: bytes) -> dict[str, Any]:
+        said = envelope.attributes
         if envelope.verb == "message":
             source = self._sources.get(str(said.get("topic")))
         else:
             source = self._services.get(str(said.get("service")), (None, None, ""))[1]
         if source is None:
             raise BadRosMessage("a message arrived without the definition of its type")
-        return envelope._replace(body=source.read(body))
+        return source.read(body)
 
     # -- calls
 
@@ -214,9 +260,14 @@ class TopicCodec:
         parts = [cast("list[str]", said.pop(part)) for part in ("request", "response")]
         request, response = (_Schema(*part) for part in parts)
         service = str(said.get("service"))
+        if "goal" in said and said.pop("stops", None) != [self._stops]:
+            attributes = {"id": said.get("id"), "ok": False, "reason": STOPPED}
+            return Received(Envelope("response", attributes))
         try:
+            body = envelope.body
             if request.encoding == "json":
                 self._services[service] = (None, None, "json")
+                self._nested.add(service)
             else:
                 key = (request, "writer")
                 writer = self._compiled.get(key)
@@ -226,7 +277,11 @@ class TopicCodec:
                     self._keep(key, writer)
                 source = None if response.encoding == "json" else self._source(response, ALL)
                 self._services[service] = (writer, source, request.encoding)
-            return Received(reply=self._call(Envelope("call", said, envelope.body)))
+                if "goal" in said and not self._is_nested(request, "goal"):
+                    body = _flat(body)
+                if "result_of" in said and self._is_nested(response, "result"):
+                    self._nested.add(service)
+            return Received(reply=self._call(Envelope("call", said, body)))
         except (BadDefinition, Unwritable) as fault:
             attributes = {"id": said.get("id"), "ok": False, "reason": str(fault)}
             return Received(Envelope("response", attributes))
@@ -237,6 +292,12 @@ class TopicCodec:
             return envelope
         writer, _, encoding = found
         data = b"" if writer is None else writer.write(envelope.body).data
+        if (
+            "goal" in envelope.attributes
+            and envelope.body
+            and len(cast("dict[str, Any]", envelope.body)) == 1
+        ):
+            data += b"\0"  # the member of an empty goal, which a bridge does not list
         return envelope._replace(
             attributes={**envelope.attributes, "encoding": encoding, "data": data}
         )
@@ -253,6 +314,8 @@ class TopicCodec:
             return payload
         if payload.verb == "call":
             return self._call(payload)
+        if payload.verb == "goal":
+            return payload._replace(attributes={**payload.attributes, "stops": [self._stops]})
         if payload.verb != "publish":
             return payload
         writer = self._writer(plain_name(str(payload.attributes.get("type") or "")))
@@ -280,3 +343,44 @@ class TopicCodec:
             except UrcError:
                 self._writers[key] = None
         return self._writers[key]
+
+
+_OUTCOMES: Final = {4: "", 5: "the action was cancelled", 6: "the action was aborted"}
+"""Outcome of each status of a goal that has ended (action_msgs/msg/GoalStatus)."""
+_NO_STATUS: Final = "the bridge sent a result without a status"
+_FEEDBACK: Final = "_FeedbackMessage"
+"""End of the name of the type of an action's feedback."""
+
+
+def _result(said: Envelope, *, is_nested: bool) -> Envelope:
+    """Return the reply to a request for a goal's result as the reply to the goal."""
+    body = said.body if isinstance(said.body, Mapping) else {}
+    status = body.get("status")
+    reason = _OUTCOMES.get(status, "the action failed") if isinstance(status, int) else _NO_STATUS
+    attributes: dict[str, object] = {
+        "id": said.attributes.get("id"),
+        "ok": not reason,
+        "status": status,
+    }
+    if reason:
+        attributes["reason"] = reason
+    flat = {name: value for name, value in body.items() if name != "status"}
+    return Envelope("response", attributes, body.get("result") if is_nested else flat)
+
+
+def _flat(body: object) -> object:
+    """Return a request to send a goal with the goal's fields next to its id."""
+    if not isinstance(body, Mapping) or not isinstance(body.get("goal"), Mapping):
+        return body
+    return {"goal_id": body.get("goal_id"), **body["goal"]}
+
+
+def _part(body: object, name: str) -> Any:
+    return body.get(name) if isinstance(body, Mapping) else None
+
+
+def _from_json(data: bytes) -> object:
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError) as fault:
+        raise BadRosMessage(f"the message is not JSON ({fault})") from fault

@@ -2,7 +2,8 @@
 
 Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
 transport. `FoxgloveSession` implements the protocol. The session is discarded with the connection,
-so no data can be sent late. A task reads continuously, even if messages are consumed slowly,
+so no data can be sent late. Only the ids of unfinished goals are kept, so that a STOP after a
+reconnection cancels these goals. A task reads continuously, even if messages are consumed slowly,
 because the bridge drops a slow client's oldest data. Channels can appear and disappear. Changes are
 collected for `_SETTLE_S` seconds, because a broken robot may announce thousands of channels per
 second.
@@ -19,6 +20,7 @@ from typing import Final
 from urc.model.payload import Envelope, Payload
 from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
 from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession, TopicWish
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.websocket import WebSocketTransport
@@ -60,6 +62,7 @@ class FoxgloveTransport:
         self._wishes = wishes
         self._graph = TopicGraph(self._log, ros)
         self._published: dict[tuple[str, str], str] = {}
+        self._goals = UnfinishedGoals()
         self._session: FoxgloveSession | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._greeted = asyncio.Event()
@@ -93,6 +96,8 @@ class FoxgloveTransport:
             call_at=loop.call_at,
             clock=loop.time,
             published=self._published,
+            goals=self._goals,
+            flush=self._news.set,
         )
         self._tasks = [
             asyncio.create_task(self._read(session)),

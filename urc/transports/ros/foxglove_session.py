@@ -1,13 +1,16 @@
 """The state of one open Foxglove protocol connection: channels, subscriptions, calls.
 
 The session does no I/O. The session writes frames to a list, and the transport sends these frames.
-Each object serves a single connection, so no state is carried over to the next connection.
+Each object serves a single connection.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
 only to the driver's topics. The bridge sends every message at the full rate, so the session drops
 messages that arrive too soon. The last message of a burst is delivered later. The session passes
 messages on as bytes, preceded by the definition of the topic's type
 (`urc.protocol.ros.topic_codec`).
+
+Goals use the hidden services of actions (`urc.transports.ros.foxglove_actions`). Of a connection's
+state, only the unfinished goals and the published topics are carried over to the next connection.
 
 The protocol provides the parameters and the list of topics. The session uses both to answer the
 corresponding rosapi services itself, so the same document also works with rosbridge.
@@ -24,6 +27,7 @@ from typing import Any, Final, NamedTuple
 from urc.model.payload import Envelope
 from urc.transports._faults import one_line
 from urc.transports.base import NOTICE, TransportError
+from urc.transports.ros.foxglove_actions import AGAIN_S, FoxgloveActions, feedback_of
 from urc.transports.ros.foxglove_frames import (
     AdvertisedChannel,
     BadOperation,
@@ -38,6 +42,7 @@ from urc.transports.ros.foxglove_frames import (
     publish_frame,
     service_of,
 )
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import RobotTime
 from urc.transports.ros.types import spelled
@@ -98,6 +103,8 @@ class FoxgloveSession:
         call_at: Callable[[float, Callable[[], None]], object],
         clock: Callable[[], float],
         published: dict[tuple[str, str], str],
+        goals: UnfinishedGoals | None = None,
+        flush: Callable[[], object] = lambda: None,
     ) -> None:
         """Initialise the state for a new connection.
 
@@ -110,6 +117,8 @@ class FoxgloveSession:
             published: type of each published topic, keyed by topic and encoding. The mapping
                 persists across connections, so that a new connection announces all these topics
                 immediately.
+            goals: unfinished goals of this and earlier connections; None for no earlier goals.
+            flush: function that sends the written frames soon.
         """
         self.queue = queue
         self._wishes = {one.topic: one for one in wishes}
@@ -127,6 +136,12 @@ class FoxgloveSession:
         self._services: dict[str, ServiceType] = {}
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
+        self._own_calls: dict[int, Callable[[ServiceReply | None, str], None]] = {}
+        """Functions that receive the replies to the session's own calls."""
+        self._results: dict[int, str] = {}
+        """Goal of each pending call for a result, keyed by the call's number."""
+        self._flush = flush
+        self._actions = FoxgloveActions(UnfinishedGoals() if goals is None else goals, self)
         self._asked: dict[str, tuple[object, str]] = {}
         """Request number and service of each pending parameter query, keyed by query id."""
         self._listeners: dict[str, set[object]] = {}
@@ -211,10 +226,16 @@ class FoxgloveSession:
                 self._notice(str(problem))
                 continue
             most = 2 * MAX_CHANNELS
+            channel = channel._replace(topic=self._wish_name(channel.topic))
             if channel.topic not in self._wishes:
                 channel, most = channel._replace(schema=""), MAX_CHANNELS
             if channel.id in self._channels or len(self._channels) < most:
                 self._channels[channel.id] = channel
+
+    def _wish_name(self, topic: str) -> str:
+        """Return the name of a topic in the document, which is another one for feedback."""
+        name = feedback_of(topic)
+        return name if name in self._wishes else topic
 
     def _unadvertise(self, said: Mapping[str, Any]) -> None:
         for number in said.get("channelIds") or ():
@@ -299,23 +320,40 @@ class FoxgloveSession:
             service = service_of(one, self.encodings)
             if service.name in self._services or len(self._services) < MAX_CHANNELS:
                 self._services[service.name] = service
+                self._actions.offered(service.name)
 
     def _unadvertise_services(self, said: Mapping[str, Any]) -> None:
         gone = {number for number in said.get("serviceIds") or () if isinstance(number, int)}
         self._services = {n: one for n, one in self._services.items() if one.id not in gone}
 
     def _reply(self, said: ServiceReply) -> None:
+        done = self._own_calls.pop(said.call, None)
+        if done is not None:
+            done(said, "")
+            return
         number, service = self._calls.pop(said.call, (None, ""))
+        goal = self._results.pop(said.call, "")
+        if goal:
+            self._actions.ended(goal)
         if service:
             attributes = {"id": number, "ok": True, "service": service, "encoding": said.encoding}
+            if goal:
+                attributes["result_of"] = goal
             self.queue.answer(Envelope("response", attributes, said.data), len(said.data))
 
     def _call_failed(self, said: Mapping[str, Any]) -> None:
-        call = said.get("callId")
-        number, service = self._calls.pop(call, (None, "")) if isinstance(call, int) else (None, "")
+        call, text = said.get("callId"), said.get("message")
+        if not isinstance(call, int):
+            return
+        reason = one_line(text) if isinstance(text, str) and text else "refused"
+        done = self._own_calls.pop(call, None)
+        if done is not None:
+            done(None, reason)
+            return
+        number, service = self._calls.pop(call, (None, ""))
+        self._results.pop(call, None)  # the goal is kept, because the robot may still follow it
         if service:
-            text = said.get("message")
-            self._answer(number, one_line(text) if isinstance(text, str) and text else "refused")
+            self._answer(number, reason)
 
     def _answer(self, number: object, reason: str = "", values: object = None) -> None:
         attributes: dict[str, object] = {"id": number, "ok": not reason}
@@ -378,13 +416,7 @@ class FoxgloveSession:
                 del self._topics[topic], self._subscriptions[one.number]
 
     def _notice(self, text: str) -> None:
-        self._tell(f"the bridge reports: {text}")
-
-    def _tell(self, text: str) -> None:
-        """Write a line to the robot's log, once per connection."""
-        if text not in self._told and len(self._told) < MAX_STATUS:
-            self._told.add(text)
-            self.queue.answer(Envelope(NOTICE, {}, text))
+        self.tell(f"the bridge reports: {text}")
 
     # -- sending
 
@@ -399,11 +431,9 @@ class FoxgloveSession:
         elif envelope.verb == "call":
             self._call(envelope)
         elif envelope.verb == "cancel":
-            # This connection has started no goal, and STOP must not fail for it.
-            self._tell("the Foxglove protocol has no actions: no goal is cancelled")
+            self._actions.cancel(str(envelope.attributes.get("action") or ""))
         elif envelope.verb == "goal":
-            reason = "the Foxglove protocol has no actions; use via: rosbridge"
-            self._answer(envelope.attributes.get("id"), reason)
+            self._actions.start(envelope)
         elif envelope.verb in ("subscribe", "unsubscribe"):
             change = self._paused.discard if envelope.verb == "subscribe" else self._paused.add
             change(str(envelope.attributes.get("topic")))
@@ -472,20 +502,72 @@ class FoxgloveSession:
             return
         encoding, data = said.get("encoding"), said.get("data")
         if not isinstance(data, bytes):
-            attributes = {"service": name, "id": number, "request": service.request}
-            back = Envelope(
-                "unencoded", {**attributes, "response": service.response}, envelope.body
-            )
-            self.queue.answer(back, len(service.request[3]) + len(service.response[3]))
+            self.return_unencoded(service, {"id": number}, envelope.body)
             return
         if encoding == "json":
             data = self._as_json(envelope.body)
+        if goal := said.get("goal"):
+            self._actions.send(str(goal), number, service, data)
+            return
         self._number += 1
         while len(self._calls) >= MAX_PENDING:
-            del self._calls[next(iter(self._calls))]
+            oldest = next(iter(self._calls))
+            del self._calls[oldest]
+            self._results.pop(oldest, None)
         self._calls[self._number] = (number, name)
+        if result_of := said.get("result_of"):
+            self._results[self._number] = str(result_of)
         frame = call_frame(service.id, self._number, str(encoding), data)
         self._frames.append((frame, False))
+
+    # -- the parts that goals need; see `ActionCalls`
+
+    def service(self, name: str) -> ServiceType | None:
+        """Return a service that the bridge offers, or None."""
+        return self._services.get(name)
+
+    def has_service(self, suffix: str) -> bool:
+        """Return whether the bridge offers a service whose name has this end."""
+        return any(name.endswith(suffix) for name in self._services)
+
+    def call(
+        self, service: ServiceType, data: bytes, done: Callable[[ServiceReply | None, str], None]
+    ) -> None:
+        """Call a service; `done` receives the reply, or None and the reason for a failure."""
+        self._number += 1
+        while len(self._own_calls) >= MAX_PENDING:
+            del self._own_calls[next(iter(self._own_calls))]
+        self._own_calls[self._number] = done
+        frame = call_frame(service.id, self._number, service.request[1], data)
+        self._frames.append((frame, False))
+        self._flush()
+
+    def fail(self, number: object, reason: str) -> None:
+        """Report the failure of a request to the engine."""
+        self._answer(number, reason)
+
+    def return_unencoded(
+        self, service: ServiceType, attributes: dict[str, object], body: object
+    ) -> None:
+        """Return a request to the engine, which encodes it and sends it again."""
+        types = {"request": service.request, "response": service.response}
+        back = Envelope("unencoded", {"service": service.name, **attributes, **types}, body)
+        self.queue.answer(back, len(service.request[3]) + len(service.response[3]))
+
+    def tell(self, text: str) -> None:
+        """Write a line to the robot's log, once per connection."""
+        if text not in self._told and len(self._told) < MAX_STATUS:
+            self._told.add(text)
+            self.queue.answer(Envelope(NOTICE, {}, text))
+
+    def repeat(self, work: Callable[[], None]) -> None:
+        """Run `work` after `AGAIN_S` seconds, unless the connection has ended."""
+
+        def run() -> None:
+            if self.queue.ended is None:
+                work()
+
+        self._call_at(self._clock() + AGAIN_S, run)
 
     def _answer_as_rosapi(self, name: str, number: object, body: object) -> bool:
         """Answer a rosapi service through the protocol; return False for all other services."""

@@ -1,7 +1,7 @@
-"""The unfinished goals of one rosbridge transport, kept across its connections.
+"""The unfinished goals of one ROS bridge transport, kept across its connections.
 
-A rosbridge server does not cancel a goal when the client's connection is lost, so the robot drives
-on. The server accepts a goal's id from any connection. The transport therefore keeps the ids: STOP
+A bridge does not cancel a goal when the client's connection is lost, so the robot drives on. A goal
+can be cancelled by its id from any connection. The transport therefore keeps the ids: STOP
 must also cancel a goal that was sent before a loss.
 """
 

@@ -1,0 +1,361 @@
+"""Goals by the hidden services of actions: what is sent, and what STOP ends in each state."""
+
+import asyncio
+import json
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.e2e.transports.peers.foxglove_action import STORE
+from urc.model.driver import STOPPED
+from urc.model.payload import Envelope
+from urc.protocol.ros.topic_codec import TopicCodec
+from urc.transports.base import NOTICE
+from urc.transports.ros.foxglove_actions import HIDDEN, MAX_CANCELS
+from urc.transports.ros.foxglove_session import FoxgloveSession
+from urc.transports.ros.goals import UnfinishedGoals
+from urc.transports.ros.graph import TopicGraph
+from urc.transports.topic_queue import TopicReceiveQueue
+
+DOCK = Envelope("goal", {"action": "/dock", "id": 7, "stops": [0]}, {"speed": 0.5})
+CANCEL = Envelope("cancel", {"action": "/dock"})
+TEXTS = {
+    "send_goal": ("unique_identifier_msgs/UUID goal_id\nfloat32 speed", "bool accepted"),
+    "get_result": ("unique_identifier_msgs/UUID goal_id", "int8 status\nfloat32 way"),
+    "cancel_goal": ("action_msgs/GoalInfo goal_info", "int8 return_code"),
+}
+UUID = "\n" + "=" * 80 + "\nMSG: unique_identifier_msgs/UUID\nuint8[16] uuid"
+
+
+class Bridge:
+    """A session with a bridge that offers the action /dock, and what it was sent."""
+
+    def __init__(self, goals: UnfinishedGoals | None = None, encoding: str = "cdr") -> None:
+        self.queue = TopicReceiveQueue()
+        self.later: list[Callable[[], None]] = []
+        self.codec = TopicCodec()
+        self.encoding = encoding
+        self.session = FoxgloveSession(
+            self.queue,
+            (),
+            TopicGraph(lambda _: None, 2),
+            call_at=lambda _, work: self.later.append(work),
+            clock=lambda: 0.0,
+            published={},
+            goals=goals,
+        )
+
+    def offer(self, *names: str) -> "Bridge":
+        services = []
+        for number, name in enumerate(names or TEXTS):
+            parts = [
+                {"encoding": self.encoding, "schemaName": f"a/action/Dock_{name}_{part}",
+                 "schemaEncoding": "ros2msg", "schema": text + UUID}
+                for part, text in zip(("Request", "Response"), TEXTS[name], strict=True)
+            ]  # fmt: skip
+            services.append(
+                {"id": 10 + list(TEXTS).index(name), "name": f"/dock/_action/{name}",
+                 "type": "a/action/Dock", "request": parts[0], "response": parts[1]}
+            )  # fmt: skip
+            assert number < 3
+        self.hear({"op": "advertiseServices", "services": services})
+        return self
+
+    def hear(self, said: dict[str, Any]) -> None:
+        self.session.arrived(json.dumps(said).encode())
+
+    def reply(self, call: int, data: bytes) -> None:
+        name = self.encoding.encode()
+        self.session.arrived(struct.pack("<BIII", 3, 0, call, len(name)) + name + data)
+
+    def sent(self) -> list[tuple[str, int, bytes]]:
+        """Return service, call number and request of each call since the last time."""
+        found = []
+        for frame, is_text in self.session.written():
+            assert not is_text
+            _, service, call, size = struct.unpack_from("<BIII", frame)
+            found.append((list(TEXTS)[service - 10], call, frame[13 + size :]))
+        return found
+
+    def told(self) -> list[Envelope]:
+        """Return what the engine has been told since the last time."""
+
+        end = Envelope("end")
+        self.queue.answer(end)
+
+        async def take() -> list[Envelope]:
+            found = []
+            while (one := await self.queue.pop()) is not end:
+                found.append(one)
+            return found
+
+        return asyncio.run(take())
+
+    def encode(self) -> None:
+        """Encode what came back unencoded, as the engine does."""
+        for envelope in self.told():
+            reply = self.codec.received(envelope).reply
+            assert reply is not None, envelope
+            self.session.perform(reply)
+
+    def start(self) -> tuple[int, str]:
+        """Send a goal; return the number of the call and the goal's id."""
+        self.session.perform(DOCK)
+        self.encode()
+        ((name, call, data),) = self.sent()
+        assert name == "send_goal"
+        assert data[20:] == struct.pack("<f", 0.5)
+        return call, data[4:20].hex()
+
+    def cancelled(self) -> list[tuple[str, int]]:
+        """Return the goal id and the call of each cancellation since the last time."""
+        found = []
+        for name, call, data in self.sent():
+            assert name == "cancel_goal"
+            message = STORE.deserialize_cdr(data, "action_msgs/msg/CancelGoal_Request")
+            assert message.goal_info.stamp.sec == message.goal_info.stamp.nanosec == 0
+            found.append((bytes(message.goal_info.goal_id.uuid).hex(), call))
+        return found
+
+
+ALL = "0" * 32
+YES = b"\0\1\0\0\1"
+NO = b"\0\1\0\0\0"
+
+
+def code(number: int) -> bytes:
+    name = "action_msgs/msg/CancelGoal_Response"
+    said = STORE.types[name](return_code=number, goals_canceling=[])
+    return bytes(STORE.serialize_cdr(said, name))
+
+
+def test_a_cancellation_has_the_bytes_of_its_type() -> None:
+    bridge = Bridge().offer()
+    _, goal = bridge.start()
+    bridge.session.perform(CANCEL)
+    stamp = STORE.types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    every, one = bridge.sent()
+    for (_, _, data), wanted in ((every, ALL), (one, goal)):
+        uuid = np.frombuffer(bytes.fromhex(wanted), dtype=np.uint8)
+        number = STORE.types["unique_identifier_msgs/msg/UUID"](uuid=uuid)
+        info = STORE.types["action_msgs/msg/GoalInfo"](goal_id=number, stamp=stamp)
+        name = "action_msgs/msg/CancelGoal_Request"
+        message = STORE.types[name](goal_info=info)
+        assert data == bytes(STORE.serialize_cdr(message, name))
+
+
+def test_a_goal_that_is_cancelled_while_it_is_encoded_is_never_sent() -> None:
+    bridge = Bridge().offer()
+    bridge.session.perform(DOCK)
+    (returned,) = bridge.told()
+    bridge.session.perform(CANCEL)
+    assert [goal for goal, _ in bridge.cancelled()] == [ALL]
+    reply = bridge.codec.received(returned).reply
+    assert reply is not None
+    bridge.session.perform(reply)
+    assert bridge.sent() == []
+    (answer,) = bridge.told()
+    assert (answer.attributes["id"], answer.attributes["ok"]) == (7, False)
+    assert answer.attributes["reason"] == "the action was cancelled"
+
+
+def test_a_goal_of_an_earlier_connection_is_not_sent_on_the_next() -> None:
+    first = Bridge().offer()
+    first.session.perform(DOCK)
+    (returned,) = first.told()
+    later = Bridge().offer()
+    reply = later.codec.received(returned).reply
+    assert reply is not None
+    later.session.perform(reply)
+    assert later.sent() == []
+
+
+def test_a_goal_that_was_sent_before_stop_is_not_encoded_any_more() -> None:
+    """A robot without a command that cancels the action must not start it after STOP, either."""
+    bridge = Bridge().offer()
+    codec = bridge.codec
+    goal = codec.sent(DOCK._replace(attributes={"action": "/dock", "id": 7}))
+    assert isinstance(goal, Envelope)
+    bridge.session.perform(goal)
+    codec.stop_goals()
+    (returned,) = bridge.told()
+    found = codec.received(returned)
+    assert found.reply is None
+    assert found.envelope is not None
+    assert found.envelope.attributes == {"id": 7, "ok": False, "reason": STOPPED}
+    again = codec.sent(DOCK._replace(attributes={"action": "/dock", "id": 8}))
+    assert isinstance(again, Envelope)
+    bridge.session.perform(again)
+    (returned,) = bridge.told()
+    assert codec.received(returned).reply is not None
+
+
+def test_a_goal_that_the_robot_accepts_after_its_cancellation_is_cancelled_again() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.session.perform(CANCEL)
+    (_, every), (_, one) = bridge.cancelled()
+    bridge.reply(every, code(2))
+    bridge.reply(one, code(2))
+    bridge.reply(call, YES)
+    assert [name for name, _ in bridge.cancelled()] == [goal]
+
+
+def test_an_unknown_goal_is_cancelled_again_because_it_may_arrive_late() -> None:
+    """A frozen bridge delivers the goal of a lost connection after the cancellation."""
+    goals = UnfinishedGoals()
+    _, goal = Bridge(goals).offer().start()
+    goals.cancel("/dock")
+    later = Bridge(goals).offer()
+    for attempt in range(MAX_CANCELS):
+        ((name, call),) = later.cancelled()
+        assert name == goal
+        later.reply(call, code(0 if attempt == 3 else 2))
+        if attempt == 3:
+            break
+        later.later.pop()()
+    assert later.later == []
+    assert goals.cancelled() == []
+
+
+def test_cancellations_of_an_unknown_goal_end() -> None:
+    goals = UnfinishedGoals()
+    Bridge(goals).offer().start()
+    goals.cancel("/dock")
+    later = Bridge(goals).offer()
+    count = 0
+    while calls := later.cancelled():
+        count += 1
+        later.reply(calls[0][1], code(2))
+        later.later.pop()()
+    assert count == MAX_CANCELS
+    assert goals.cancelled(), "the next connection tries again"
+
+
+def test_a_cancellation_that_fails_is_repeated_and_told() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.reply(call, YES)
+    bridge.encode()
+    assert [name for name, _, _ in bridge.sent()] == ["get_result"]
+    bridge.session.perform(CANCEL)
+    number = bridge.cancelled()[1][1]
+    bridge.hear({"op": "serviceCallFailure", "callId": number, "message": "timed out"})
+    (notice,) = bridge.told()
+    assert notice == Envelope(NOTICE, {}, "a goal of /dock is not cancelled: timed out")
+    bridge.later.pop()()
+    assert [name for name, _ in bridge.cancelled()] == [goal]
+    bridge.queue.end("lost")
+    bridge.later.clear()
+
+
+def test_a_refused_cancellation_is_told_and_not_repeated() -> None:
+    bridge = Bridge().offer()
+    call, _ = bridge.start()
+    bridge.reply(call, YES)
+    bridge.encode()
+    bridge.sent()
+    bridge.session.perform(CANCEL)
+    bridge.reply(bridge.cancelled()[1][1], code(1))
+    (notice,) = bridge.told()
+    assert notice.body == "the robot refused to cancel a goal of /dock"
+    assert bridge.later == []
+
+
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [
+        (4, None),
+        (5, "the action was cancelled"),
+        (6, "the action was aborted"),
+        (9, "the action failed"),
+    ],
+)
+def test_a_result_ends_the_goal(status: int, reason: str | None) -> None:
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    call, goal = bridge.start()
+    bridge.reply(call, YES)
+    bridge.encode()
+    ((_, call, data),) = bridge.sent()
+    assert data == b"\0\1\0\0" + bytes.fromhex(goal)
+    bridge.reply(call, b"\0\1\0\0" + struct.pack("<b3xf", status, 2.5))
+    (raw,) = bridge.told()
+    answer = bridge.codec.received(raw).envelope
+    assert answer is not None
+    assert answer.attributes["ok"] == (reason is None)
+    assert answer.attributes.get("reason") == reason
+    assert answer.body == {"way": 2.5}
+    assert goals.cancel("/dock") == []
+
+
+def test_a_rejected_goal_is_not_kept() -> None:
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    call, _ = bridge.start()
+    bridge.reply(call, NO)
+    (answer,) = bridge.told()
+    assert answer.attributes["reason"] == "the action was rejected"
+    assert goals.cancel("/dock") == []
+
+
+def test_a_goal_without_an_answer_is_kept_for_stop() -> None:
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    call, goal = bridge.start()
+    bridge.hear({"op": "serviceCallFailure", "callId": call, "message": "timed out"})
+    (answer,) = bridge.told()
+    assert answer.attributes["reason"] == "timed out"
+    assert goals.cancel("/dock") == [goal]
+
+
+@pytest.mark.parametrize(
+    ("names", "action", "expected"),
+    [
+        ((), "/dock", HIDDEN),
+        (("get_result", "cancel_goal"), "/dock", HIDDEN),
+        (("send_goal", "cancel_goal"), "/undock", "there is no action /undock"),
+        (
+            ("send_goal", "get_result"),
+            "/dock",
+            "the bridge offers no service that cancels /dock, so no goal is sent",
+        ),
+    ],
+)
+def test_without_the_services_for_starting_and_cancelling_no_goal_is_sent(
+    names: tuple[str, ...], action: str, expected: str
+) -> None:
+    bridge = Bridge()
+    if names:
+        bridge.offer(*names)
+    bridge.session.perform(DOCK._replace(attributes={"action": action, "id": 7}))
+    (answer,) = bridge.told()
+    assert (answer.attributes["ok"], answer.attributes["reason"]) == (False, expected)
+    assert bridge.sent() == []
+
+
+def test_a_goal_that_never_ends_is_cancelled_when_the_service_appears() -> None:
+    """A reconnected bridge announces its services a moment later."""
+    goals = UnfinishedGoals()
+    _, goal = Bridge(goals).offer().start()
+    later = Bridge(goals)
+    later.session.perform(CANCEL)
+    assert later.sent() == []
+    later.offer("cancel_goal")
+    assert [name for name, _ in later.cancelled()] == [goal]
+
+
+@pytest.mark.parametrize("data", [b"", b"\0\1\0\0", b"{", b'{"accepted":[]}'])
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+def test_a_reply_that_is_none_breaks_nothing(data: bytes, encoding: str) -> None:
+    bridge = Bridge(encoding=encoding).offer()
+    bridge.session.perform(DOCK)
+    bridge.encode()
+    ((_, call, _),) = bridge.sent()
+    bridge.reply(call, data)
+    bridge.session.perform(CANCEL)
+    for _, call, _ in bridge.sent():
+        bridge.reply(call, data)
