@@ -71,10 +71,6 @@ async def started(action: RouteAction, robot: ConnectedRobot) -> "asyncio.Task[A
     return task
 
 
-def notes(robot: ConnectedRobot) -> list[str]:
-    return [note.text for note in robot.session.hub.notes]
-
-
 @pytest.mark.parametrize("is_flat", [True, False])
 async def test_a_route_its_progress_and_its_result(rover: FoxgloveRobot, is_flat: bool) -> None:
     async with acting(rover, is_flat=is_flat) as (action, robot):
@@ -215,9 +211,7 @@ async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -
     async with connected(rover.port) as robot:
         with pytest.raises(CommandFailed, match="start it with include_hidden: true"):
             await robot.command("follow", **ROUTE)
-        await robot.command("stop_route")
-        expected = "no unfinished goal of /follow_waypoints is known: none is cancelled"
-        await until(lambda: any(expected in one for one in notes(robot)))
+        await robot.command("stop_route")  # STOP must not fail for it
 
 
 async def test_an_action_that_does_not_exist_is_named(rover: FoxgloveRobot) -> None:

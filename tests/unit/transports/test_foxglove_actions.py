@@ -332,6 +332,8 @@ def test_without_the_services_for_starting_and_cancelling_no_goal_is_sent(
     if names:
         bridge.offer(*names)
     bridge.session.perform(DOCK._replace(attributes={"action": action, "id": 7}))
+    assert bridge.told() == [], "the services may be announced a moment later"
+    bridge.later.pop()()
     (answer,) = bridge.told()
     assert (answer.attributes["ok"], answer.attributes["reason"]) == (False, expected)
     assert bridge.sent() == []
@@ -345,7 +347,48 @@ def test_a_goal_that_never_ends_is_cancelled_when_the_service_appears() -> None:
     later.session.perform(CANCEL)
     assert later.sent() == []
     later.offer("cancel_goal")
-    assert [name for name, _ in later.cancelled()] == [goal]
+    assert [name for name, _ in later.cancelled()] == [ALL, goal]
+    later.later.pop()()
+    assert later.told() == later.sent() == []
+
+
+def test_a_restarted_server_cancels_goals_that_it_does_not_know() -> None:
+    """STOP is owed across a restart; its cancellation comes before the services are known."""
+    bridge = Bridge()
+    bridge.session.perform(CANCEL)
+    bridge.offer()
+    assert [name for name, _ in bridge.cancelled()] == [ALL]
+
+
+def test_a_cancellation_does_not_wait_for_long() -> None:
+    bridge = Bridge()
+    for _ in range(2):  # the second one adds no line to the log
+        bridge.session.perform(CANCEL)
+        bridge.later.pop()()
+    (notice,) = bridge.told()
+    expected = "no unfinished goal of /dock is known: none is cancelled"
+    assert notice == Envelope(NOTICE, {}, expected)
+    bridge.offer()
+    assert bridge.sent() == []
+
+
+def test_a_goal_waits_for_its_services_and_stop_ends_the_wait() -> None:
+    bridge = Bridge()
+    bridge.session.perform(DOCK)
+    bridge.offer()
+    bridge.later.pop()()
+    bridge.encode()
+    assert [name for name, _, _ in bridge.sent()] == ["send_goal"]
+    other = Bridge()
+    other.session.perform(DOCK)
+    other.session.perform(CANCEL)
+    other.offer()
+    assert [name for name, _ in other.cancelled()] == [ALL]
+    for work in other.later:
+        work()
+    (answer,) = other.told()
+    assert answer.attributes["reason"] == "the action was cancelled"
+    assert other.sent() == []
 
 
 @pytest.mark.parametrize("data", [b"", b"\0\1\0\0", b"{", b'{"accepted":[]}'])

@@ -12,6 +12,9 @@ is cancelled by its id. This is repeated on later connections, and while the rob
 goal: the bridge may deliver a goal late, after the cancellation. A goal that has not left URC when
 its action is cancelled is never sent.
 
+A bridge announces its services just after the connection opens. Goals and cancellations therefore
+wait a moment for their services.
+
 Sources: ROS 2 design, Actions; action_msgs/srv/CancelGoal; action_msgs/msg/GoalStatus.
 """
 
@@ -42,6 +45,7 @@ _CODE_AT: Final = 4
 _ALL: Final = bytes(16)
 """Goal id that means all goals of an action."""
 _ACCEPTED, _REJECTED, _UNKNOWN = 0, 1, 2
+_CANCELLED: Final = "the action was cancelled"
 HIDDEN: Final = "the bridge offers no actions: start it with include_hidden: true"
 
 
@@ -87,7 +91,9 @@ class FoxgloveActions:
         self._goals = goals
         self._calls = calls
         self._unsent: dict[str, str] = {}
-        """Action of each goal that the engine is encoding, keyed by goal id."""
+        """Action of each goal that waits for its service or for the engine, keyed by goal id."""
+        self._owed: set[str] = set()
+        """Actions whose goals are to be cancelled as soon as the bridge offers the service."""
         self._started: set[str] = set()
         """Goals that the robot has accepted on this connection."""
         self._cancels: dict[str, int] = {}
@@ -97,33 +103,46 @@ class FoxgloveActions:
 
     def start(self, envelope: Envelope) -> None:
         """Have the engine encode a goal, or report why the goal cannot be sent."""
-        said = envelope.attributes
-        action, number = str(said.get("action") or ""), said.get("id")
-        service = self._calls.service(action + SEND_GOAL)
-        if service is None or self._calls.service(action + CANCEL_GOAL) is None:
-            self._calls.fail(number, self._hindrance(one_line(action)[:_SHOWN], service))
-            return
-        goal = secrets.token_bytes(16)
+        goal, action = secrets.token_bytes(16), str(envelope.attributes.get("action") or "")
         while len(self._unsent) >= MAX_GOALS:
             del self._unsent[next(iter(self._unsent))]
         self._unsent[goal.hex()] = action
-        attributes = {"id": number, "goal": goal.hex(), "stops": said.get("stops")}
+        if not self._return(goal, action, envelope):
+            self._calls.repeat(lambda: self._return_late(goal, action, envelope))
+
+    def _return(self, goal: bytes, action: str, envelope: Envelope) -> bool:
+        """Return a goal to the engine; return False if the bridge lacks a service of the action."""
+        service = self._calls.service(action + SEND_GOAL)
+        if service is None or self._calls.service(action + CANCEL_GOAL) is None:
+            return False
+        said = envelope.attributes
+        attributes = {"id": said.get("id"), "goal": goal.hex(), "stops": said.get("stops")}
         body = {"goal_id": {"uuid": list(goal)}, "goal": envelope.body or {}}
         self._calls.return_unencoded(service, attributes, body)
+        return True
 
-    def _hindrance(self, action: str, service: ServiceType | None) -> str:
+    def _return_late(self, goal: bytes, action: str, envelope: Envelope) -> None:
+        """Return a goal to the engine that has waited for its services."""
+        number = envelope.attributes.get("id")
+        if goal.hex() not in self._unsent:
+            self._calls.fail(number, _CANCELLED)
+        elif not self._return(goal, action, envelope):
+            del self._unsent[goal.hex()]
+            self._calls.fail(number, self._hindrance(one_line(action)[:_SHOWN], action))
+
+    def _hindrance(self, shown: str, action: str) -> str:
         """Return the reason why no goal can be sent to an action."""
-        if service is not None:
-            return f"the bridge offers no service that cancels {action}, so no goal is sent"
+        if self._calls.service(action + SEND_GOAL) is not None:
+            return f"the bridge offers no service that cancels {shown}, so no goal is sent"
         if self._calls.has_service(SEND_GOAL):
-            return f"there is no action {action}"
+            return f"there is no action {shown}"
         return HIDDEN
 
     def send(self, goal: str, number: object, service: ServiceType, data: bytes) -> None:
         """Send an encoded goal, unless its action has been cancelled since."""
         action = self._unsent.pop(goal, None)
         if action is None:
-            self._calls.fail(number, "the action was cancelled")
+            self._calls.fail(number, _CANCELLED)
             return
         self._goals.add(goal, action)
         self._calls.call(service, data, lambda *reply: self._replied(goal, action, number, *reply))
@@ -168,7 +187,15 @@ class FoxgloveActions:
             for goal in goals:
                 self._cancels.pop(goal, None)
                 self._cancel(goal, action)
-        elif not goals:
+        elif len(self._owed) < MAX_GOALS:
+            self._owed.add(action)
+            self._calls.repeat(lambda: self._give_up(action, has_goals=bool(goals)))
+
+    def _give_up(self, action: str, *, has_goals: bool) -> None:
+        """Stop waiting for the service that cancels all goals of an action."""
+        is_missing = action in self._owed
+        self._owed.discard(action)
+        if is_missing and not has_goals:
             shown = one_line(action)[:_SHOWN]
             self._calls.tell(f"no unfinished goal of {shown} is known: none is cancelled")
 
@@ -178,8 +205,13 @@ class FoxgloveActions:
         Args:
             name: name of a service that the bridge has begun to offer.
         """
-        if name.endswith(CANCEL_GOAL):
-            self._cancel_again(name.removesuffix(CANCEL_GOAL))
+        if not name.endswith(CANCEL_GOAL):
+            return
+        action, service = name.removesuffix(CANCEL_GOAL), self._calls.service(name)
+        if action in self._owed and service is not None:
+            self._owed.discard(action)
+            self._calls.call(service, _cancellation(service, _ALL), _ignore)
+        self._cancel_again(action)
 
     def _cancel_again(self, action: str) -> None:
         for goal, name in self._goals.cancelled():
