@@ -91,6 +91,7 @@ async def test_a_route_on_the_map_is_paused_and_continued_and_stop_cancels_it(
     assert await page.evaluate(PLACE) == paused
     await page.get_by_role("button", name="Continue …").click()
     await page.get_by_role("button", name="Send", exact=True).click()
+    await expect(words).to_contain_text("On the way to waypoint 1 of 3")
     await page.wait_for_function(f"() => {PLACE} !== {paused!r}", timeout=30_000)
     await page.locator(STOP).first.click()
     await expect(words).to_contain_text("cancelled", timeout=10_000)
