@@ -68,8 +68,8 @@ class ActionCalls(Protocol):
     ) -> None:
         """Call a service; `done` receives the reply, or None and the reason for a failure."""
 
-    def fail(self, number: object, reason: str) -> None:
-        """Report the failure of a request to the engine."""
+    def answer(self, number: object, reason: str = "", values: object = None) -> None:
+        """Report the result of a request to the engine; a `reason` means failure."""
 
     def return_unencoded(
         self, service: ServiceType, attributes: dict[str, object], body: object
@@ -125,10 +125,10 @@ class FoxgloveActions:
         """Return a goal to the engine that has waited for its services."""
         number = envelope.attributes.get("id")
         if goal.hex() not in self._unsent:
-            self._calls.fail(number, _CANCELLED)
+            self._calls.answer(number, _CANCELLED)
         elif not self._return(goal, action, envelope):
             del self._unsent[goal.hex()]
-            self._calls.fail(number, self._hindrance(one_line(action)[:_SHOWN], action))
+            self._calls.answer(number, self._hindrance(one_line(action)[:_SHOWN], action))
 
     def _hindrance(self, shown: str, action: str) -> str:
         """Return the reason why no goal can be sent to an action."""
@@ -142,7 +142,7 @@ class FoxgloveActions:
         """Send an encoded goal, unless its action has been cancelled since."""
         action = self._unsent.pop(goal, None)
         if action is None:
-            self._calls.fail(number, _CANCELLED)
+            self._calls.answer(number, _CANCELLED)
             return
         self._goals.add(goal, action)
         self._calls.call(service, data, lambda *reply: self._replied(goal, action, number, *reply))
@@ -152,18 +152,18 @@ class FoxgloveActions:
     ) -> None:
         """Ask for the result of an accepted goal."""
         if reply is None:  # the goal is kept, because the robot may have received it
-            self._calls.fail(number, fault)
+            self._calls.answer(number, fault)
             return
         if not _first(reply, "accepted"):
             self._goals.finish(goal)
-            self._calls.fail(number, "the action was rejected")
+            self._calls.answer(number, "the action was rejected")
             return
         self._started.add(goal)
         if any(goal == one for one, _ in self._goals.cancelled()):
             self._cancel(goal, action)  # cancelled before the robot had accepted it
         service = self._calls.service(action + GET_RESULT)
         if service is None:
-            self._calls.fail(number, f"the bridge does not offer {action + GET_RESULT}")
+            self._calls.answer(number, f"the bridge does not offer {action + GET_RESULT}")
             return
         body = {"goal_id": {"uuid": list(bytes.fromhex(goal))}}
         attributes = {"id": number, "result_of": goal}

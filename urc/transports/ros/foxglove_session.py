@@ -13,10 +13,10 @@ Goals use the hidden services of actions (`urc.transports.ros.foxglove_actions`)
 state, only the unfinished goals and the published topics are carried over to the next connection.
 
 The protocol provides the parameters and the list of topics. The session uses both to answer the
-corresponding rosapi services itself, so the same document also works with rosbridge.
+corresponding rosapi services itself, so the same document also works with rosbridge
+(`urc.transports.ros.rosapi_answers`).
 """
 
-import json
 import logging
 import re
 import time
@@ -45,6 +45,7 @@ from urc.transports.ros.foxglove_frames import (
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.rosapi_answers import RosapiAnswers
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
 
@@ -141,9 +142,8 @@ class FoxgloveSession:
         self._results: dict[int, str] = {}
         """Goal of each pending call for a result, keyed by the call's number."""
         self._flush = flush
+        self._rosapi = RosapiAnswers(self)
         self._actions = FoxgloveActions(UnfinishedGoals() if goals is None else goals, self)
-        self._asked: dict[str, tuple[object, str]] = {}
-        """Request number and service of each pending parameter query, keyed by query id."""
         self._listeners: dict[str, set[object]] = {}
         self._number = 0
         self._time = RobotTime()
@@ -195,7 +195,7 @@ class FoxgloveSession:
             case "serviceCallFailure":
                 self._call_failed(said)
             case "parameterValues":
-                self._parameters(said)
+                self._take_parameters(said)
             case "connectionGraphUpdate":
                 self._graph_update(said)
             case "status":
@@ -353,27 +353,21 @@ class FoxgloveSession:
         number, service = self._calls.pop(call, (None, ""))
         self._results.pop(call, None)  # the goal is kept, because the robot may still follow it
         if service:
-            self._answer(number, reason)
+            self.answer(number, reason)
 
-    def _answer(self, number: object, reason: str = "", values: object = None) -> None:
+    def answer(self, number: object, reason: str = "", values: object = None) -> None:
+        """Report the result of a request to the engine; a `reason` means failure."""
         attributes: dict[str, object] = {"id": number, "ok": not reason}
         if reason:
             attributes["reason"] = reason
         self.queue.answer(Envelope("response", attributes, values))
 
-    def _parameters(self, said: Mapping[str, Any]) -> None:
+    def _take_parameters(self, said: Mapping[str, Any]) -> None:
+        """Answer a query for parameters, and deliver parameters that the driver subscribes to."""
         found = {
             one["name"]: one.get("value") for one in _listed(said, "parameters") if _named(one)
         }
-        number, service = self._asked.pop(str(said.get("id")), (None, ""))
-        if service == "/rosapi/get_param_names":
-            self._answer(number, values={"names": sorted(found)})
-        elif service == "/rosapi/get_param":
-            value = next(iter(found.values()), None)
-            reason = "" if value is not None else "there is no such parameter"
-            self._answer(number, reason, {"value": json.dumps(value), "successful": not reason})
-        elif service:
-            self._answer(number, values={"successful": True, "reason": ""})
+        self._rosapi.found(str(said.get("id")), found)
         for name, value in found.items():
             topic = PARAMETER + name
             if topic in self._wishes:
@@ -497,8 +491,8 @@ class FoxgloveSession:
         name, number = str(said.get("service") or ""), said.get("id")
         service = self._services.get(name)
         if service is None:
-            if not self._answer_as_rosapi(name, number, envelope.body):
-                self._answer(number, f"there is no service {one_line(name)[:_SHOWN]}")
+            if not self._rosapi.answer(name, number, envelope.body):
+                self.answer(number, f"there is no service {one_line(name)[:_SHOWN]}")
             return
         encoding, data = said.get("encoding"), said.get("data")
         if not isinstance(data, bytes):
@@ -542,10 +536,6 @@ class FoxgloveSession:
         self._frames.append((frame, False))
         self._flush()
 
-    def fail(self, number: object, reason: str) -> None:
-        """Report the failure of a request to the engine."""
-        self._answer(number, reason)
-
     def return_unencoded(
         self, service: ServiceType, attributes: dict[str, object], body: object
     ) -> None:
@@ -569,32 +559,20 @@ class FoxgloveSession:
 
         self._call_at(self._clock() + AGAIN_S, run)
 
-    def _answer_as_rosapi(self, name: str, number: object, body: object) -> bool:
-        """Answer a rosapi service through the protocol; return False for all other services."""
-        fields = body if isinstance(body, Mapping) else {}
-        if name == "/rosapi/topics":
-            found = {one.topic: one.type for one in self._channels.values()}
-            values = {"topics": list(found), "types": list(found.values())}
-            self._answer(number, values=values)
-            return True
-        if name not in ("/rosapi/get_param", "/rosapi/set_param", "/rosapi/get_param_names"):
-            return False
-        if "parameters" not in self.capabilities:
-            self._answer(number, "the bridge has no parameters")
-            return True
+    # -- the parts that parameters need; see `RosapiCalls`
+
+    def topics(self) -> dict[str, str]:
+        """Return the types of all topics, keyed by topic."""
+        return {one.topic: one.type for one in self._channels.values()}
+
+    def next_number(self) -> int:
+        """Return a number that this connection has not used yet."""
         self._number += 1
-        while len(self._asked) >= MAX_PENDING:
-            del self._asked[next(iter(self._asked))]
-        self._asked[str(self._number)] = (number, name)
-        # rosapi writes /node:name, and the Foxglove bridge writes /node.name.
-        parameter = str(fields.get("name") or "").replace(":", ".")
-        if name == "/rosapi/set_param":
-            one = {"name": parameter, "value": _of_text(fields.get("value"))}
-            self._op("setParameters", parameters=[one], id=str(self._number))
-        else:
-            names = [parameter] if name == "/rosapi/get_param" else []
-            self._op("getParameters", parameterNames=names, id=str(self._number))
-        return True
+        return self._number
+
+    def operate(self, name: str, **fields: object) -> None:
+        """Write an operation of the protocol."""
+        self._op(name, **fields)
 
     def _op(self, name: str, **fields: object) -> None:
         self._frames.append((encode_operation({"op": name, **fields}), True))
@@ -607,13 +585,3 @@ def _listed(said: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
 
 def _named(one: Mapping[str, Any]) -> bool:
     return isinstance(one.get("name"), str)
-
-
-def _of_text(value: object) -> object:
-    """Decode a parameter's value, which rosapi passes as JSON text."""
-    if not isinstance(value, str):
-        return value
-    try:
-        return json.loads(value)
-    except ValueError:
-        return value
