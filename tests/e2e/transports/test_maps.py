@@ -2,6 +2,8 @@
 
 import asyncio
 import math
+import struct
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,25 @@ ROBOT = Path(__file__).resolve().parents[3] / "robots" / "generic-ros2.yaml"
 WIDTH, HEIGHT = 2000, 1500
 WAIT_S = 30.0
 GRID = "nav_msgs/msg/OccupancyGrid"
+UPDATE = "\n".join(
+    (
+        "std_msgs/Header header",
+        "int32 x",
+        "int32 y",
+        "uint32 width",
+        "uint32 height",
+        "int8[] data",
+        "=" * 80,
+        "MSG: std_msgs/Header",
+        "builtin_interfaces/Time stamp",
+        "string frame_id",
+        "=" * 80,
+        "MSG: builtin_interfaces/Time",
+        "int32 sec",
+        "uint32 nanosec",
+    )
+)
+"""Definition of map_msgs/OccupancyGridUpdate, which rosbags does not have."""
 
 
 async def until(is_so: Callable[[], bool], repeat: Callable[[], None] = lambda: None) -> None:
@@ -148,3 +169,55 @@ async def test_a_robot_without_nav2_is_asked_for_none_of_its_topics() -> None:
                 await robot.command("navigate", to_x=1.0, to_y=1.0)
     finally:
         rover.close()
+
+
+async def test_changes_of_a_large_map_leave_the_event_loop_free() -> None:
+    """The processor time between two turns of the loop counts, so a busy computer is no fault."""
+    rover = FoxgloveRobot()
+    cells = np.random.default_rng(7).choice([0, 0, 0, -1, 100, 50], WIDTH * HEIGHT).astype(np.int8)
+    turns: list[float] = []
+
+    async def watch() -> None:
+        last = time.thread_time()
+        while True:
+            await asyncio.sleep(0)
+            now = time.thread_time()
+            turns.append(now - last)
+            last = now
+
+    try:
+        async with urc.connect(
+            urc.load(ROBOT), port=rover.port, bridge="foxglove", navigation=True
+        ) as robot:
+
+            def publish() -> None:
+                if robot.latest("floor") is None:
+                    rover.publish("/map", GRID, occupancy(cells))
+
+            await until(lambda: robot.latest("floor") is not None, publish)
+            await asyncio.sleep(1.0)
+            watching = asyncio.create_task(watch())
+            for number in range(1, 6):
+                change(rover, number)
+
+                def is_shown(expected: int = number) -> bool:
+                    floor: Any = robot.latest("floor")
+                    grid = read_grid(floor.value)
+                    return grid.cells[0] == expected
+
+                async with asyncio.timeout(WAIT_S):
+                    while not await asyncio.to_thread(is_shown):
+                        change(rover, number)
+                        await asyncio.sleep(0.2)
+            watching.cancel()
+            assert max(turns) < 0.03, "encoding this map takes more than 0.04 s"
+    finally:
+        rover.close()
+
+
+def change(rover: FoxgloveRobot, value: int) -> None:
+    """Set one cell, the first one of the map, as map_server and slam_toolbox do."""
+    name = "map_msgs/msg/OccupancyGridUpdate"
+    where = struct.pack("<iiIII", 0, 0, 1, 1, 1)
+    data = b"\0\1\0\0" + struct.pack("<iII4s", 1, 0, 4, b"map\0") + where + bytes([value])
+    rover.publish("/map_updates", name, data, UPDATE)
