@@ -40,7 +40,7 @@ class Envelope(NamedTuple):
     verb: str
     """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel``,
     ``request`` and ``get``. The transport delivers ``message``, ``response``, ``feedback`` and
-    ``notice``."""
+    ``notice``. A ROS transport answers ``topics`` with ``topics``."""
     attributes: Mapping[str, object] = NOTHING
     """Address and options: topic, type, method, path, headers, quality of service and so on. A
     request and its response have the same ``id``. Every response has the attribute ``ok``; a

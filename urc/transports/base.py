@@ -15,6 +15,7 @@ from urc.problems import UrcError
 
 __all__ = [
     "NOTICE",
+    "TOPICS",
     "ByteStream",
     "Tunnel",
     "ConnectFailed",
@@ -43,6 +44,11 @@ NOTICE: Final = "notice"
 """The verb of notices, which are envelopes that the transport itself creates. A notice's body is
 one line of text about an error that the robot does not report. Notices are written to the robot's
 log and do not prove that the robot is alive.
+"""
+
+TOPICS: Final = "topics"
+"""The verb of a request for the robot's topics, and of the answer, which the transport itself
+creates (`urc.transports.ros.topic_list`). An answer does not prove that the robot is alive.
 """
 
 

@@ -58,8 +58,11 @@ def test_tokens_are_those_of_the_design_document() -> None:
 def test_tokens_are_read() -> None:
     """Publishers and subscriptions; nodes, services and anything else are nothing."""
     found = token_of(PUBLISHER)
-    assert found == ("publisher", "/chatter", "std_msgs/msg/String", STRING, False)
-    assert token_of(SUBSCRIPTION) == found._replace(kind="subscription")
+    assert found == ("publisher", "/chatter", "std_msgs/msg/String", STRING, False, "/talker")
+    assert token_of(SUBSCRIPTION) == found._replace(kind="subscription", node="/listener")
+    inner = token_of(PUBLISHER.replace("/%/talker/", "/%robot1%arm/talker/"))
+    assert inner is not None
+    assert inner.node == "/robot1/arm/talker"
     kept = token_of(PUBLISHER.replace("/::,7:", "/:1:,1:"))
     assert kept is not None
     assert kept.is_transient

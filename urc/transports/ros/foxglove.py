@@ -169,7 +169,7 @@ class FoxgloveTransport:
         if not topics or session is None:
             return ""
         await asyncio.sleep(_CONNECTS_S)
-        lost = [topic for topic in topics if session.listeners(topic) == []]
+        lost = [topic for topic in topics if session.listeners(topic) == ()]
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
 
     async def probe(self) -> None:

@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 
 from urc.model.payload import Envelope
 from urc.transports._faults import one_line
-from urc.transports.base import NOTICE, TransportError
+from urc.transports.base import NOTICE, TOPICS, TransportError
 from urc.transports.ros.foxglove_actions import AGAIN_S, FoxgloveActions, feedback_of
 from urc.transports.ros.foxglove_frames import (
     AdvertisedChannel,
@@ -42,10 +42,12 @@ from urc.transports.ros.foxglove_frames import (
     publish_frame,
     service_of,
 )
+from urc.transports.ros.foxglove_topics import FoxgloveTopics
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import RobotTime
 from urc.transports.ros.rosapi_answers import RosapiAnswers
+from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
 
@@ -82,12 +84,13 @@ class TopicWish(NamedTuple):
 class _Subscription:
     """A subscribed topic, with the earliest time of its next message."""
 
-    __slots__ = ("channel", "due_s", "is_heard", "late", "number", "wish")
+    __slots__ = ("channel", "due_s", "late", "number", "received", "wish")
 
     def __init__(self, wish: TopicWish, channel: AdvertisedChannel, number: int) -> None:
         self.wish, self.channel, self.number = wish, channel, number
         self.due_s = float("-inf")
-        self.is_heard = False
+        self.received = 0
+        """Number of received messages."""
         self.late: Envelope | None = None
         """Newest message that arrived too soon and must be delivered later, or None."""
 
@@ -144,7 +147,8 @@ class FoxgloveSession:
         self._flush = flush
         self._rosapi = RosapiAnswers(self)
         self._actions = FoxgloveActions(UnfinishedGoals() if goals is None else goals, self)
-        self._listeners: dict[str, set[object]] = {}
+        self._graph_topics = FoxgloveTopics()
+        self._published_s = float("-inf")
         self._number = 0
         self._time = RobotTime()
         self._told: set[str] = set()
@@ -154,7 +158,6 @@ class FoxgloveSession:
         self.encodings: tuple[str, ...] = ()
         self.is_greeted = False
         """Whether the server information has arrived."""
-        self.has_graph = False
 
     def written(self) -> list[tuple[bytes, bool]]:
         """Remove and return the frames to send, each with a flag that is true for text."""
@@ -212,6 +215,7 @@ class FoxgloveSession:
             self._op("subscribeConnectionGraph")
         for (topic, encoding), kind in self._published.items():
             self._announce(topic, encoding, kind)
+            self._graph_topics.announced(topic, kind, ())
         names = [topic[len(PARAMETER) :] for topic in self._wishes if topic.startswith(PARAMETER)]
         if names and "parametersSubscribe" in self.capabilities:
             self._op("subscribeParameterUpdates", parameterNames=names)
@@ -288,7 +292,7 @@ class FoxgloveSession:
         one = self._subscriptions.get(said.subscription)
         if one is None:
             return
-        one.is_heard = True
+        one.received += 1
         self._time.told(said.time_ns, time.time_ns())
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
@@ -378,16 +382,16 @@ class FoxgloveSession:
     # -- the robot's graph and status
 
     def _graph_update(self, said: Mapping[str, Any]) -> None:
-        self.has_graph = True
-        for one in _listed(said, "subscribedTopics"):
-            if _named(one) and len(self._listeners) < MAX_CHANNELS:
-                self._listeners[one["name"]] = set(map(str, one.get("subscriberIds") or ()))
-        for name in said.get("removedTopics") or ():
-            self._listeners.pop(str(name), None)
+        self._graph_topics.update(said)
 
-    def listeners(self, topic: str) -> list[object] | None:
+    @property
+    def has_graph(self) -> bool:
+        """Whether the bridge reports the publishers and subscribers of topics."""
+        return self._graph_topics.is_known
+
+    def listeners(self, topic: str) -> tuple[str, ...] | None:
         """Return the nodes that subscribe to a topic; None if the nodes are unknown."""
-        return list(self._listeners.get(topic, ())) if self.has_graph else None
+        return self._graph_topics.subscribers_of(topic)
 
     def _status(self, said: Mapping[str, Any]) -> None:
         level, text = said.get("level"), one_line(str(said.get("message")))
@@ -404,7 +408,7 @@ class FoxgloveSession:
         number.
         """
         for one in list(self._topics.values()):
-            topic, is_refused = one.wish.topic, one.channel.id in channels and not one.is_heard
+            topic, is_refused = one.wish.topic, one.channel.id in channels and not one.received
             if is_refused and self._retries[topic] < MAX_RETRIES:
                 self._retries[topic] += 1
                 del self._topics[topic], self._subscriptions[one.number]
@@ -421,7 +425,10 @@ class FoxgloveSession:
             TransportError: the robot does not support the operation.
         """
         if envelope.verb == "publish":
+            self._published_s = self._clock()
             self._publish(envelope)
+        elif envelope.verb == TOPICS:
+            self._list_topics(envelope)
         elif envelope.verb == "call":
             self._call(envelope)
         elif envelope.verb == "cancel":
@@ -434,6 +441,13 @@ class FoxgloveSession:
             self.reconcile()
         else:
             raise TransportError(f"this connection cannot {envelope.verb}")
+
+    def _list_topics(self, request: Envelope) -> None:
+        """Answer a request for topics, unless URC publishes."""
+        if self._clock() - self._published_s >= QUIET_S:
+            received = {one.wish.topic: one.received for one in self._topics.values()}
+            answer = self._graph_topics.answer(request, self._channels.values(), received)
+            self.queue.answer(answer, 100 * len(answer.body))  # type: ignore[arg-type] # a list
 
     def _publish(self, envelope: Envelope) -> None:
         said = envelope.attributes
@@ -456,6 +470,7 @@ class FoxgloveSession:
         if number is None:
             kind = spelled(kind, "msg", 1 if encoding == "ros1" else 2)
             number = self._announce(topic, encoding, kind)
+            self._graph_topics.announced(topic, kind, self._channels.values())
             self._graph.learn({one.topic: one.type for one in self._channels.values()})
             if self._graph.publishes(topic, kind) and self.has_graph:
                 self._graph.subscribers(topic, self.listeners(topic) or ())

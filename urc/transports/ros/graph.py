@@ -8,6 +8,8 @@ subscribers. A connection with access to the graph, such as rosapi, passes the t
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
+from urc.transports.ros.topic_list import short_type
+
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
@@ -62,8 +64,8 @@ class TopicGraph:
 
     def _compare(self, topic: str, kind: str, verb: str) -> None:
         known = self._types.get(topic, "")
-        if known and kind and _plain(known) != _plain(kind):
-            self._log(f"{topic} {verb} {_plain(known)}, not {_plain(kind)}")
+        if known and kind and short_type(known) != short_type(kind):
+            self._log(f"{topic} {verb} {short_type(known)}, not {short_type(kind)}")
 
     def _log(self, text: str) -> None:
         if text not in self._told and len(self._told) < MAX_TOLD:
@@ -77,9 +79,3 @@ def version_of(types: Iterable[str]) -> int | None:
     if not words:
         return None
     return 2 if 3 in words else 1
-
-
-def _plain(kind: str) -> str:
-    """Return a type name in the short form ``pkg/Type``."""
-    words = kind.split("/")
-    return f"{words[0]}/{words[-1]}"

@@ -30,18 +30,21 @@ from typing import Any, Final, Literal
 
 from urc._extras import missing
 from urc.model.payload import Envelope, Payload
-from urc.model.values import NOTHING, Value
+from urc.model.values import Value
 from urc.transports.base import (
     NOTICE,
+    TOPICS,
     ConnectFailed,
     PeerClosed,
     TransportError,
 )
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph, version_of
+from urc.transports.ros.rosapi_topics import RosapiTopics
 from urc.transports.ros.rosbridge_cells import LARGE_BYTES, packed_operation
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
+from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.websocket import WebSocketTransport
 
@@ -249,6 +252,9 @@ class _Session:
         self._reader: asyncio.Task[None] | None = None
         self._fresh: dict[str, None] = {}
         """Topics whose first message may not have arrived yet, in order of publication."""
+        self._topics = RosapiTopics(self._ask, self._is_quiet)
+        self._published_s = float("-inf")
+        self._listing: asyncio.Task[None] | None = None
 
     async def start(self, subscriptions: tuple[RosSubscription, ...], answer_s: float) -> None:
         """Repeat lost cancellations, start reading, query the list of topics, and subscribe.
@@ -270,13 +276,17 @@ class _Session:
             await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
-        """Send an envelope as a rosbridge operation, or pause or resume a subscription."""
+        """Send an envelope as a rosbridge operation, change a subscription, or list topics."""
         if envelope.verb in ("subscribe", "unsubscribe"):
             change = self._client.resume if envelope.verb == "subscribe" else self._client.pause
             await self._write(change(str(envelope.attributes.get("topic"))))
             return
+        if envelope.verb == TOPICS:
+            self._list(envelope)
+            return
         frames = self._client.perform(envelope)
         if envelope.verb == "publish":
+            self._published_s = asyncio.get_running_loop().time()
             topic = str(envelope.attributes.get("topic"))
             if len(self._fresh) < KNOWN_TOPICS:
                 self._fresh[topic] = None
@@ -295,6 +305,20 @@ class _Session:
                 self._graph.subscribers(topic, nodes)
 
         return self._client.call_service("/rosapi/subscribers", told, {"topic": topic})
+
+    def _is_quiet(self) -> bool:
+        return asyncio.get_running_loop().time() - self._published_s >= QUIET_S
+
+    def _list(self, request: Envelope) -> None:
+        """Begin to answer a request for topics, unless URC publishes or answers another request."""
+        if self._is_quiet() and (self._listing is None or self._listing.done()):
+            self._listing = asyncio.create_task(self._answer(request))
+
+    async def _answer(self, request: Envelope) -> None:
+        with suppress(TransportError):  # the reader reports the end of the connection
+            answer = await self._topics.answer(request, self._client.received)
+            if answer is not None:
+                self.queue.answer(answer, 100 * len(answer.body))  # type: ignore[arg-type] # a list
 
     async def settle(self) -> str:
         """Wait for delivery; return a line about topics without subscribers, or ""."""
@@ -319,30 +343,35 @@ class _Session:
 
     async def _subscribers(self, topic: str) -> list[object] | None:
         """Return the nodes that subscribe to a topic; None if rosapi does not reply."""
-        said: asyncio.Future[Mapping[str, Any]] = asyncio.get_running_loop().create_future()
+        said = await self._ask("/rosapi/subscribers", {"topic": topic})
+        found = said.get("subscribers") if said is not None else None
+        return found if isinstance(found, list) else None
 
-        def told(values: Mapping[str, Any]) -> None:
+    async def _ask(self, service: str, arguments: Mapping[str, object]) -> Mapping[str, Any] | None:
+        """Call a service of rosapi; return None after an error or without a reply."""
+        said: asyncio.Future[Mapping[str, Any] | None]
+        said = asyncio.get_running_loop().create_future()
+
+        def told(values: Mapping[str, Any] | None) -> None:
             if not said.done():
                 said.set_result(values)
 
         await self._write(
-            self._client.call_service(
-                "/rosapi/subscribers", told, {"topic": topic}, lambda problem: told(NOTHING)
-            )
+            self._client.call_service(service, told, arguments, lambda problem: told(None))
         )
         try:
             async with asyncio.timeout(_ANSWER_S):
-                found = (await said).get("subscribers")
+                return await said
         except TimeoutError:
             return None
-        return found if isinstance(found, list) else None
 
     async def end(self) -> None:
         """Stop reading and wake all waiting tasks."""
         self.queue.end("the connection is closed")
-        if self._reader is not None:
-            self._reader.cancel()
-            await asyncio.gather(self._reader, return_exceptions=True)
+        tasks = [task for task in (self._reader, self._listing) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _write(self, frames: list[bytes]) -> None:
         for frame in frames:
@@ -385,7 +414,9 @@ class _Session:
         if isinstance(names, list):
             kinds = types if isinstance(types, list) and len(types) == len(names) else []
             found = dict(zip(names, kinds or [""] * len(names), strict=True))
-            self._graph.learn({str(name): str(kind) for name, kind in found.items()})
+            types = {str(name): str(kind) for name, kind in found.items()}
+            self._graph.learn(types)
+            self._topics.learn(types)
             self._graph.subscribed({one.topic: one.type for one in subscriptions})
             if self._is_auto:
                 self._client.spell(version_of(map(str, kinds)))

@@ -74,6 +74,8 @@ class RosClient:
         """Topics that were subscribed on this connection."""
         self._told: set[str] = set()
         """Actions for which a `cancel` without a known goal was reported."""
+        self.received: dict[str, int] = {}
+        """Number of received messages, keyed by subscribed topic."""
 
     @property
     def unanswered(self) -> int:
@@ -97,6 +99,7 @@ class RosClient:
             queue_length=wanted.queue_length,
             reconnect_on_close=False,
         )
+        self.received[wanted.topic] = 0
         topic.subscribe(lambda body: self._message(wanted.topic, body))
         self._listened[wanted.topic] = wanted, topic
         return self._protocol.written()
@@ -230,6 +233,7 @@ class RosClient:
 
     def _message(self, topic: str, body: object) -> None:
         envelope = Envelope("message", {"topic": topic}, body)
+        self.received[topic] += 1
         self._queue.message(topic, envelope, self._size_bytes)
 
     def _answer(self, number: object, is_ok: bool, values: object) -> None:

@@ -26,9 +26,10 @@ from urc.key_expressions import key_fault
 from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, late, one_line
 from urc.transports._stream_dialer import StreamDialer
-from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
+from urc.transports.base import NOTICE, TOPICS, ConnectFailed, PeerClosed, TransportError
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
 from urc.transports.ros.zenoh_names import (
     NO_HASH,
@@ -43,6 +44,7 @@ from urc.transports.ros.zenoh_names import (
     type_of_key,
 )
 from urc.transports.ros.zenoh_options import Ros2Options, Ros2Topic
+from urc.transports.ros.zenoh_topics import answer_from
 from urc.transports.zenoh_session import MAX_KEY_BYTES, ZenohSession
 
 __all__ = ["RosZenohTransport"]
@@ -80,6 +82,7 @@ class _Subscription:
         self.due_s = float("-inf")
         self.late: tuple[tuple[str, str], bytes] | None = None
         """Newest message that arrived too soon."""
+        self.received = 0
 
 
 class RosZenohTransport:
@@ -145,6 +148,9 @@ class RosZenohTransport:
         if data.verb in ("subscribe", "unsubscribe"):
             node.pause(str(data.attributes.get("topic")), is_paused=data.verb == "unsubscribe")
             return
+        if data.verb == TOPICS:
+            node.list_topics(data)
+            return
         if data.verb != "publish":
             raise TransportError(f"ros over zenoh cannot {data.verb}; supported: publish")
         await node.publish(data)
@@ -205,6 +211,7 @@ class _RosNode:
         self._subscriptions = {f"/{one.topic.strip('/')}": _Subscription(one)
                                for one in options.topics}  # fmt: skip
         self._publishers: dict[tuple[str, str], _Publisher] = {}
+        self._published_s = float("-inf")
         self._is_cancel_told = False
         self._fresh: dict[str, None] = {}
         """Published topics whose subscribers have not been checked."""
@@ -286,6 +293,7 @@ class _RosNode:
             self._time.told(sent_ns, time.time_ns())
         if not self._is_wanted(one, kind):
             return
+        one.received += 1
         now_s = self._loop.time()
         if one.topic.throttle_s and now_s < one.due_s:
             if one.late is None:
@@ -362,6 +370,16 @@ class _RosNode:
                 if one.topic == name and one.kind == "subscription"
                 and self._names.node.split("/")[2] not in key]  # fmt: skip
 
+    def list_topics(self, request: Envelope) -> None:
+        """Answer a request for topics, unless URC publishes."""
+        if self._loop.time() - self._published_s < QUIET_S:
+            return
+        own = self._names.node.split("/")[2]
+        tokens = [one for key, one in self._tokens.items() if own not in key]
+        received = {topic: one.received for topic, one in self._subscriptions.items()}
+        answer = answer_from(tokens, request, received)
+        self.session.queue.answer(answer, 100 * len(answer.body))  # type: ignore[arg-type] # a list
+
     # -- sending
 
     def nothing_cancelled(self) -> None:
@@ -373,6 +391,7 @@ class _RosNode:
 
     async def publish(self, envelope: Envelope) -> None:
         """Publish a message; raise `TransportError` if the robot could not read it."""
+        self._published_s = self._loop.time()
         said = envelope.attributes
         topic, kind = str(said.get("topic") or ""), str(said.get("type") or "")
         data, own = said.get("data"), str(said.get("hash") or "")

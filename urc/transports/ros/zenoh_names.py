@@ -77,6 +77,8 @@ class TopicToken(NamedTuple):
     hashed: str
     is_transient: bool
     """Whether a publisher keeps its last messages for later subscriptions."""
+    node: str = ""
+    """Name of the node, such as ``/robot1/driver``."""
 
 
 def tokens_key(domain: int) -> str:
@@ -97,6 +99,7 @@ def token_of(key: str) -> TopicToken | None:
         _plain(kind),
         hashed,
         durability == _TRANSIENT_LOCAL,
+        f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}",
     )
 
 
