@@ -19,6 +19,8 @@ from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.image_viewers import ImageViewers
 from urc.runtime.redaction import Redactor
+from urc.runtime.topic_check import TopicMismatch
+from urc.transports.ros.topic_list import TopicList, TopicRow
 
 if TYPE_CHECKING:
     from urc.runtime.audit_entry import AuditEntry
@@ -273,6 +275,12 @@ class Hub:
         """Progress of each sequence, by name; sequences that have never run are missing."""
         self.progress_count = 0
         """Number of sequence progress changes so far."""
+        self.topic_lists: dict[str, TopicList] = {}
+        """Newest list of the robot's topics, keyed by transport; empty without a connection."""
+        self.topic_mismatches: tuple[TopicMismatch, ...] = ()
+        """Differences between the driver's topics and the robot's."""
+        self.mismatches_count = 0
+        """Number of changes of `topic_mismatches` so far."""
         self.notes: deque[LogEntry] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
         """Total number of log entries, including dropped entries."""
@@ -332,6 +340,25 @@ class Hub:
         self.progress_count += 1
         self.revision += 1
         self._wake()
+
+    def set_topics(self, transport: str, listed: TopicList | None) -> None:
+        """Store the topics that a robot has reported; None after the end of the connection."""
+        if listed is None:
+            self.topic_lists.pop(transport, None)
+        elif self._redactor is None:
+            self.topic_lists[transport] = listed
+        else:
+            value = self._redactor.value
+            names = tuple(TopicRow._make((*value(row[:5]), row[5])) for row in listed.rows)
+            self.topic_lists[transport] = listed._replace(rows=names)
+
+    def set_mismatches(self, mismatches: Sequence[TopicMismatch]) -> None:
+        """Store the differences between the driver's topics and the robot's."""
+        if self.topic_mismatches != tuple(mismatches):
+            self.topic_mismatches = tuple(mismatches)
+            self.mismatches_count += 1
+            self.revision += 1
+            self._wake()
 
     @property
     def is_tapped(self) -> bool:

@@ -21,7 +21,7 @@ kernel. The reader and writer tasks handle bytes that must wait, large amounts o
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
 from urc.model.driver import TransportSpec
@@ -34,12 +34,14 @@ from urc.runtime.link_report import LinkReport
 from urc.runtime.output_buffer import STUCK_S, OutputBuffer
 from urc.transports.base import (
     NOTICE,
+    TOPICS,
     Prompt,
     SupportsReady,
     SupportsSettle,
     Transport,
     TransportError,
 )
+from urc.transports.ros.topic_list import list_of, request_for
 
 __all__ = ["Link"]
 
@@ -161,6 +163,15 @@ class Link:
         self._hurried_s = now
         self._retry_s = min(self._retry_s, now)
         self._hurried.set()
+
+    def ask_topics(self, names: Iterable[str], *, is_all: bool) -> None:
+        """Request the topics of a ROS robot; `Hub.topic_lists` receives the answer.
+
+        Without a connection, or while URC publishes, there is no answer.
+        """
+        ended = self._ended
+        if ended is not None and self._close_reason is None and not ended.done():
+            self._outgoing.write(request_for(names, is_all=is_all))
 
     def want_close(self, reason: str) -> None:
         """Close the connection after all output, or immediately if there is a `reason`."""
@@ -323,6 +334,7 @@ class Link:
                     task.cancel()
         finally:
             self._ended = None
+            self._hub.set_topics(self._name, None)
             for alarm in alarms:
                 alarm.cancel()
             await self._close()
@@ -439,6 +451,9 @@ class Link:
     def _pass_on(self, data: Payload) -> None:
         if isinstance(data, Envelope) and data.verb == NOTICE:
             self._report.log("warning", "notice", str(data.body))
+            return
+        if isinstance(data, Envelope) and data.verb == TOPICS:
+            self._hub.set_topics(self._name, list_of(data))
             return
         now = self._heard_s = self._clock.now()
         if self._hub.traffic_watchers:

@@ -8,6 +8,7 @@ from urc.protocol.events import Violation
 from urc.runtime.clock import Clock, Timer
 from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.redaction import REDACTED
+from urc.transports.base import TOPICS
 
 __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 
@@ -124,9 +125,9 @@ class LinkReport:
         self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
-        """Record traffic while the hub has traffic readers."""
-        if self._hub.traffic_watchers:
-            envelope = data if isinstance(data, Envelope) else None
+        """Record traffic while the hub has traffic readers; requests for topics are left out."""
+        envelope = data if isinstance(data, Envelope) else None
+        if self._hub.traffic_watchers and (envelope is None or envelope.verb != TOPICS):
             shown, now = traffic_of(data), self._clock.now()
             self._hub.saw(Traffic(now, self._transport, direction, shown, envelope))
             if self._hub.holds_back:

@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import count
@@ -318,6 +318,10 @@ class Session:
         """Try to reopen all lost connections without waiting for their backoff."""
         for link in self._links.values():
             link.reconnect()
+
+    def ask_topics(self, transport: str, names: Iterable[str], *, is_all: bool) -> None:
+        """Request the topics of a ROS robot; see `Link.ask_topics`."""
+        self._links[transport].ask_topics(names, is_all=is_all)
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, continue or end a sequence.

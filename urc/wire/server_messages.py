@@ -41,6 +41,8 @@ __all__ = [
     "TokenMessage",
     "SequenceRow",
     "ProgressMessage",
+    "TopicMismatchRow",
+    "TopicsMessage",
     "AlarmRow",
     "AlarmsMessage",
     "ServerMessage",
@@ -136,6 +138,28 @@ class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):
     """The state of every transport."""
 
     links: list[LinkRow]
+
+
+class TopicMismatchRow(msgspec.Struct, omit_defaults=True, frozen=True):
+    """One difference between the driver's topics and those of a ROS robot."""
+
+    code: str
+    """Kind of the difference, as in `urc.runtime.topic_check.TopicMismatch`."""
+    topic: str
+    found: str = ""
+    """Type or ROS version of the robot."""
+    wanted: str = ""
+    """Type or ROS version of the driver."""
+    commands: tuple[str, ...] = ()
+    """Commands that publish the topic."""
+    signals: tuple[str, ...] = ()
+    """Signals that the topic sets."""
+
+
+class TopicsMessage(Outbound, tag="topics", omit_defaults=False, frozen=True):
+    """All differences between the driver's topics and those of a ROS robot."""
+
+    mismatches: list[TopicMismatchRow]
 
 
 class LogRow(msgspec.Struct, frozen=True):
@@ -342,5 +366,6 @@ ServerMessage = (
     | TokenMessage
     | ProgressMessage
     | AlarmsMessage
+    | TopicsMessage
 )
 """Every text message that the server sends."""

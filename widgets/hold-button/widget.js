@@ -19,6 +19,7 @@ export default {
     const note = part(el, ".hold-button-note");
     const level = Number(options["level"] ?? 1);
     let locked = t("not ready yet");
+    let notice = "";
     /** @type {HoldState} */
     let state = { phase: "idle", reason: "", values: null };
 
@@ -29,7 +30,8 @@ export default {
       attribute(main, "aria-pressed", String(isHeld && state.phase === "held"));
       write(word, state.phase === "spent" && !isHeld ? WORDS.idle : WORDS[state.phase]);
       const ended = state.phase !== "idle" && state.reason ? `◆ ${state.reason}` : "";
-      write(note, ended || (isLocked ? `◆ ${locked}` : ""));
+      const why = isLocked ? locked : notice;
+      write(note, ended || (why ? `◆ ${why}` : ""));
     }
 
     hold("held", {
@@ -44,6 +46,7 @@ export default {
     return {
       update(_, { held }) {
         locked = held?.reason ?? t("no command is bound to this button");
+        notice = held?.notice ?? "";
         draw();
       },
     };

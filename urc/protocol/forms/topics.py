@@ -7,12 +7,12 @@ the end for all following levels. On Zenoh, a topic is a key expression
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
-from urc.expressions import ExpressionError
+from urc.expressions import ExpressionError, Template
 from urc.key_expressions import key_matches
 from urc.model.driver import Driver, Reply
-from urc.model.payload import Envelope, Payload, ReadSpec
+from urc.model.payload import Envelope, Payload, ReadSpec, each_of
 from urc.model.sequence import ExpectStep, all_steps
 from urc.model.values import Value
 from urc.problems import UrcError
@@ -20,6 +20,7 @@ from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
 
 __all__ = [
+    "PublishedTopic",
     "ReadTopic",
     "TopicReader",
     "frame_of",
@@ -27,6 +28,7 @@ __all__ = [
     "matches",
     "packed_topics",
     "paths_by_topic",
+    "published",
     "read_topics",
     "topic_of",
 ]
@@ -151,6 +153,44 @@ def read_topics(
             is_simple = any(read is one for one in simple)
             found[topic] = ReadTopic(fields | set(read.fields), is_only and is_simple)
     return found
+
+
+class PublishedTopic(NamedTuple):
+    """A topic that a command publishes."""
+
+    command: str
+    topic: str
+    type: str
+    """Declared type; "" if undeclared."""
+
+
+def published(
+    driver: Driver, transport: str, settings: Mapping[str, object]
+) -> Iterator[PublishedTopic]:
+    """Yield the topics that a driver's commands publish on a transport.
+
+    A topic that depends on the arguments of a command is left out.
+    """
+    for command in driver.commands.values():
+        for spec in each_of(command.send) if command.transport == transport else ():
+            if spec.form != "envelope" or spec.options.get("verb") != "publish":
+                continue
+            attributes = cast("Mapping[str, object]", spec.options["attributes"])
+            found = [_fixed(attributes.get(name), settings) for name in ("topic", "type")]
+            if found[0] and found[1] is not None:
+                yield PublishedTopic(command.name, found[0], found[1])
+
+
+def _fixed(value: object, settings: Mapping[str, object]) -> str | None:
+    """Return an attribute as text; None if the attribute depends on arguments."""
+    if isinstance(value, Template):
+        if not value.names <= {"settings"}:
+            return None
+        try:
+            value = value.evaluate({"settings": settings})
+        except ExpressionError:
+            return None
+    return str(value or "")
 
 
 def paths_by_topic(

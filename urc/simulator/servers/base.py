@@ -67,6 +67,8 @@ class ServerContext(NamedTuple):
     as ``now``."""
     topics: Mapping[str, Mapping[str, Value]] = NOTHING
     """Options of the driver's subscriptions on a message transport, keyed by topic."""
+    taken: Mapping[str, str] = NOTHING
+    """Types of the topics that the driver publishes, keyed by topic."""
     is_anywhere: bool = False
     """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None

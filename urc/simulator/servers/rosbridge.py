@@ -12,6 +12,7 @@ from websockets.asyncio.server import Server, ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
 from urc.model.payload import Envelope, Payload
+from urc.model.values import NOTHING
 from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
@@ -47,12 +48,16 @@ class _Wanted(NamedTuple):
 class Bridge:
     """The state shared by all clients of one bridge."""
 
-    def __init__(self, declared: Mapping[str, str]) -> None:
+    def __init__(self, declared: Mapping[str, str], taken: Mapping[str, str] = NOTHING) -> None:
         """Create the bridge.
 
-        `declared` maps each of the robot's topics to its type; "" means an unknown type.
+        Args:
+            declared: types of the topics that the robot publishes; "" means an unknown type.
+            taken: types of the topics that the robot subscribes to.
         """
         self.types = dict(declared)
+        self.declared = frozenset(declared)
+        self.taken = taken
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
         """Client that offers each service, keyed by service name."""
@@ -356,7 +361,7 @@ class BridgeClient:
         if folder not in ("/rosapi", "rosapi"):
             return None
         given = args if isinstance(args, dict) else {}
-        types = dict(sorted(self._bridge.types.items()))
+        types = dict(sorted({**self._bridge.types, **self._bridge.taken}.items()))
         match question:
             case "topics":
                 return {"topics": list(types), "types": list(types.values())}
@@ -371,6 +376,9 @@ class BridgeClient:
                 if any(topic in client.wanted for client in self._bridge.clients):
                     nodes.append("/rosbridge_websocket")
                 return {"subscribers": nodes}
+            case "publishers":
+                topic = str(given.get("topic"))
+                return {"publishers": ["/robot"] if topic in self._bridge.declared else []}
             case "services":
                 return {"services": sorted(self._bridge.servers)}
         return None
@@ -442,7 +450,10 @@ class RosbridgeServer(MessageServer):
         # A bridge names types in the style of its ROS version. The default is ROS 2.
         ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("version"))
         types = {name: str(how.get("type") or "") for name, how in context.topics.items()}
-        self._bridge = Bridge({name: spelled(kind, "msg", ros) for name, kind in types.items()})
+        self._bridge = Bridge(
+            {name: spelled(kind, "msg", ros) for name, kind in types.items()},
+            {name: spelled(kind, "msg", ros) for name, kind in context.taken.items()},
+        )
 
     def _endpoint(self, host: str, port: int) -> Endpoint:
         found = super()._endpoint(host, port)

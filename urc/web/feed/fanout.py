@@ -16,7 +16,13 @@ from urc.runtime.clock import Clock, LoopClock, Timer
 from urc.runtime.hub import Hub
 from urc.web.feed.image_cache import ImageCache, ImageSubscription, is_picture
 from urc.web.wire.ask import encode_progress
-from urc.web.wire.messages import Indexes, encode_links, encode_log, encode_values
+from urc.web.wire.messages import (
+    Indexes,
+    encode_links,
+    encode_log,
+    encode_topics,
+    encode_values,
+)
 from urc.web.wire.picture import as_frame
 
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
@@ -41,6 +47,8 @@ class FanoutPosition(NamedTuple):
     """Number of log lines sent to the client or dropped."""
     joined: int = 0
     """Hub revision at which the client joined; 0 after the client has received its first values."""
+    mismatches: int = 0
+    """Number of changes of the topic mismatches up to the mismatches last sent to the client."""
 
 
 @dataclass(slots=True)
@@ -180,7 +188,7 @@ class Fanout:
     def _encode(self, known: FanoutPosition, now_s: float) -> _Update:
         hub = self.hub
         messages: list[bytes] = []
-        revision, links, progress, notes, joined = known
+        revision, links, progress, notes, joined, mismatches = known
         if links != hub.links_count:
             messages.append(encode_links(hub.links.values(), now_s).encode())
         if revision < self._head:
@@ -192,8 +200,15 @@ class Fanout:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
             messages.append(encode_progress(tuple(hub.progress.values())).encode())
+        if mismatches != hub.mismatches_count:
+            messages.append(encode_topics(hub.topic_mismatches).encode())
         after = FanoutPosition(
-            revision, hub.links_count, hub.progress_count, hub.notes_count, joined
+            revision,
+            hub.links_count,
+            hub.progress_count,
+            hub.notes_count,
+            joined,
+            hub.mismatches_count,
         )
         frames = b"".join([as_frame(message, is_text=True) for message in messages])
         return _Update(after, frames, now_s)

@@ -38,6 +38,7 @@ from urc.web.drive.two_person import TwoPersonRule
 from urc.web.feed.alarm_feed import AlarmFeed
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.feed.fanout import Fanout
+from urc.web.feed.topic_watch import TopicWatch
 
 __all__ = [
     "Glimpse",
@@ -170,6 +171,8 @@ class LiveSession:
     """Event that is set when the session ends, for any reason."""
     began_s: float
     """Start time of the session on the service's clock, in seconds."""
+    topics: TopicWatch
+    """Watcher of the topics of a ROS robot."""
 
 
 class SessionFailed(UrcError):
@@ -423,7 +426,9 @@ class RobotService:
     async def _serve(self, session: SessionLike) -> None:
         each = keep_all_signals(self.robot.profile)
         fanout = Fanout(session.hub, clock=self.clock, each=each)
-        live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event(), self.clock.now())
+        topics = TopicWatch(self.robot.profile, dict(self.robot.settings), session, self.clock)
+        number, now_s = secrets.token_hex(8), self.clock.now()
+        live = LiveSession(session, fanout, number, asyncio.Event(), now_s, topics)
         opened = self._next_session()
         opened.set_result(live)
         self.controls.recorder.attend(session.hub, self.clock.now)
@@ -433,7 +438,7 @@ class RobotService:
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(work)
-                        for work in (live.fanout.run(), self.controls.serve(session))
+                        for work in (fanout.run(), topics.run(), self.controls.serve(session))
                     ]
                     await self._until_deserted()
                     self._next = None  # later clients wait for the next session

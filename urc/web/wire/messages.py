@@ -11,6 +11,7 @@ Messages from the server to the page, listed by their tag ``t``::
             s alarms (left out if all are normal). A signal with a history may have several values,
             oldest first; e has the number of its first value, by index
     links   the state of every transport
+    topics  the differences between the driver's topics and those of a ROS robot
     log     lines, oldest first; a gap in the numbers shows dropped lines
     reply   the only reply to a command
     pong    the reply to a ping
@@ -44,6 +45,7 @@ from urc.model.values import NOTHING, Reading, Sample, Signal
 from urc.runtime.connection_cause import cause_of
 from urc.runtime.hub import LinkStatus, LogEntry
 from urc.runtime.signal_sources import sources_of
+from urc.runtime.topic_check import TopicMismatch
 from urc.web.wire.text import cut, encoded, encoded_bytes, milliseconds, repaired
 from urc.wire.client_messages import INBOUND_BYTES, ClientMessage, CommandRequest, Ping
 from urc.wire.server_messages import (
@@ -64,6 +66,8 @@ from urc.wire.server_messages import (
     PongMessage,
     ReplyMessage,
     SignalRow,
+    TopicMismatchRow,
+    TopicsMessage,
     ValuesMessage,
 )
 
@@ -89,6 +93,7 @@ __all__ = [
     "encode_log",
     "encode_pong",
     "encode_reply",
+    "encode_topics",
     "encode_values",
 ]
 
@@ -209,6 +214,15 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
             ]
         )
     )
+
+
+def encode_topics(mismatches: Iterable[TopicMismatch]) -> str:
+    """Return the message with the differences between the driver's topics and the robot's."""
+    rows = []
+    for code, use, found, wanted in mismatches:
+        commands, signals = (use.names, ()) if use.is_published else ((), use.names)
+        rows.append(TopicMismatchRow(code, cut(use.topic), found, wanted, commands, signals))
+    return encoded(TopicsMessage(rows))
 
 
 def encode_log(notes: Iterable[LogEntry], first: int, now_s: float) -> str:

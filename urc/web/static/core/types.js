@@ -57,6 +57,8 @@
  * @property {string} reason Displayed reason why the command cannot be sent; "" if it can.
  * @property {boolean} isAnswered Whether the robot acknowledges the command; otherwise, it ends
  *   once it is sent.
+ * @property {string} [notice] Displayed reason why the command may have no effect, although it can be
+ *   sent; "" or omitted if there is none.
  *
  * @typedef {object} Argument One argument of a command, as the driver declares it.
  * @property {string} [name]
@@ -105,6 +107,14 @@
  * @property {number} faults
  * @property {string} cause name of the cause of a lost connection, see connection_causes.js
  * @property {boolean} ready whether the connection is open and its login has ended, even if no data has arrived yet
+ *
+ * @typedef {object} TopicMismatch One difference between the driver's topics and a ROS robot's.
+ * @property {string} code
+ * @property {string} topic
+ * @property {string} [found] Type or ROS version of the robot.
+ * @property {string} [wanted] Type or ROS version of the driver.
+ * @property {string[]} [commands] Commands that publish the topic.
+ * @property {string[]} [signals] Signals that the topic sets.
  *
  * @typedef {object} Line
  * @property {number} age

@@ -235,6 +235,9 @@ function take(message) {
     case "links":
       store.setLinks(message.links, nowMs);
       break;
+    case "topics":
+      store.setTopics(message.mismatches);
+      break;
     case "log":
       log.add(message.lines, message.first, session);
       panel.addLines(message.lines, message.first, session);

@@ -24,6 +24,7 @@ import { digitsIn } from "../core/number_format.js";
 import { ageText, textOf } from "../core/formatting.js";
 import { converted, factorOf, Units } from "../core/units.js";
 import { t } from "../core/words.js";
+import { TopicNotes } from "./topic_notes.js";
 
 export { ageText, DASH } from "../core/formatting.js";
 
@@ -72,6 +73,7 @@ export class Store {
     this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
+    this.topics = new TopicNotes();
     this.each = new SampleHistory();
     this.units = new Units();
     /** Signals in the units of inputs. @type {WeakMap<Conversion, Signal>} */
@@ -92,6 +94,7 @@ export class Store {
       if (!this.signals.has(name)) this.samples.delete(name);
     }
     this.hasPictures = hello.signals.some(({ type }) => PICTURES.has(type));
+    this.topics.take([]);
     this.edition += 1;
     this.links = new Map();
     this.downMs = new Map();
@@ -184,6 +187,29 @@ export class Store {
       else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
     }
     this.countLinks();
+  }
+
+  /**
+   * Store the notes about the topics of a ROS robot.
+   *
+   * @param {import("../core/types.js").TopicMismatch[]} mismatches
+   */
+  setTopics(mismatches) {
+    this.topics.take(mismatches);
+    this.edition += 1;
+  }
+
+  /**
+   * Return why signals have no live value, from the robot's topics; "" if the reason is unknown.
+   *
+   * @param {readonly string[]} names
+   * @param {number} nowMs
+   */
+  topicNote(names, nowMs) {
+    const notes = this.topics.signals;
+    if (notes.size === 0) return "";
+    const name = names.find((one) => notes.has(one) && this.state(one, nowMs) !== "live");
+    return name === undefined ? "" : (notes.get(name) ?? "");
   }
 
   /**

@@ -109,6 +109,8 @@ export class Cell {
     this.size = null;
     /** Note over the widget: loading, or slow. @type {HTMLElement | null} */
     this.note = null;
+    /** Note about the topics of its signals; "" without a note. */
+    this.topicNote = "";
   }
 
   async mount() {
@@ -274,6 +276,7 @@ export class Cell {
     this.edition = store.edition;
     this.seenOutlets = outlook;
     if (isOutputNews) this.markStopped(outlets);
+    this.tellTopics(store, nowMs);
     for (const bound of this.inputs) {
       const { input, signals, seen } = bound;
       const each = signals.map((_, place) => this.reading(bound, place, store, nowMs));
@@ -295,6 +298,19 @@ export class Cell {
     const stop = this.doors.input.stopReason();
     const waits = stop !== "" && Object.values(outlets).some(({ reason }) => reason === stop);
     this.el.toggleAttribute("data-stopped", waits);
+  }
+
+  /**
+   * Tell why the widget's signals have no value, if the robot's topics show the reason.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  tellTopics(store, nowMs) {
+    const note = store.topicNote(this.inputs.flatMap(({ signals }) => signals), nowMs);
+    if (note === this.topicNote) return;
+    this.topicNote = note;
+    this.remark(note ? `◆ ${note}` : "");
   }
 
   /**
@@ -334,7 +350,8 @@ export class Cell {
     this.budget.count(nowMs, performance.now() - startMs);
     if (this.budget.isSpent) this.fail(new Error(t("it blocks the page repeatedly")));
     else if (this.budget.isSlow !== wasSlow) {
-      this.remark(this.budget.isSlow ? t("◆ slow: updated once a second") : "");
+      const usual = this.topicNote ? `◆ ${this.topicNote}` : "";
+      this.remark(this.budget.isSlow ? t("◆ slow: updated once a second") : usual);
     }
   }
 
@@ -346,11 +363,12 @@ export class Cell {
     /** @type {Record<string, Outlet>} */
     const found = Object.create(null);
     const { input } = this.doors;
-    for (const [name, { line, refusal, isAnswered, isHeld, moves, role }] of this.outputs) {
+    for (const [name, { command, line, refusal, isAnswered, isHeld, moves, role }] of this.outputs) {
       const shared = refusal || store.hindrance(line, isHeld);
       const own = isHeld ? input.refusal() : input.hindrance(moves);
       const reason = shared || own || input.lacks(role);
-      found[name] = { isReady: reason === "", reason, isAnswered };
+      const notice = reason === "" ? (store.topics.commands.get(command) ?? "") : "";
+      found[name] = { isReady: reason === "", reason, isAnswered, notice };
     }
     return found;
   }

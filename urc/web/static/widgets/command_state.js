@@ -33,6 +33,7 @@ export class CommandState {
     this.phase = "";
     this.outcome = "";
     this.reason = t("not ready yet");
+    this.notice = "";
     this.isAnswered = false;
     this.isOver = false;
     /** Arguments of the next command. @type {Record<string, Value> | null} */
@@ -64,6 +65,7 @@ export class CommandState {
   /** @param {Outlet | undefined} outlet the argument of `update` */
   take(outlet) {
     this.reason = outlet ? outlet.reason : this.t("no command is bound here");
+    this.notice = outlet?.notice ?? "";
     this.isAnswered = outlet?.isAnswered ?? false;
     if (this.reason) this.next = null; // a blocked command is never sent later
     this.show();
@@ -138,7 +140,8 @@ export class CommandState {
    * @param {...string} more
    */
   note(...more) {
-    const hindrance = this.reason ? `◆ ${this.reason}` : "";
+    const why = this.reason || this.notice;
+    const hindrance = why ? `◆ ${why}` : "";
     return [this.outcome, hindrance, ...more].filter(Boolean).join(" · ");
   }
 }

@@ -48,6 +48,8 @@ export class Motion {
     /** Index of the speed step, from 0. */
     this.step = Math.min(this.speeds.length, Math.max(1, Math.round(chosen))) - 1;
     this.reason = ctx.t("not ready yet");
+    /** Why the motion may have no effect; "" if there is no reason. */
+    this.notice = "";
     /** @type {HoldState} */
     this.state = { phase: "idle", reason: "", values: null };
     /** @type {Push | null} */
@@ -132,6 +134,7 @@ export class Motion {
     return {
       update: (_, outputs) => {
         this.reason = outputs[this.output]?.reason ?? this.ctx.t("no command is bound");
+        this.notice = outputs[this.output]?.notice ?? "";
         this.draw();
       },
     };
@@ -149,6 +152,9 @@ export class Motion {
     let note = isLocked ? `◆ ${this.reason}` : "";
     if (phase === "asking") note = t("… taking control");
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
+    if (!note && this.notice) note = `◆ ${this.notice}`;
+    // The notice replaces the values, which would look as if the robot moved.
+    attribute(this.root, "data-notice", this.notice && phase === "held" ? "yes" : null);
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
     // A stopped or refused gesture moves nothing, so the control is drawn at rest under the finger.

@@ -164,7 +164,8 @@ export class Setpoint {
     const waiting = this.wishState === "waiting" && !this.isOptimistic ? ctx.t("requested {wish}", { wish: wished }) : "";
     const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";
     const outcome = this.state && giver.phase === "done" ? "" : giver.outcome;
-    const hindrance = giver.reason ? `◆ ${giver.reason}` : "";
+    const why = giver.reason || giver.notice;
+    const hindrance = why ? `◆ ${why}` : "";
     const state = this.state ? noteOf(this.state, ctx.t) : "";
     return [giver.isPending ? "" : outcome, hindrance, missed || waiting, state].filter(Boolean).join(" · ");
   }

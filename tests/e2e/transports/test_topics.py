@@ -1,0 +1,97 @@
+"""The topics of a robot behind each kind of ROS connection, and what is wrong with a profile."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.transports.ros_bases import BASES, STAMPED, TOPICS, open_base
+from urc.config.load import load_profile
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.session import Motion, Session
+from urc.runtime.topic_check import find_mismatches, topic_uses
+from urc.transports.ros.topic_list import TopicList, short_type
+
+pytestmark = pytest.mark.anyio
+
+WAIT_S = 30.0
+ROVER = """
+urc: 1
+kind: robot
+name: rover
+title: Rover
+settings:
+  port: { type: port, required: true }
+  line: { type: string, required: true }
+transports: { ros: { type: ros, via: "{{ settings.line }}", host: 127.0.0.1, port: "{{ settings.port }}", version: auto } }
+signals: { x: {}, y: {}, z: {} }
+messages:
+  odom: { subscribe: { topic: /odom, type: nav_msgs/Odometry }, json: { x: pose.pose.position.x } }
+  scan: { subscribe: { topic: /scan, type: nav_msgs/Path }, json: { y: header.frame_id } }
+  gone: { subscribe: { topic: /gone, type: std_msgs/Float32 }, json: { z: data } }
+commands:
+  drive:
+    args: { speed: { type: number, min: -1, max: 1, default: 0 } }
+    send: { publish: { topic: /cmd_vel, type: geometry_msgs/Twist, json: { linear: { x: "{{ speed }}" } } } }
+    hold: { repeat: 100ms, release: { speed: 0 }, watchdog: 500ms }
+  shout:
+    send: { publish: { topic: /nobody, type: std_msgs/Empty, json: {} } }
+tests: [{ name: x, feed: { ros: { message: { topic: /odom, json: { pose: { pose: { position: { x: 1 } } } } } } }, expect: { x: 1 } }]
+"""  # noqa: E501
+
+
+async def listed(session: Session, is_good: Callable[[TopicList], bool]) -> TopicList:
+    """Request all topics until the list is complete, as ROS announces them gradually."""
+    names = ["/odom", "/scan", "/gone", "/cmd_vel", "/nobody"]
+    async with asyncio.timeout(WAIT_S):
+        while True:
+            session.ask_topics("ros", names, is_all=True)
+            await asyncio.sleep(0.3)
+            found = session.hub.topic_lists.get("ros")
+            if found is not None and is_good(found):
+                return found
+
+
+@pytest.mark.parametrize("motion", ["here", "guarded"])
+@pytest.mark.parametrize("line", BASES)
+async def test_the_topics_of_a_robot_and_the_mistakes_of_a_profile(
+    line: str, motion: Motion, tmp_path: Path
+) -> None:
+    """Types, nodes and received messages, in the process of URC and through the guard."""
+    file = tmp_path / "rover.yaml"
+    file.write_text(ROVER)
+    profile = load_profile(str(file), built_in_catalog())
+    transports = built_in_catalog().transports
+    async with open_base(line, tmp_path) as base:
+        settings = {"port": base.port, "line": line}
+        async with Session(profile, settings, transports, motion=motion) as session:
+
+            def is_good(found: TopicList) -> bool:
+                rows = {one.name: one for one in found.rows}
+                return (
+                    TOPICS.keys() <= rows.keys()
+                    and bool(rows["/cmd_vel"].subscribers)
+                    and (rows["/odom"].received or 0) > 0
+                )
+
+            found = await listed(session, is_good)
+            rows = {one.name: one for one in found.rows}
+            for topic, kind in TOPICS.items():
+                types = rows[topic].carries or ()
+                assert [short_type(one) for one in types] == [short_type(kind)], topic
+                assert rows[topic].publishers, topic
+            assert [short_type(one) for one in rows["/cmd_vel"].takes or ()] == [
+                short_type(STAMPED)
+            ]
+            assert rows["/map"].received is None
+            assert found.version == 2
+            uses = topic_uses(profile.driver, settings)
+            told = find_mismatches(uses, session.hub.topic_lists, {"ros": "auto"})
+            assert {(one.use.topic, one.code, one.found) for one in told} == {
+                ("/scan", "carries-type", "sensor_msgs/LaserScan"),
+                ("/gone", "no-publisher", ""),
+                ("/cmd_vel", "takes-type", "geometry_msgs/TwistStamped"),
+                ("/nobody", "no-subscriber", ""),
+            }
+        assert session.hub.topic_lists == {}

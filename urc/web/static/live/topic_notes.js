@@ -1,0 +1,47 @@
+// @ts-check
+/**
+ * The differences between the driver's topics and those of a ROS robot, as notes. ROS reports none
+ * of them: a command on a topic without subscribers simply has no effect. The notes block nothing.
+ *
+ * @typedef {import("../core/types.js").TopicMismatch} TopicMismatch
+ */
+import { t } from "../core/words.js";
+
+/** The notes of one robot. */
+export class TopicNotes {
+  constructor() {
+    /** Command → its note. @type {Map<string, string>} */
+    this.commands = new Map();
+    /** Signal → its note. @type {Map<string, string>} */
+    this.signals = new Map();
+  }
+
+  /** @param {TopicMismatch[]} mismatches all mismatches */
+  take(mismatches) {
+    this.commands.clear();
+    this.signals.clear();
+    for (const one of mismatches) {
+      const note = noteOf(one);
+      for (const name of one.commands ?? []) this.commands.set(name, note);
+      for (const name of one.signals ?? []) this.signals.set(name, note);
+    }
+  }
+}
+
+/** @param {TopicMismatch} mismatch */
+export function noteOf({ code, topic, found = "", wanted = "" }) {
+  switch (code) {
+    case "no-subscriber":
+      return t("Nothing subscribes to {topic}", { topic });
+    case "no-publisher":
+      return t("Nothing publishes {topic}", { topic });
+    case "takes-type":
+      return t("{topic} carries {found}, but the profile sends {wanted}", { topic, found, wanted });
+    case "carries-type":
+      return t("{topic} carries {found}, but the profile expects {wanted}", { topic, found, wanted });
+    case "ros-version":
+      return t("This is ROS {found}, but the profile is for ROS {wanted}", { found, wanted });
+    default:
+      return `${topic}: ${code}`;
+  }
+}
