@@ -54,8 +54,15 @@ class Candidate:
     """One address of a bridge, with a transport for each kind of bridge."""
 
     def __init__(
-        self, wire: WebSocketTransport, foxglove: FoxgloveTransport, other: RosbridgeTransport
+        self,
+        port: int,
+        wire: WebSocketTransport,
+        foxglove: FoxgloveTransport,
+        other: RosbridgeTransport,
     ) -> None:
+        self.port = port
+        self.kind = "rosbridge"
+        """Kind of the bridge at the last successful attempt."""
         self._wire = wire
         self._foxglove = foxglove
         self._rosbridge = other
@@ -66,6 +73,7 @@ class Candidate:
         is_foxglove = self._wire.subprotocol in SUBPROTOCOLS
         bridge: _Bridge = self._foxglove if is_foxglove else self._rosbridge
         await bridge.begin(timeout_s)
+        self.kind = "foxglove" if is_foxglove else "rosbridge"
         return bridge
 
 
@@ -82,6 +90,11 @@ class AnyBridgeTransport:
     def address(self) -> str:
         """The transport's target in readable form, such as ``ros 192.168.1.5``."""
         return self._bridge.address if self._bridge is not None else f"ros {self._where}"
+
+    @property
+    def chosen(self) -> tuple[str, int]:
+        """Kind and port of the bridge that answered last."""
+        return self._candidates[0].kind, self._candidates[0].port
 
     async def open(self, timeout_s: float) -> None:
         """Connect to a bridge within `timeout_s` seconds, or raise `ConnectFailed`."""
@@ -179,7 +192,7 @@ def from_setup(setup: TransportSetup) -> Transport:
             return other
         if via == "foxglove":
             return foxglove
-        candidates.append(Candidate(wire, foxglove, other))
+        candidates.append(Candidate(number, wire, foxglove, other))
     return AnyBridgeTransport(candidates, host if port is None else where)
 
 
