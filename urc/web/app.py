@@ -57,6 +57,7 @@ from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
 from urc.web.load.widget_trust import WidgetTrust
 from urc.web.manage.manager import Manager
+from urc.web.manage.new_robot import NewRobotRoutes
 from urc.web.manage.playback_control import move_playback, playback_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
@@ -97,6 +98,7 @@ __all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
 _PAGE = {"cache-control": "no-store"}
 _LATE_S = 2.0
 """Interval between audit entries with counts of repeated events, in seconds."""
+_Part = AuditRoutes | ManageRoutes | SettingsRoutes | NewRobotRoutes | DevStart
 _NO_ROBOT = "this server has no robot with that name"
 
 
@@ -158,6 +160,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
         modules=import_map(vendored()),
         ways=NavigationLinks(
             has_managers=options.robot_options is not None,
+            has_new=options.robot_options is not None and options.robot_options.shows_installed,
             has_dev=options.remake is not None,
             has_audit=audit is not None,
         ),
@@ -284,14 +287,15 @@ class _Routes:
             self.dev = Dev(self.fleet.services, options.remake, self.renew)
             self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
-    def with_calls(self) -> "list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart]":
+    def with_calls(self) -> "list[_Part]":
         """Return the objects that provide both pages and API calls."""
-        found: list[AuditRoutes | ManageRoutes | SettingsRoutes | DevStart] = [
+        found: list[_Part] = [
             AuditRoutes(self.audit, self.recorder, lambda: self.services, self.ways)
         ]
         if self.manager is not None:
             found.append(ManageRoutes(self.manager, self.ways, self.recorder))
             found.append(SettingsRoutes(self.manager, self.ways, self.recorder))
+            found.append(NewRobotRoutes(self.manager, self.ways, self.recorder))
         if self.dev_start is not None:
             found.append(self.dev_start)
         return found

@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -15,13 +16,17 @@ from urc.model.profile import Profile, Setting
 from urc.motion.lease import Operator as Screen
 from urc.problems import Problem, UrcError
 from urc.runtime.hub import Traffic
+from urc.runtime.topic_check import TopicUse
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.profile import text
-from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
+from urc.transports.ros.topic_list import TopicList, TopicRow
+from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, TOPICS_S, Backlog, DevClient
 from urc.web.dev.rows import TrafficRow
+from urc.web.dev.topics import encode_topic_table
 from urc.web.dev.watch import CheckedProfile, ProfileWatch
 from urc.web.feed.client_socket import FixedRights, SocketPeer
+from urc.web.feed.topic_watch import TopicRates
 from urc.web.fleet.robots import Robot, RobotService
 
 pytestmark = pytest.mark.anyio
@@ -259,3 +264,48 @@ async def test_a_broken_version_is_told_in_the_terminal(caplog: pytest.LogCaptur
         it.watch._judge(CheckedProfile(None, problems, ()))
         assert it.watch.state == "broken"
         assert "lamp/widget.yaml:5:1: error unknown-key" in caplog.text
+
+
+async def test_topics_are_sent_only_while_the_page_shows_them() -> None:
+    """Each change once, with hostile names escaped."""
+    row = TopicRow("/odom", ("nav_msgs/msg/Odometry",), None, ("/<b>",), (), 3)
+    listed = TopicList((row,), 100_000, 2, True, True)
+    async with scene() as made:
+        made.robot.hub.set_topics("wire", listed)
+        await made.clock.advance(5)
+        assert made.line.of_type("topics") == []
+        made.line.say({"t": "topics", "shown": True})
+        for _ in range(20):
+            await made.clock.advance(TOPICS_S)
+        (told,) = made.line.of_type("topics")
+        shown = {"name": "/odom", "types": ["nav_msgs/msg/Odometry"], "publishers": ["/<b>"],
+                 "subscribers": []}  # fmt: skip
+        table = {"transport": "wire", "total": 100_000, "version": 2, "known": True}
+        assert told == {"t": "topics", "tables": [{**table, "rows": [shown]}]}
+        made.robot.hub.set_topics("wire", listed._replace(total=7))
+        await made.clock.advance(2 * TOPICS_S)
+        assert [one["tables"][0]["total"] for one in made.line.of_type("topics")] == [100_000, 7]
+        made.line.say({"t": "topics", "shown": False})
+        await made.clock.advance(2 * TOPICS_S)
+        made.robot.hub.set_topics("wire", listed._replace(total=9))
+        await made.clock.advance(10)
+        assert len(made.line.of_type("topics")) == 2
+
+
+def test_used_topics_come_first_with_their_rates() -> None:
+    rates = TopicRates()
+    rows = tuple(TopicRow(name, received=10 if name == "/odom" else None) for name in
+                 ("/a", "/odom", "/cmd_vel"))  # fmt: skip
+    rates.take("ros", TopicList((TopicRow("/odom", received=0),), 1, 2, True, True), 0.0)
+    listed = TopicList(rows, 3, 2, True, True)
+    rates.take("ros", listed, 4.0)
+    uses = [
+        TopicUse("ros", "/cmd_vel", "geometry_msgs/Twist", True, ("drive",)),
+        TopicUse("ros", "/odom", "nav_msgs/Odometry", False, ("x", "y")),
+    ]
+    (table,) = json.loads(encode_topic_table({"ros": listed}, uses, rates))["tables"]
+    assert table["rows"] == [
+        {"name": "/cmd_vel", "used": ["drive"], "is_used": True},
+        {"name": "/odom", "rate": 2.5, "used": ["x", "y"], "is_used": True},
+        {"name": "/a"},
+    ]

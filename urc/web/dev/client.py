@@ -20,12 +20,14 @@ from urc.problems import UrcError
 from urc.runtime.document_tests import sample_settings
 from urc.runtime.hub import EventTap, LogEntry, Traffic
 from urc.runtime.redaction import stand_ins
+from urc.transports.ros.topic_list import TopicList
 from urc.web.dev import wire
 from urc.web.dev.preview import Preview, preview
 from urc.web.dev.rows import TrafficRow, note_row, traffic_row
+from urc.web.dev.topics import encode_topic_table
 from urc.web.dev.tryout import pasted_bytes, try_out
 from urc.web.dev.watch import ProfileWatch
-from urc.web.fleet.robots import SessionFailed, missing_settings
+from urc.web.fleet.robots import LiveSession, SessionFailed, missing_settings
 from urc.web.page_socket import STALL_S, ClientSocket, FlowControl, TokenBucket
 from urc.web.wire.messages import (
     CLOSE_BAD_MESSAGES,
@@ -51,6 +53,8 @@ BEHIND_S = 0.05
 HELD_S = 0.5
 """Maximum delay of text that may be the beginning of a secret, in seconds."""
 RETRY_S = 1.0
+TOPICS_S = 0.5
+"""Interval between two checks whether the list of topics has changed, in seconds."""
 
 log = logging.getLogger(__name__)
 
@@ -113,6 +117,8 @@ class DevClient:
         self._allowance = TokenBucket(MESSAGES_PER_S, self._clock.now())
         self._bad = 0
         self._edition = -1
+        self._shows_topics = asyncio.Event()
+        """Event that is set while the page shows the robot's topics."""
 
     async def serve(self) -> None:
         """Serve the developer page over the accepted socket until either side closes."""
@@ -152,11 +158,26 @@ class DevClient:
                         self._push(note_row(note))
                     listening = asyncio.ensure_future(self._listen(tap))
                     ended = asyncio.ensure_future(live.ended.wait())
+                    topics = asyncio.ensure_future(self._list_topics(live))
                     try:
                         await asyncio.wait((listening, ended), return_when=asyncio.FIRST_COMPLETED)
                     finally:
-                        listening.cancel()
-                        ended.cancel()
+                        for task in (listening, ended, topics):
+                            task.cancel()
+
+    async def _list_topics(self, live: LiveSession) -> None:
+        """Send the robot's topics whenever they change, while the page shows them."""
+        watch, hub = live.topics, live.session.hub
+        while True:
+            await self._shows_topics.wait()
+            sent: dict[str, TopicList] | None = None
+            with watch.shown():
+                while self._shows_topics.is_set():
+                    # A page that reads slowly gets fewer lists.
+                    if hub.topic_lists != sent and not self._answers:
+                        sent = dict(hub.topic_lists)
+                        self._log(encode_topic_table(sent, watch.uses, watch.rates))
+                    await self._clock.sleep(TOPICS_S)
 
     async def _listen(self, tap: EventTap) -> None:
         dropped = 0
@@ -252,6 +273,12 @@ class DevClient:
             return
         if isinstance(asked, Ping):
             self._log(encode_pong(asked, now_s))
+            return
+        if isinstance(asked, wire.TopicsRequest):
+            if asked.shown:
+                self._shows_topics.set()
+            else:
+                self._shows_topics.clear()
             return
         try:
             self._questions.put_nowait(asked)

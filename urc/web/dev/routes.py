@@ -45,6 +45,8 @@ class DevPage:
     """Path of the developer page's WebSocket."""
     timeline: str
     """Path of the robot's timeline in the audit log."""
+    has_topics: bool
+    """Whether the robot has a ROS connection."""
 
 
 def dev_url(name: str) -> str:
@@ -111,6 +113,9 @@ class Dev:
             values=f"/ws?robot={quoted}",
             socket=f"{dev_url(name)}/ws",
             timeline=f"/api/v1/robots/{quoted}/timeline",
+            has_topics=any(
+                one.type == "ros" for one in watch.robot.profile.driver.transports.values()
+            ),
         )
         return HTMLResponse(render("dev.html.j2", page), headers={"cache-control": "no-store"})
 

@@ -31,6 +31,7 @@ from urc.wire.server_messages import Outbound
 __all__ = [
     "Inbound",
     "PreviewRequest",
+    "TopicsRequest",
     "ParseRequest",
     "decode",
     "encode_hello",
@@ -68,7 +69,15 @@ class PreviewRequest(
     arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
 
 
-Inbound = Ping | ParseRequest | PreviewRequest
+class TopicsRequest(
+    msgspec.Struct, tag_field="t", tag="topics", forbid_unknown_fields=True, frozen=True
+):
+    """A request to send the robot's topics from now on, or to stop sending them."""
+
+    shown: bool
+
+
+Inbound = Ping | ParseRequest | PreviewRequest | TopicsRequest
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 

@@ -15,6 +15,11 @@ __all__ = [
     "RefreshRequest",
     "AuditResult",
     "Available",
+    "FoundTopic",
+    "NewRobot",
+    "NewRobotAdded",
+    "TopicsAsked",
+    "TopicsFound",
     "RemovedPackages",
     "HealthStatus",
     "Installed",
@@ -40,6 +45,8 @@ MOST_HITS: Final = 100
 
 _Short = Annotated[str, msgspec.Meta(max_length=300)]
 _Long = Annotated[str, msgspec.Meta(max_length=4096)]
+_Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
+_Topic = Annotated[str, msgspec.Meta(max_length=256, pattern="^[A-Za-z0-9_/]*$")]
 _Settings = Annotated[dict[_Short, _Long | None], msgspec.Meta(max_length=200)]
 
 
@@ -51,6 +58,56 @@ class Url(ManageMessage, frozen=True):
     """Request to add or remove a repository."""
 
     url: _Short
+
+
+class TopicsAsked(ManageMessage, frozen=True):
+    """Request for the topics of the ROS robot at an address."""
+
+    host: Annotated[str, msgspec.Meta(min_length=1, max_length=253)]
+    port: _Port | None = None
+    """Port of the bridge or router; None to try the usual ports."""
+
+
+class FoundTopic(ManageMessage, frozen=True):
+    """One topic and its type in the short form ``pkg/Type``."""
+
+    name: str
+    type: str
+
+
+class TopicsFound(ManageMessage, frozen=True):
+    """The topics of a ROS robot that fit the parts of a mobile base."""
+
+    via: str
+    """Kind of the connection: ``rosbridge``, ``foxglove`` or ``zenoh``."""
+    port: int
+    version: int
+    """ROS version, 1 or 2."""
+    total: int
+    """Number of all topics of the robot."""
+    parts: dict[str, tuple[FoundTopic, ...]]
+    """Topics that fit each part, best first, keyed by part."""
+
+
+class NewRobot(ManageMessage, frozen=True):
+    """Request to add a ROS robot."""
+
+    title: Annotated[str, msgspec.Meta(max_length=80)]
+    host: Annotated[str, msgspec.Meta(min_length=1, max_length=253)]
+    port: _Port
+    via: Literal["rosbridge", "foxglove", "zenoh"]
+    version: Literal[1, 2]
+    command_type: Literal["geometry_msgs/Twist", "geometry_msgs/TwistStamped"]
+    """Type of the messages that the robot's command topic takes."""
+    topics: Annotated[dict[_Short, _Topic], msgspec.Meta(max_length=20)]
+    """Topic of each part that the robot has, keyed by part."""
+
+
+class NewRobotAdded(ManageMessage, frozen=True):
+    """The new robot's name and the path of its page."""
+
+    name: str
+    url: str
 
 
 class RefreshRequest(ManageMessage, frozen=True):

@@ -27,6 +27,8 @@ class NavigationLinks:
 
     has_managers: bool = False
     """Whether the server has pages for drivers, interfaces, widgets and settings."""
+    has_new: bool = False
+    """Whether the server has the page for a new ROS robot, and shows the robot in the menu."""
     has_dev: bool = False
     has_audit: bool = False
     """Whether the server has an audit log."""

@@ -11,6 +11,7 @@ import { element, visible } from "./bytes.js";
 import { Commands } from "./commands.js";
 import { WireLog } from "./log.js";
 import { Timeline } from "./timeline.js";
+import { TopicTable } from "./topics.js";
 import { TryOut } from "./try.js";
 import { Socket } from "../live/socket.js";
 import { DASH, Store, ageText } from "../live/store.js";
@@ -65,6 +66,7 @@ const desk = {
 };
 const tryOut = new TryOut(root, desk);
 const commands = new Commands(part(root, "[data-commands]"), desk);
+const topics = root.querySelector("[data-topics]") ? new TopicTable(root, (message) => line.send(message)) : null;
 const timeline = new Timeline(root, root.dataset["timeline"] ?? "");
 
 /**
@@ -134,6 +136,7 @@ function take(message) {
   switch (message.t) {
     case "hello":
       log.restart();
+      topics?.tell();
       // Opened last, because the robot connects for the first of the two sockets, and its first
       // messages matter.
       if (!values.isWanted) values.open();
@@ -143,6 +146,9 @@ function take(message) {
       break;
     case "profile":
       profile(message);
+      break;
+    case "topics":
+      topics?.show(message.tables);
       break;
     case "tried":
     case "shown":
