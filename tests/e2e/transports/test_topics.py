@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+import urc
+from tests.e2e.dashboards import until
 from tests.e2e.transports.ros_bases import BASES, STAMPED, TOPICS, open_base
 from urc.config.load import load_profile
+from urc.model.values import Value
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
 from urc.runtime.topic_check import find_mismatches, topic_uses
@@ -16,6 +19,8 @@ from urc.transports.ros.topic_list import TopicList, short_type
 pytestmark = pytest.mark.anyio
 
 WAIT_S = 30.0
+REPEAT_S = 0.1
+STOP_S = 1.0
 ROVER = """
 urc: 1
 kind: robot
@@ -64,7 +69,7 @@ async def test_the_topics_of_a_robot_and_the_mistakes_of_a_profile(
     profile = load_profile(str(file), built_in_catalog())
     transports = built_in_catalog().transports
     async with open_base(line, tmp_path) as base:
-        settings = {"port": base.port, "line": line}
+        settings: dict[str, Value] = {"port": base.port, "line": line}
         async with Session(profile, settings, transports, motion=motion) as session:
 
             def is_good(found: TopicList) -> bool:
@@ -95,3 +100,42 @@ async def test_the_topics_of_a_robot_and_the_mistakes_of_a_profile(
                 ("/nobody", "no-subscriber", ""),
             }
         assert session.hub.topic_lists == {}
+
+
+@pytest.mark.parametrize("line", BASES)
+async def test_requests_for_topics_never_delay_motion_or_its_stop(
+    line: str, tmp_path: Path
+) -> None:
+    """A hundred requests a second; while the robot is driven, none is answered."""
+    file = tmp_path / "rover.yaml"
+    file.write_text(ROVER.replace("geometry_msgs/Twist,", "geometry_msgs/Twist, stamped: true,"))
+    async with (
+        open_base(line, tmp_path) as base,
+        urc.connect(urc.load(file), port=base.port, line=line) as robot,
+    ):
+        await listed(robot.session, lambda found: bool(found.rows))
+        asking = asyncio.create_task(ask(robot.session))
+        try:
+            async with robot.drive("drive") as stick:
+                clock = asyncio.get_running_loop().time
+                async with asyncio.timeout(WAIT_S):
+                    while not any(base.speeds):  # ROS connects a new publisher gradually
+                        await stick.hold(0.1, speed=0.5)
+                before, began_s = robot.session.hub.topic_lists["ros"], clock()
+                count = len(base.speeds)
+                await stick.hold(2.0, speed=0.5)
+                lasted_s = clock() - began_s
+                assert robot.session.hub.topic_lists["ros"] is before
+                assert len(base.speeds) - count >= 0.8 * lasted_s / REPEAT_S
+            async with asyncio.timeout(STOP_S):
+                await until(lambda: base.speeds[-1] == 0)
+            await until(lambda: robot.session.hub.topic_lists["ros"] is not before)
+            assert base.speeds[-1] == 0
+        finally:
+            asking.cancel()
+
+
+async def ask(session: Session) -> None:
+    while True:
+        session.ask_topics("ros", ["/cmd_vel"], is_all=True)
+        await asyncio.sleep(0.01)
