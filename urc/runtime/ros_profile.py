@@ -66,25 +66,31 @@ class BaseProfile(NamedTuple):
 
 
 def candidates(listed: TopicList) -> dict[str, list[tuple[str, str]]]:
-    """Return the topic and type of each topic that fits a part, best first, keyed by part."""
+    """Return the topic and type of each topic that fits a part, best first, keyed by part.
+
+    A type is "" if the connection does not know it: rosapi of ROS 1 knows only published types.
+    """
     found: dict[str, list[tuple[str, str]]] = {}
     for part in PARTS:
         fits = [
             (_rank(part, row, kind), row.name, kind)
             for row in listed.rows
-            if (kind := _fitting(part, row)) and _is_writable(row.name)
+            if (kind := _fitting(part, row)) is not None and _is_writable(row.name)
         ]
         found[part.name] = [(name, kind) for _, name, kind in sorted(fits)[:MOST]]
     return found
 
 
-def _fitting(part: RobotPart, row: TopicRow) -> str:
-    """Return the type of a topic that fits a part; "" if the topic does not fit."""
+def _fitting(part: RobotPart, row: TopicRow) -> str | None:
+    """Return the type of a topic that fits a part, "" for an unknown type; None if none fits."""
     types = {short_type(kind) for kind in (row.takes if part.is_taken else row.carries) or ()}
     nodes = row.subscribers if part.is_taken else row.publishers
     if nodes == ():
+        return None
+    is_usual = row.name.rpartition("/")[2] in part.usual
+    if part.is_taken and nodes and not types and is_usual:
         return ""
-    return next((kind for kind in part.types if kind in types), "")
+    return next((kind for kind in part.types if kind in types), None)
 
 
 def _rank(part: RobotPart, row: TopicRow, kind: str) -> tuple[int, int]:

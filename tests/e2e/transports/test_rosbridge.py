@@ -366,7 +366,7 @@ async def test_roslibpy_takes_the_emulated_robot_for_a_bridge(rover: Profile) ->
     """Topics, types, services of the robot and of other clients, and what they say of failures."""
     async with nothing_left(), emulated(rover) as port:
         said = await run(sys.executable, str(CLIENTS / "roslibpy_client.py"), str(port))
-    assert said["topics"] == ["/odom"]
+    assert said["topics"] == ["/cmd_vel", "/odom"]
     assert said["type"] == "nav_msgs/Odometry"
     assert said["heard"]["/echo"] == {"data": "grüezi / hello"}
     assert "position" in said["heard"]["/odom"]["pose"]["pose"]
@@ -380,7 +380,7 @@ async def test_roslib_takes_the_emulated_robot_for_a_bridge(rover: Profile) -> N
     """In JavaScript, with its own decoders of CBOR and PNG, and an action of ROS 2."""
     async with nothing_left(), emulated(rover) as port:
         said = await run("node", str(CLIENTS / "roslib_client.mjs"), str(port))
-    assert said["topics"]["topics"] == ["/odom"]
+    assert said["topics"]["topics"] == ["/cmd_vel", "/odom"]
     for compression in ("none", "cbor", "png"):
         assert said[compression] == {"data": f"grüezi by {compression}", "values": [1.5, None]}
     assert "does not exist" in said["nobody"]["why"]

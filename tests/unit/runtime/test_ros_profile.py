@@ -77,6 +77,18 @@ def test_the_type_of_commands_is_that_of_the_subscribers() -> None:
     ]
 
 
+def test_a_command_topic_of_unknown_type_is_offered_by_its_name() -> None:
+    """As rosapi of ROS 1 reports a topic that nothing publishes."""
+    found = rows(
+        TopicRow("/robot1/cmd_vel", subscribers=("/base",)),
+        TopicRow("/goal", subscribers=("/base",)),
+        TopicRow("/other/cmd_vel", subscribers=()),
+        TopicRow("/odom", publishers=("/base",)),
+    )
+    assert found["cmd_vel"] == [("/robot1/cmd_vel", "")]
+    assert found["odom"] == []
+
+
 def test_names_that_no_document_should_contain_are_left_out() -> None:
     """Templates, quotes and other characters that ROS does not allow."""
     odometry = ("nav_msgs/msg/Odometry",)

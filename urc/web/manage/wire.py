@@ -69,7 +69,7 @@ class TopicsAsked(ManageMessage, frozen=True):
 
 
 class FoundTopic(ManageMessage, frozen=True):
-    """One topic and its type in the short form ``pkg/Type``."""
+    """One topic and its type in the short form ``pkg/Type``; "" for an unknown type."""
 
     name: str
     type: str

@@ -69,7 +69,7 @@ function offer(form, { via, port, version, total, parts }) {
   for (const select of form.querySelectorAll("[data-part]")) {
     if (!(select instanceof HTMLSelectElement)) continue;
     const topics = parts[select.name] ?? [];
-    const options = topics.map(({ name, type }) => made("option", { value: name }, `${name} (${type})`));
+    const options = topics.map(({ name, type }) => made("option", { value: name }, `${name} (${type || t("unknown type")})`));
     if (!("needed" in select.dataset)) options.push(made("option", { value: "" }, t("none")));
     else if (topics.length === 0) options.push(made("option", { value: "" }, t("no topic fits")));
     select.replaceChildren(...options);
@@ -96,7 +96,7 @@ async function add(form) {
   lock(form, true);
   tell("[data-added]", t("adding …"));
   try {
-    const answer = await ask("/api/v1/new/robot", { title, host, port, via, version, commandType: command?.type ?? TWIST, topics });
+    const answer = await ask("/api/v1/new/robot", { title, host, port, via, version, commandType: command?.type || TWIST, topics });
     location.assign(answer.url);
   } catch (error) {
     tell("[data-added]", `▲ ${reason(error)}`, true);
