@@ -85,8 +85,7 @@ async def serve(
                 last_peer=last_peer,
                 carried=inside[name],
             )
-            server = _server(context)
-            servers.append(server)
+            servers.append(server := _server(context))
             listening[name] = await server.open()
             if spec.tunnel:
                 listening[name] = _put_inside(inside[spec.tunnel], context, listening[name])
