@@ -8,16 +8,21 @@ import pytest
 
 import urc
 from tests.e2e.dashboards import until
+from tests.e2e.ports import free_port
 from tests.e2e.transports.ros_bases import BASES, STAMPED, TOPICS, open_base
 from urc.config.load import load_profile
 from urc.model.values import Value
+from urc.runtime.open_profile import open_document
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
+from urc.runtime.settings import resolve_settings
 from urc.runtime.topic_check import find_mismatches, topic_uses
+from urc.simulator.server import serve
 from urc.transports.ros.topic_list import TopicList, short_type
 
 pytestmark = pytest.mark.anyio
 
+ROBOTS = Path(__file__).resolve().parents[3] / "robots"
 WAIT_S = 30.0
 REPEAT_S = 0.1
 STOP_S = 1.0
@@ -139,3 +144,20 @@ async def ask(session: Session) -> None:
     while True:
         session.ask_topics("ros", ["/cmd_vel"], is_all=True)
         await asyncio.sleep(0.01)
+
+
+async def test_a_bridge_of_ros_1_is_named_for_a_profile_of_ros_2() -> None:
+    one, two = (open_document(ROBOTS / f"generic-ros{version}.yaml") for version in (1, 2))
+    port = free_port()
+    settings, _ = resolve_settings(one, {"port": str(port)})
+    mine, _ = resolve_settings(two, {"port": str(port), "bridge": "rosbridge"})
+    transports = built_in_catalog().transports
+    async with serve(one, settings), Session(two, mine, transports) as session:
+        uses = topic_uses(two.driver, mine)
+        async with asyncio.timeout(WAIT_S):
+            while "ros" not in session.hub.topic_lists:
+                session.ask_topics("ros", [use.topic for use in uses], is_all=False)
+                await asyncio.sleep(0.2)
+        told = find_mismatches(uses, session.hub.topic_lists, {"ros": 2})
+    assert {one.use.topic for one in told} >= {"/cmd_vel", "/odom", "/scan"}
+    assert {(one.code, one.found, one.wanted) for one in told} == {("ros-version", "1", "2")}
