@@ -134,7 +134,9 @@ def _stems(
 def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
     """Return the most specific suitable widget for a signal."""
     if signal.type == "occupancy_grid":
-        return _map(registry.get("map"), signal)
+        return _view(registry.get("map"), "grids", signal)
+    if signal.type == "point_cloud":
+        return _view(registry.get("scene3d"), "cloud", signal)
     for name in _candidates(signal):
         use = _one_input(registry.get(name), signal)
         if use is not None:
@@ -142,11 +144,13 @@ def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
     return None
 
 
-def _map(widget: Widget | None, signal: Signal) -> WidgetUse | None:
-    """Return a map of an occupancy grid; None without a map widget."""
-    port = widget.inputs.get("grids") if widget is not None else None
+def _view(widget: Widget | None, name: str, signal: Signal) -> WidgetUse | None:
+    """Return a map or scene whose input `name` is the signal; None without such a widget."""
+    port = widget.inputs.get(name) if widget is not None else None
     if widget is None or port is None or misfit(port, signal):
         return None
+    if not port.is_multiple:
+        return _use(widget, signal.name, {port.name: signal.name}, signal.title)
     use = _use(widget, signal.name, {}, signal.title)
     return use._replace(lists={port.name: (signal.name,)})
 

@@ -14,6 +14,7 @@ from urc.expressions import Template
 
 __all__ = [
     "BINARY_TYPES",
+    "MAX_POINTS",
     "PICTURE_TYPES",
     "PLAIN",
     "Alarm",
@@ -47,12 +48,16 @@ SignalType = Literal[
     "image",
     "blob",
     "occupancy_grid",
+    "point_cloud",
 ]
 """Signal types: a single value, an array of one type, a mapping, or bytes."""
-BINARY_TYPES: Final[tuple[SignalType, ...]] = ("image", "blob", "occupancy_grid")
+BINARY_TYPES: Final[tuple[SignalType, ...]] = ("image", "blob", "occupancy_grid", "point_cloud")
 """Types of signals whose values are bytes, which pages receive as binary messages."""
 PICTURE_TYPES: Final[tuple[SignalType, ...]] = ("image", "occupancy_grid")
 """Types of signals whose values are image files; an occupancy grid is a PNG image."""
+MAX_POINTS: Final = 100_000
+"""Maximum number of points that a point cloud can keep. Converting this many points takes up to
+100 ms."""
 Value = bool | int | float | str | None
 """A plain value; None means that the robot reports "not available"."""
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
@@ -172,7 +177,8 @@ class Signal(NamedTuple):
     items: ElementType = "number"
     """Type of an array's elements."""
     size: int | None = None
-    """Number of elements in an array, or maximum size of an image or blob in bytes."""
+    """Number of elements in an array, maximum size of an image or blob in bytes, or maximum number
+    of points in a point cloud."""
     axes: Axes = ""
     """Axis convention of the value."""
     formula: Template | None = None
@@ -183,6 +189,9 @@ class Signal(NamedTuple):
     debounce_s: float = 0.0
     """Debounce time in seconds: a new value is reported only after it has been stable for this
     time."""
+    colour: str = ""
+    """Name of the field that gives the points of a point cloud their colour; "" means the usual
+    field."""
 
 
 class Sample(NamedTuple):

@@ -65,7 +65,8 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         _words("x y z roll pitch yaw heading speed sideways climb turn"), frozenset[str]()
     ),
     **dict.fromkeys(
-        _words("joints legs occupancy_grid costmap picture panorama top"), frozenset[str]()
+        _words("joints legs occupancy_grid costmap point_cloud picture panorama top"),
+        frozenset[str](),
     ),
     "odometry": _words("x y z yaw qx qy qz qw speed sideways turn left right"),
     "imu": _words("roll pitch yaw heading qx qy qz qw roll_rate pitch_rate yaw_rate ax ay az"),

@@ -7,10 +7,11 @@ Layer 4. Pure. Source: github.com/foxglove/foxglove-sdk, schemas/jsonschema (MIT
 from collections.abc import Mapping
 from typing import Any, Final
 
-__all__ = ["COMPRESSED_IMAGE", "LASER_SCAN", "LOCATION_FIX", "LOG", "POSE_IN_FRAME"]
+__all__ = ["COMPRESSED_IMAGE", "LASER_SCAN", "LOCATION_FIX", "LOG", "POINT_CLOUD", "POSE_IN_FRAME"]
 
 _TEXT: Final = {"type": "string"}
 _NUMBER: Final = {"type": "number"}
+_SIZE: Final = {"type": "integer", "minimum": 0}
 _NUMBERS: Final = {"type": "array", "items": _NUMBER}
 _TIME: Final = {
     "type": "object",
@@ -59,7 +60,7 @@ LOG: Final = _message(
     message=_TEXT,
     name=_TEXT,
     file=_TEXT,
-    line={"type": "integer", "minimum": 0},
+    line=_SIZE,
 )
 LASER_SCAN: Final = _message(
     "LaserScan",
@@ -70,6 +71,27 @@ LASER_SCAN: Final = _message(
     end_angle=_NUMBER,
     ranges=_NUMBERS,
     intensities=_NUMBERS,
+)
+POINT_CLOUD: Final = _message(
+    "PointCloud",
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    pose=_POSE,
+    point_stride=_SIZE,
+    fields={
+        "type": "array",
+        "items": _message(
+            "PackedElementField",
+            name=_TEXT,
+            offset=_SIZE,
+            type=_words(
+                "NumericType",
+                *("UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32"),
+                *("FLOAT32", "FLOAT64"),
+            ),
+        ),
+    },
+    data={"type": "string", "contentEncoding": "base64"},
 )
 POSE_IN_FRAME: Final = _message("PoseInFrame", timestamp=_TIME, frame_id=_TEXT, pose=_POSE)
 _FIX: Final = _message(

@@ -1,7 +1,7 @@
 """Readings, log entries and connection states as JSON messages with JSON Schemas.
 
 Layer 4. Pure. Recordings and the Foxglove server share this mapping, so a viewer shows both in the
-same way. Images and the log use Foxglove's standard messages.
+same way. Images, point clouds and the log use Foxglove's standard messages.
 
 Viewers read the fields of a message from its schema. Each property in a schema therefore has a
 ``type``, or the alternatives of an enumeration. A property without a type makes some viewers reject
@@ -12,6 +12,7 @@ import base64
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final, NamedTuple, get_args
 
 import msgspec
@@ -19,7 +20,9 @@ import msgspec
 from urc.images import media_type
 from urc.model.driver import Argument
 from urc.model.values import BINARY_TYPES, PICTURE_TYPES, Alarm, Sample, Signal
-from urc.runtime.foxglove_schemas import COMPRESSED_IMAGE
+from urc.protocol.values.convert import BadValue
+from urc.runtime.cloud_messages import cloud_fields
+from urc.runtime.foxglove_schemas import COMPRESSED_IMAGE, POINT_CLOUD
 from urc.runtime.foxglove_schemas import LOG as FOXGLOVE_LOG
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry
 
@@ -74,12 +77,15 @@ LINK_SCHEMA: Final = object_schema(
 )
 LOG_SCHEMA: Final = MessageSchema("foxglove.Log", FOXGLOVE_LOG)
 _IMAGE_SCHEMA: Final = MessageSchema("foxglove.CompressedImage", COMPRESSED_IMAGE)
+_CLOUD_SCHEMA: Final = MessageSchema("foxglove.PointCloud", POINT_CLOUD)
 
 
 def signal_schema(signal: Signal) -> MessageSchema:
     """Return the type of a signal's readings."""
     if signal.type in PICTURE_TYPES:
         return _IMAGE_SCHEMA
+    if signal.type == "point_cloud":
+        return _CLOUD_SCHEMA
     about = " ".join(filter(None, (signal.title or signal.description, signal.unit)))
     value = signal_property(signal)
     if about:
@@ -122,6 +128,9 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int) -> bytes:
                 "format": _format(value),
             }
         )
+    if signal.type == "point_cloud" and isinstance(value, bytes):
+        with suppress(BadValue):  # the file comes from another program
+            return as_json({"timestamp": stamp(time_ns), **cloud_fields(value)})
     told: dict[str, object] = {"value": value}
     if sample.alarm:
         told["alarm"] = sample.alarm

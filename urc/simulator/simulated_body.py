@@ -24,7 +24,7 @@ _KEPT = ("flies", "cut")
 """Inputs that the fail-safe leaves active, because they cause no motion. For example, a
 drone without commands stays in the air."""
 
-_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama|top)'\)")
+_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|point_cloud|picture|panorama|top)'\)")
 """Pattern for references to sensors that need numpy or Pillow."""
 
 Evaluate = Callable[[Template, float], object]

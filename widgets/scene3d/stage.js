@@ -37,7 +37,10 @@ export class ViewSwitch {
     this.scene.add(this.robot);
     this.ground = this.makeGround(0x808890);
     this.points = this.makePoints();
-    this.robot.add(this.points);
+    this.cloud = this.makePoints();
+    this.cloud.material.color.set(0xffffff);
+    this.cloud.material.vertexColors = true;
+    this.robot.add(this.points, this.cloud);
     this.controls = new Controls(this.camera, this.canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.ask());
@@ -112,17 +115,41 @@ export class ViewSwitch {
 
   /** @param {Float32Array} places */
   setPoints(places) {
+    this.fill(this.points, { position: places });
+  }
+
+  /**
+   * Show a point cloud with colours; both lists have three numbers for each point.
+   *
+   * @param {Float32Array} places
+   * @param {Float32Array} colours
+   */
+  setCloud(places, colours) {
+    this.fill(this.cloud, { position: places, color: colours });
+  }
+
+  /**
+   * @param {import("three").Points} points
+   * @param {Record<string, Float32Array>} given
+   */
+  fill(points, given) {
     const { three } = this;
-    const old = this.points.geometry.getAttribute("position");
-    if (old && old.array.length >= places.length && places.length > 0) {
-      old.array.set(places);
-      old.needsUpdate = true;
-    } else {
-      this.points.geometry.dispose();
-      this.points.geometry = new three.BufferGeometry();
-      this.points.geometry.setAttribute("position", new three.BufferAttribute(places.slice(), 3));
+    let count = 0;
+    for (const [name, values] of Object.entries(given)) {
+      count = values.length / 3;
+      const old = points.geometry.getAttribute(name);
+      if (old && old.array.length >= values.length && count > 0) {
+        old.array.set(values);
+        old.needsUpdate = true;
+        continue;
+      }
+      if (old) {
+        points.geometry.dispose();
+        points.geometry = new three.BufferGeometry();
+      }
+      points.geometry.setAttribute(name, new three.BufferAttribute(values.slice(), 3));
     }
-    this.points.geometry.setDrawRange(0, places.length / 3);
+    points.geometry.setDrawRange(0, count);
     this.ask();
   }
 

@@ -1,10 +1,12 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Picture} Picture */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./model.js").Model} Model */
 /** @typedef {import("./pose.js").Quaternion} Quaternion */
 import { DASH, attribute, colours, many, noteOf, number, part, write } from "urc/kit";
+import { coloursOf, placesOf, readCloud } from "./cloud.js";
 import { box, urdf } from "./model.js";
 import { angles, cloud, fromAngles, fromOrientation, posture } from "./pose.js";
 import { ViewSwitch } from "./stage.js";
@@ -81,6 +83,12 @@ class Scene {
     this.isFitted = false;
     /** Serial number of the drawn points; -1 without points. */
     this.pointsSerial = -1;
+    /** Newest point cloud. @type {Picture | null} */
+    this.cloudPicture = null;
+    /** Last decoded point cloud. @type {import("./cloud.js").Cloud | null} */
+    this.cloud = null;
+    this.isReading = false;
+    this.isCloudBad = false;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
     try {
       this.stage = new ViewSwitch(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
@@ -133,6 +141,8 @@ class Scene {
 
   theme() {
     this.stage?.theme(colours(this.root, ["line", "caution"]));
+    this.inks = colours(this.root, ["series-1", "series-2", "series-4"]);
+    this.showCloud();
   }
 
   resize() {
@@ -179,6 +189,7 @@ class Scene {
     attribute(this.root, "data-state", this.worst?.state ?? "none");
     this.place();
     this.setPoints();
+    this.setCloud();
     this.tell();
   }
 
@@ -235,6 +246,53 @@ class Scene {
     this.stage.setPoints(cloud(values, Number(this.options["budget"] ?? 20000), this.convention));
   }
 
+  setCloud() {
+    const picture = this.readings["cloud"]?.image ?? null;
+    if (!this.stage || picture?.serial === this.cloudPicture?.serial) return;
+    this.cloudPicture = picture;
+    if (picture) void this.readClouds();
+    else {
+      [this.cloud, this.isCloudBad] = [null, false];
+      this.showCloud();
+    }
+  }
+
+  /** Decode the newest point cloud; a newer one waits for its turn. */
+  async readClouds() {
+    if (this.isReading) return;
+    this.isReading = true;
+    let /** @type {Picture | null} */ seen = null;
+    while (!this.signal.aborted && this.cloudPicture && this.cloudPicture !== seen) {
+      seen = this.cloudPicture;
+      try {
+        const cloud = readCloud(await seen.blob.arrayBuffer());
+        if (!this.cloudPicture) break; // meanwhile too old to be shown
+        [this.cloud, this.isCloudBad] = [cloud, false];
+      } catch {
+        [this.cloud, this.isCloudBad] = [null, true];
+      }
+      if (!this.signal.aborted) this.showCloud();
+    }
+    this.isReading = false;
+  }
+
+  showCloud() {
+    const { cloud, inks, options, stage, three } = this;
+    if (!stage) return;
+    const places = cloud ? placesOf(cloud, Number(options["budget"] ?? 20000), this.convention) : new Float32Array(0);
+    const stops = inks ? [inks["series-1"], inks["series-2"], inks["series-4"]].map((ink) => new three.Color(ink)) : [];
+    const mixed = new three.Color();
+    const ramp = (/** @type {number} */ share) => {
+      const [from, to] = share < 0.5 ? [stops[0], stops[1]] : [stops[1], stops[2]];
+      if (from && to) mixed.lerpColors(from, to, share < 0.5 ? 2 * share : 2 * share - 1);
+      return /** @type {const} */ ([mixed.r, mixed.g, mixed.b]);
+    };
+    const by = options["colour"] === "height" ? "height" : "field";
+    stage.setCloud(places, cloud ? coloursOf(cloud, places, by, ramp) : new Float32Array(0));
+    attribute(this.root, "data-points", cloud ? String(places.length / 3) : null);
+    this.tell();
+  }
+
   tell() {
     const { worst, model, t } = this;
     const turn = this.turn();
@@ -243,15 +301,17 @@ class Scene {
     attribute(this.root, "data-pose", isTurned && !turn ? "unknown" : null);
     const joints = this.jointValues().filter((each) => each !== null).length;
     const isShown = worst !== undefined && (worst.state === "live" || worst.state === "stale");
-    const level = turn && words.length === 0 ? t("level") : "";
     const bent = joints > 0 ? t("joints: {count}", { count: joints }) : "";
-    const said = [level, ...words].filter(Boolean).join(" · ");
+    const level = turn && words.length === 0 ? t("level") : "";
+    const points = this.cloud ? t("points: {count}", { count: this.cloud.count }) : "";
+    const said = [level, ...words, points].filter(Boolean).join(" · ");
     write(this.text, isShown && (said || bent) ? said : DASH);
     write(this.joints, isShown ? bent : "");
     const count = model?.missing.length ?? 0;
     const missing = count > 0 ? ["◆", t("missing shapes: {count}", { count })].join(" ") : "";
     const note = worst ? noteOf(worst, t) : "";
-    write(this.note, [this.fault ? `▲ ${this.fault}` : "", missing, note].filter(Boolean).join(" · "));
+    const bad = this.isCloudBad ? `▲ ${t("not a point cloud")}` : "";
+    write(this.note, [this.fault ? `▲ ${this.fault}` : "", bad, missing, note].filter(Boolean).join(" · "));
   }
 }
 

@@ -112,11 +112,11 @@ class _Linker:
                 self.field(part.must("head").must(field), field, {"key": True})
             elif field in read.collects:
                 self.field(part.must("collect").must(field), field, {"key": True})
-            elif self._is_unread_grid(field, read):
+            elif kind := self._unread_type(field, read):
                 self.problems.error(
                     inner,
                     "wrong-type",
-                    f"signal {field!r} is of type occupancy_grid, which needs the form json",
+                    f"signal {field!r} is of type {kind}, which needs the form json",
                     hint=f'write json: {{ {field}: "@" }} for a whole message',
                 )
             elif field in self.driver.signals or not field.startswith("_"):
@@ -124,9 +124,12 @@ class _Linker:
                 self.field(place, field, where)
         self._beside(part, read)
 
-    def _is_unread_grid(self, field: str, read: ReadSpec) -> bool:
+    def _unread_type(self, field: str, read: ReadSpec) -> str:
+        """Return the type of a field that is a whole message which `read` cannot read, or ""."""
         signal = self.driver.signals.get(field)
-        return signal is not None and signal.type == "occupancy_grid" and read.form != "json"
+        if signal is None or read.form == "json":
+            return ""
+        return signal.type if signal.type in ("occupancy_grid", "point_cloud") else ""
 
     def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
         """Check the name of one signal that `part` sets."""

@@ -9,14 +9,14 @@ from urc.config.parse.limits import parse_limits
 from urc.config.values import check_range
 from urc.expressions import Template
 from urc.model.driver import Poll
-from urc.model.values import Signal
+from urc.model.values import MAX_POINTS, Signal
 
 __all__ = ["parse_signal", "with_ages"]
 
 _NUMBERS: Final = ("integer", "number")
 _ANGLE_UNITS: Final = ("rad", "deg", "°")
 _ROTATIONS: Final = ("roll", "pitch", "yaw")
-_BYTES: Final = ("image", "blob")
+_SIZED: Final = ("array", "image", "blob", "point_cloud")
 _LATCHED_S: Final = 86400.0
 """Default age of an occupancy grid, in seconds: a robot may send its map only once."""
 
@@ -60,6 +60,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         formula=_formula(part, problems),
         deadband=_deadband(part, element, (low, high), problems),
         debounce_s=_debounce_s(part, kind, problems),
+        colour=part.text("colour"),
     )
 
 
@@ -106,7 +107,8 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
 
 
 def _check_vector(part: Node, kind: str, problems: Problems) -> None:
-    for key, kinds in (("items", ("array",)), ("size", ("array", *_BYTES))):
+    wanted = (("items", ("array",)), ("size", _SIZED), ("colour", ("point_cloud",)))
+    for key, kinds in wanted:
         if part.get(key) is not None and kind not in kinds:
             problems.error(
                 part,
@@ -116,6 +118,14 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
                 key=True,
                 hint=f"this key needs 'type: {kinds[0]}'",
             )
+    if kind == "point_cloud" and (part.integer("size") or 0) > MAX_POINTS:
+        problems.error(
+            part,
+            "out-of-range",
+            f"a point cloud has at most {MAX_POINTS} points",
+            at="size",
+            hint="larger clouds are thinned on arrival; pages draw 20000 points smoothly",
+        )
 
 
 def _check_rotation(part: Node, kind: str, problems: Problems) -> None:

@@ -64,6 +64,8 @@ _SAME_TYPES: Final = {
     "map": "object",
     "picture": "image",
     "costmap": "occupancy_grid",
+    "pointcloud": "point_cloud",
+    "PointCloud2": "point_cloud",
     "bytes": "blob",
 }
 """URC type names, by the corresponding type name in another tool."""

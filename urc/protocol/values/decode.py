@@ -20,6 +20,7 @@ from urc.protocol.values.convert import (
     whole_of,
 )
 from urc.protocol.values.occupancy_grid import GridConverter, grid_message
+from urc.protocol.values.point_cloud import cloud_converter, cloud_message
 from urc.protocol.values.vectors import array_converter, bytes_converter, object_converter
 
 __all__ = ["BadValue", "Convert", "build_converter", "build_raw"]
@@ -37,6 +38,8 @@ def build_converter(signal: Signal) -> Convert:
         return _usable(object_converter)
     if signal.type == "occupancy_grid":
         return GridConverter()
+    if signal.type == "point_cloud":
+        return cloud_converter(signal)
     if signal.type in ("image", "blob"):
         return _usable(bytes_converter(signal))
     element = _element_converter(signal)
@@ -52,6 +55,8 @@ def build_raw(signal: Signal) -> Callable[[object], object]:
     """
     if signal.type == "occupancy_grid":
         return lambda value: grid_message(value) if isinstance(value, bytes) else value
+    if signal.type == "point_cloud":
+        return lambda value: cloud_message(value) if isinstance(value, bytes) else value
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)
     if back is None:

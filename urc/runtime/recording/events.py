@@ -11,6 +11,7 @@ from typing import Any, Final, cast, get_args
 import msgspec
 
 from urc.model.values import BINARY_TYPES, PICTURE_TYPES, Alarm, Reading, Sample, Signal
+from urc.runtime.cloud_messages import cloud_file
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.json_messages import LEVELS
 from urc.runtime.recording.shapes import DRIVING, LINK, LOG, SIGNALS, WIRE
@@ -87,11 +88,14 @@ _KINDS: Final[Mapping[str, type | tuple[type, ...]]] = {
     "object": dict,
     "image": str,
     "occupancy_grid": str,
+    "point_cloud": str,
     "blob": str,
 }
 
 
 def _value(signal: Signal, told: Mapping[str, Any]) -> Reading:
+    if signal.type == "point_cloud" and "data" in told:
+        return cloud_file(told)
     value = told["data"] if signal.type in PICTURE_TYPES and "data" in told else told["value"]
     if value is None:
         return None

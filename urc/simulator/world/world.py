@@ -42,7 +42,7 @@ _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
 """Battery level after a low-battery fault, in per cent."""
-_RENDERED: Final = frozenset({"laser", "picture", "panorama", "top"})
+_RENDERED: Final = frozenset({"laser", "point_cloud", "picture", "panorama", "top"})
 """Readings that need numpy or Pillow."""
 PLAIN: Final = frozenset({"laser", "picture"})
 """Readings that `urc.simulator.world.plain` renders without numpy and Pillow."""
@@ -186,6 +186,16 @@ class World:
 
         return self._once("panorama", 0.5, draw)
 
+    def point_cloud(self) -> bytes:
+        """Return the points of a laser scanner with several rings, at most ten times per second."""
+
+        def measure() -> bytes:
+            from urc.simulator.world.points import scanned_points
+
+            return scanned_points(self.faces(), _moment(self))
+
+        return self._once("points", 0.1, measure)
+
     def faces(self) -> "EdgeArrays":
         """Return the edges of the map for ray casting."""
         if self._faces is None:
@@ -289,6 +299,8 @@ class SensorView(Mapping[str, object]):
             return world.occupancy_grid
         if name == "costmap":
             return world.costmap
+        if name == "point_cloud":
+            return world.point_cloud()
         if name == "top":
             return world.top_view(320, 240)
         raise KeyError(name)

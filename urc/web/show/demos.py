@@ -22,6 +22,7 @@ from urc.model.values import AlarmLimits, Signal
 from urc.model.widget import Widget, WidgetPort
 from urc.problems import ProblemsError, UrcError
 from urc.protocol.values.occupancy_grid import Grid, encode_grid
+from urc.protocol.values.point_cloud import encode_cloud, packed_cloud
 from urc.source import Document, read_document
 from urc.web.show.demo_shape import check_demo
 from urc.web.wire.messages import encode_hello
@@ -226,6 +227,8 @@ def _image(widget: Widget, value: Any) -> bytes | None:
             return _decoded(str(text))
         case {"rows": [str(), *_] as rows, **more}:
             return _grid(rows, {str(name): one for name, one in more.items()})
+        case {"points": [[_, _, _, _], *_] as points, **more} if not more:
+            return _cloud(points)
     return None
 
 
@@ -245,6 +248,16 @@ def _grid(rows: list[str], place: Mapping[str, Any]) -> bytes:
         )
     except (KeyError, TypeError, ValueError) as fault:
         raise UrcError(f"a grid needs numbers for resolution, x, y and yaw: {fault}") from fault
+
+
+def _cloud(points: list[list[Any]]) -> bytes:
+    """Return a point cloud; each point has x, y and z in metres, and an intensity."""
+    try:
+        values = [[float(value) for value in point] for point in points]
+        columns = dict(zip(("x", "y", "z", "intensity"), zip(*values, strict=True), strict=True))
+    except (TypeError, ValueError) as fault:
+        raise UrcError(f"a point of a cloud has four numbers: {fault}") from fault
+    return encode_cloud(packed_cloud("base_link", "intensity", len(points), columns))
 
 
 def _decoded(text: str) -> bytes:

@@ -10,6 +10,7 @@ import pytest
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
 from urc.protocol.values.occupancy_grid import Grid, encode_grid
+from urc.protocol.values.point_cloud import Cloud, encode_cloud
 from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.hub import (
     AuditRecord,
@@ -26,6 +27,10 @@ from urc.testing.profile import text
 
 BORN_NS = 1_700_000_000_000_000_000
 FLOOR = encode_grid(Grid(2, 1, 0.05, -1.0, 2.0, 0.5, "map", b"\x00\xff"))
+CLOUDS = [
+    encode_cloud(Cloud("lidar", colour, 2, bytes(range(2 * size))))
+    for colour, size in (("intensity", 16), ("rgb", 16), ("", 12))
+]
 PNG = b"\x89PNG\r\n\x1a\n rest"
 SIGNALS = {
     one.name: one
@@ -36,6 +41,7 @@ SIGNALS = {
         Signal("pose", "object"),
         Signal("camera", "image"),
         Signal("floor", "occupancy_grid"),
+        Signal("cloud", "point_cloud"),
         Signal("dump", "blob"),
         Signal("isOn", "boolean"),
     )
@@ -110,6 +116,9 @@ EVENTS: Mapping[str, Tapped] = {
     "mapping": Sample("pose", {"x": 1, "at": (1, 2), "in": {"y": None}}, 1.5),
     "image": Sample("camera", PNG, 1.5),
     "map": Sample("floor", FLOOR, 1.5),
+    "points": Sample("cloud", CLOUDS[0], 1.5),
+    "coloured points": Sample("cloud", CLOUDS[1], 1.5),
+    "plain points": Sample("cloud", CLOUDS[2], 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
     "line": LinkStatus(
         "wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3, is_ready=True
@@ -154,6 +163,7 @@ def test_images_and_the_log_have_the_names_that_programs_know() -> None:
     assert names["/signals/camera"] == "foxglove.CompressedImage"
     assert names["/signals/floor"] == "foxglove.CompressedImage"
     assert json.loads(told(EVENTS["map"])[2])["format"] == "png"
+    assert names["/signals/cloud"] == "foxglove.PointCloud"
     assert names[LOG] == "foxglove.Log"
     assert json.loads(told(EVENTS["image"])[2])["format"] == "png"
 
@@ -234,6 +244,8 @@ def test_a_clock_that_is_set_moves_nothing() -> None:
         ("/signals/gone", b'{"value": 1}'),
         ("/signals/camera", b'{"data": "\xc3\xa9"}'),
         ("/signals/camera", b'{"value": 7}'),
+        ("/signals/cloud", b'{"data": "AAAA", "fields": [], "point_stride": 12, "frame_id": ""}'),
+        ("/signals/cloud", b'{"data": "", "fields": [], "point_stride": 0, "frame_id": ""}'),
         ("/signals/battery", b'{"value": "42"}'),
         ("/signals/battery", b'{"value": true}'),
         ("/signals/word", b'{"value": 1}'),

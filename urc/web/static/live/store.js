@@ -47,7 +47,7 @@ const LONG_LAG_MS = 1000;
 /** Stand-in for an undeclared signal. @type {Signal} */
 const UNKNOWN = { name: "", type: "string" };
 /** Types of signals that may hold images. */
-export const PICTURES = new Set(["image", "blob", "occupancy_grid"]);
+export const PICTURES = new Set(["image", "blob", "occupancy_grid", "point_cloud"]);
 
 export class Store {
   constructor() {
