@@ -1,4 +1,4 @@
-"""Maps, plans and transforms over the server of the Foxglove SDK, with messages of rosbags."""
+"""Maps, plans, transforms and points over the server of the Foxglove SDK, made by rosbags."""
 
 import asyncio
 import math
@@ -16,6 +16,7 @@ from bench.rig.ros_messages import ROS2
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from urc.client import CommandFailed
 from urc.protocol.values.occupancy_grid import read_grid
+from urc.protocol.values.point_cloud import read_cloud
 
 pytestmark = pytest.mark.anyio
 
@@ -152,6 +153,58 @@ async def test_a_large_map_a_plan_and_a_pose_arrive_over_the_real_server() -> No
             await robot.command("stop_navigation")
     finally:
         rover.close()
+
+
+async def test_a_large_point_cloud_arrives_thinned_over_the_real_server(tmp_path: Path) -> None:
+    """115,200 points of 64 rings become 5000 points, of all rings."""
+    file = tmp_path / "seer.yaml"
+    file.write_text(SEER, encoding="utf-8")
+    rows, rings = 1800, 64
+    points = np.zeros(rows * rings, dtype=[(name, "<f4") for name in "xyzi"] + [("t", "<u4")])
+    points["x"] = np.arange(rows * rings) // rings
+    points["y"] = np.arange(rows * rings) % rings
+    points["z"][::7] = np.nan
+    names = ("x", "y", "z", "i")
+    fields = [
+        ROS2.types["sensor_msgs/msg/PointField"](name, 4 * at, 7, 1)
+        for at, name in enumerate(names)
+    ]
+    cloud = made(
+        "sensor_msgs/msg/PointCloud2",
+        header=header("lidar"), height=1, width=len(points), fields=fields, is_bigendian=False,
+        point_step=20, row_step=20 * len(points), data=points.view(np.uint8), is_dense=False,
+    )  # fmt: skip
+    rover = FoxgloveRobot()
+    try:
+        async with urc.connect(urc.load(file), port=rover.port) as robot:
+
+            def publish() -> None:
+                rover.publish("/points", "sensor_msgs/msg/PointCloud2", cloud)
+
+            await until(lambda: robot.latest("cloud") is not None, publish)
+            latest: Any = robot.latest("cloud")
+    finally:
+        rover.close()
+    found = read_cloud(latest.value)
+    values = np.frombuffer(found.points, "<f4").reshape(-1, 4)
+    assert (found.frame, found.colour, found.total) == ("lidar", "i", len(points))
+    assert 0.8 * 5000 < len(values) <= 5000
+    assert np.isfinite(values).all()
+    assert set(values[:, 1]) == set(range(rings))
+
+
+SEER = """
+urc: 1
+kind: robot
+name: seer
+settings: { port: { type: port, default: 8765 } }
+transports: { ros: { type: ros, via: foxglove, host: 127.0.0.1, port: "{{ settings.port }}" } }
+signals: { cloud: { type: point_cloud, size: 5000 } }
+messages:
+  points:
+    subscribe: { topic: /points, type: sensor_msgs/PointCloud2 }
+    json: { cloud: "@" }
+"""
 
 
 async def test_a_robot_without_nav2_is_asked_for_none_of_its_topics() -> None:
