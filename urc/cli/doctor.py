@@ -33,7 +33,7 @@ REQUIRED = {
 }
 EXTRAS = {
     "numpy": ("demo", "cameras and laser scanners of emulated robots"),
-    "pillow": ("demo", "cameras of emulated robots"),
+    "pillow": ("images", "raw images of ROS, and cameras of emulated robots"),
     "serialx": ("serial", "robots on serial ports"),
     "paho-mqtt": ("mqtt", "robots behind an MQTT broker"),
     "eclipse-zenoh": ("zenoh", "devices with Zenoh keys, and ROS 2 over Zenoh"),

@@ -24,8 +24,6 @@ import struct
 import sys
 from array import array
 from base64 import b64encode
-from binascii import Error as Base64Error
-from binascii import a2b_base64
 from collections.abc import Callable, Mapping, Sequence
 from itertools import compress
 from typing import Any, Final, NamedTuple
@@ -33,6 +31,7 @@ from typing import Any, Final, NamedTuple
 from urc.expressions import quoted
 from urc.model.values import Reading, Signal
 from urc.protocol.values.convert import BadValue, Unusable
+from urc.protocol.values.vectors import bytes_of
 
 __all__ = ["COLOURS", "POINTS", "Cloud", "cloud_converter", "cloud_message"]
 __all__ += ["encode_cloud", "packed_cloud", "read_cloud"]
@@ -116,7 +115,7 @@ def _cloud(raw: Mapping[str, Any], colour: str, most: int) -> Cloud:
     if not count:
         return Cloud(frame, "", 0, b"")
     layout = _layout(raw.get("fields"), ">" if raw.get("is_bigendian") else "<", colour)
-    data = _bytes(raw.get("data"))
+    data = bytes_of(raw.get("data"))
     if layout.unpack.size > step:
         raise BadValue(
             f"the fields of a point take {layout.unpack.size} bytes, but its point_step is {step}"
@@ -225,19 +224,6 @@ def _fields(given: object) -> dict[str, tuple[int, str]]:
             )
         found[name[:_NAME_LETTERS]] = offset, _CODES[kind]
     return found
-
-
-def _bytes(data: object) -> bytes:
-    if isinstance(data, (bytes, bytearray, memoryview)):
-        return bytes(data)
-    try:
-        if isinstance(data, str):
-            return a2b_base64(data, strict_mode=True)
-        if isinstance(data, (list, tuple)):
-            return bytes(data)
-    except (Base64Error, TypeError, ValueError):
-        pass
-    raise BadValue(f"{quoted(data)} is not the data of a point cloud: neither bytes nor base64")
 
 
 def _whole(raw: Mapping[str, Any], name: str) -> int:

@@ -9,13 +9,22 @@ import re
 from binascii import Error as Base64Error
 from binascii import a2b_base64, b2a_base64
 from collections.abc import Callable, Mapping
+from typing import Any, cast
 
 from urc.expressions import quoted
 from urc.images import MAX_PIXELS, picture_size, pixels
 from urc.model.values import Reading, Signal, Value
 from urc.protocol.values.convert import BadValue
+from urc.protocol.values.ros_image import picture_of
 
-__all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "bytes_text"]
+__all__ = [
+    "MAX_BYTES",
+    "MAX_ELEMENTS",
+    "array_converter",
+    "bytes_converter",
+    "bytes_of",
+    "bytes_text",
+]
 __all__ += ["elements_of", "object_converter"]
 
 MAX_ELEMENTS = 65536
@@ -71,20 +80,14 @@ def object_converter(raw: object) -> Reading:
 
 
 def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
-    """Return a function that checks raw bytes, or decodes base64 text to bytes."""
+    """Return a function that checks raw bytes, or decodes base64 text or a ROS image to bytes."""
     most = signal.size or MAX_BYTES
 
     def convert(raw: object) -> Reading:
         if raw is None:
             return None
-        if isinstance(raw, (bytes, bytearray, memoryview)):
-            data = bytes(raw)
-        elif isinstance(raw, str):
-            data = _from_base64(raw)
-        elif isinstance(raw, (list, tuple)):
-            data = _from_numbers(raw)
-        else:
-            raise BadValue(f"{quoted(raw)} is neither bytes nor base64")
+        is_message = isinstance(raw, Mapping) and signal.type == "image"
+        data = picture_of(cast("Mapping[str, Any]", raw), bytes_of) if is_message else bytes_of(raw)
         if len(data) > most:
             raise BadValue(f"expected at most {most} bytes, found {len(data)}")
         if signal.type == "image" and pixels(data) > MAX_PIXELS:
@@ -95,6 +98,17 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
         return data
 
     return convert
+
+
+def bytes_of(raw: object) -> bytes:
+    """Return bytes, base64 text or a list of numbers as bytes; raise `BadValue` for others."""
+    if isinstance(raw, (bytes, bytearray, memoryview)):
+        return bytes(raw)
+    if isinstance(raw, str):
+        return _from_base64(raw)
+    if isinstance(raw, (list, tuple)):
+        return _from_numbers(raw)
+    raise BadValue(f"{quoted(raw)} is neither bytes nor base64")
 
 
 def bytes_text(data: bytes) -> str:
