@@ -56,12 +56,15 @@ _CONSTANTS: Final = {
 }
 """Names that are constants, not fields, keyed by class; rosbags declares both alike."""
 _TIMES: Final = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
+_LONG_SHARE: Final = 1 / 500
+"""Share of strings and sequences that may be long."""
+_LONGEST: Final = 3000
 _LETTERS: Final = "abcdefghijklmnopqrstuvwxyz_/ 0123456789äß€漢😀"
 _STRANGE: Final = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e308, 5e-324)
 
 
 class RandomMessages:
-    """A source of random messages, whose strings and sequences are empty or short."""
+    """A source of random messages, whose strings and sequences are usually empty or short."""
 
     def __init__(self, store: Typestore, seed: int) -> None:
         self._store = store
@@ -89,6 +92,8 @@ class RandomMessages:
                 return self._several(detail[0], self._length())
 
     def _length(self) -> int:
+        if self._dice.random() < _LONG_SHARE:
+            return self._dice.randrange(_LONGEST)
         return self._dice.choice((0, 0, 1, 2, 3, self._dice.randrange(40)))
 
     def _single(self, name: str) -> Any:

@@ -161,9 +161,9 @@ FAMILIES: Mapping[str, Family] = {
         "Keys of messages",
         "Keys of frames that the robot sends without a request, and the forms of text frames.",
         _driver(
-            "messages message subscribe collect collected fieldPattern splitForm keyvalueForm"
-            " jsonForm xmlForm equalsForm rawForm fieldConversions setExpressions whenExpression"
-            " lines"
+            "messages message subscribe logLine collect collected fieldPattern splitForm"
+            " keyvalueForm jsonForm xmlForm equalsForm rawForm fieldConversions setExpressions"
+            " whenExpression lines"
         ),
         {"language/text.md": "Text frames", "language/messages.md": "Messages"},
     ),

@@ -262,6 +262,15 @@ class Poll(NamedTuple):
     offline: Offline | None = None
 
 
+class LogLine(NamedTuple):
+    """The log entry that a message becomes; its expressions use the message's fields."""
+
+    text: Template
+    level: Template | None = None
+    """Expression for the level: ``info``, ``warning`` or ``error``. If the result is empty, there
+    is no entry. None means ``info``."""
+
+
 class Message(NamedTuple):
     """A declared unsolicited frame and the signals that it updates."""
 
@@ -270,6 +279,8 @@ class Message(NamedTuple):
     read: ReadSpec
     acknowledge: WriteSpec | None = None
     """Frame that immediately acknowledges the message; None means no acknowledgement."""
+    log: LogLine | None = None
+    """Log entry about the message; None means no entry."""
 
 
 class Driver(NamedTuple):

@@ -32,6 +32,7 @@ from urc.protocol.events import (
     Failed,
     MotionReady,
     MotionRefused,
+    Noted,
     NumbersUsed,
     Open,
     Ready,
@@ -72,7 +73,7 @@ __all__ = ["Engine"]
 
 
 _PLAIN = frozenset(
-    (Send, Violation, Open, Ready, Replied, Failed, NumbersUsed, MotionReady, MotionRefused)
+    (Send, Violation, Noted, Open, Ready, Replied, Failed, NumbersUsed, MotionReady, MotionRefused)
 )
 """Event types that the engine returns unchanged."""
 

@@ -1,7 +1,7 @@
 """Requests to the engine, and the events that the engine returns to its owner."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from urc.model.payload import CountedFrame, Payload
 from urc.model.values import NOTHING, Reading, Sample
@@ -14,6 +14,7 @@ __all__ = [
     "MotionEvent",
     "MotionReady",
     "MotionRefused",
+    "Noted",
     "NumbersUsed",
     "Open",
     "Ready",
@@ -106,6 +107,14 @@ class Violation(NamedTuple):
     message: str
 
 
+class Noted(NamedTuple):
+    """A message that the driver declares as a log entry."""
+
+    transport: str
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
 class NumbersUsed(NamedTuple):
     """A frame has used counter numbers, so stop frames rendered earlier may be outdated.
 
@@ -132,4 +141,4 @@ class MotionRefused(NamedTuple):
 
 MotionEvent = NumbersUsed | MotionReady | MotionRefused
 """Events for the motion controller."""
-Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation | MotionEvent
+Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation | Noted | MotionEvent

@@ -19,6 +19,7 @@ from urc.protocol.events import (
     Event,
     Failed,
     MotionEvent,
+    Noted,
     Open,
     Ready,
     Replied,
@@ -180,6 +181,9 @@ class LinkPort(Protocol):
 
     def count(self, fault: Violation) -> None:
         """Count a protocol violation."""
+
+    def note(self, entry: Noted) -> None:
+        """Log a message that the driver declares as a log entry."""
 
     def hang_up(self, reason: str) -> None:
         """Close the connection; the link's task later reports the end to the engine."""
@@ -382,6 +386,8 @@ class Dispatcher:
         match event:
             case Violation(transport):
                 self._ports[transport].count(event)
+            case Noted(transport):
+                self._ports[transport].note(event)
             case Open(transport):
                 self._ports[transport].want_open()
             case Ready(transport):

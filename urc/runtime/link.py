@@ -26,7 +26,7 @@ from typing import Any
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload
-from urc.protocol.events import Send, Violation
+from urc.protocol.events import Noted, Send, Violation
 from urc.runtime.clock import Clock, PeriodicTimer, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
@@ -219,6 +219,10 @@ class Link:
             self._stand()
         else:
             self._greet()
+
+    def note(self, entry: Noted) -> None:
+        """Log a message that the driver declares as a log entry, at a limited rate."""
+        self._report.note(entry)
 
     def count(self, fault: Violation) -> None:
         """Count a protocol violation; log violations at a limited rate."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from urc.model.payload import Envelope, Payload, traffic_of
-from urc.protocol.events import Violation
+from urc.protocol.events import Noted, Violation
 from urc.runtime.clock import Clock, Timer
 from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.redaction import REDACTED
@@ -12,6 +12,10 @@ from urc.transports.base import TOPICS
 
 __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 
+NOTES_BURST = 50
+"""Number of log entries from messages of the robot before the rate limit applies."""
+NOTES_REFILL_S = 0.1
+"""Minimum interval between log entries from messages after the first entries, in seconds."""
 BURST = 4
 """Number of log entries of one kind before the rate limit applies."""
 REFILL_S = 10.0
@@ -33,8 +37,10 @@ class _Kind:
 class LogRateLimiter:
     """A token bucket that limits each kind of log entry."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, burst: int = BURST, refill_s: float = REFILL_S) -> None:
         self._clock = clock
+        self._burst = burst
+        self._refill_s = refill_s
         self._kinds: dict[str, _Kind] = {}
 
     def admit(self, kind: str) -> int | None:
@@ -42,9 +48,9 @@ class LogRateLimiter:
         now = self._clock.now()
         if kind not in self._kinds:
             kind = kind if len(self._kinds) < KINDS else ""
-            self._kinds.setdefault(kind, _Kind(BURST, now))
+            self._kinds.setdefault(kind, _Kind(self._burst, now))
         known = self._kinds[kind]
-        known.tokens = min(BURST, known.tokens + (now - known.told_s) / REFILL_S)
+        known.tokens = min(self._burst, known.tokens + (now - known.told_s) / self._refill_s)
         known.told_s = now
         if known.tokens < 1:
             known.untold += 1
@@ -67,6 +73,7 @@ class LinkReport:
         self._is_ready = False
         self._is_changed = True
         self._limiter = LogRateLimiter(clock)
+        self._notes_limiter = LogRateLimiter(clock, NOTES_BURST, NOTES_REFILL_S)
         self._telling: Timer | None = None
         self.state: LinkState = "idle"
         self.attempts = 0
@@ -123,6 +130,14 @@ class LinkReport:
             return
         more = f" (and {untold} more like it)" if untold else ""
         self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
+
+    def note(self, entry: Noted) -> None:
+        """Add a log entry that a message of the robot contains, within the rate limit."""
+        untold = self._notes_limiter.admit("")
+        if untold is None:
+            return
+        more = f" (after {untold} entries that are not shown)" if untold else ""
+        self._hub.log(LogEntry(self._clock.now(), entry.level, self._transport, entry.text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
         """Record traffic while the hub has traffic readers; requests for topics are left out."""

@@ -215,6 +215,9 @@ class DefaultConnection:
         """Return the encoder of a declared message."""
         message = self._robot.driver.messages[name]
         names = message.acknowledge.names if message.acknowledge is not None else frozenset()
+        if message.log is not None:
+            level = message.log.level
+            names |= message.log.text.names | (level.names if level is not None else frozenset())
         needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
         return self._answer(message.read)._replace(needed=needed)
 

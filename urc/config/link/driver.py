@@ -287,6 +287,12 @@ def link_driver(
         if message.acknowledge is not None:
             known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
             linker.templates(inner.must("acknowledge"), message.acknowledge, known)
+        if message.log is not None:
+            line = inner.must("log")
+            known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
+            linker.template(line.must("text"), message.log.text, known)
+            if message.log.level is not None:
+                linker.template(line.must("level"), message.log.level, known)
     return linker.uses
 
 

@@ -21,7 +21,7 @@ from urc.config.parse.reply import implied_reply, parse_reply
 from urc.config.parse.signal import parse_signal, with_ages
 from urc.config.parse.transport import parse_transport
 from urc.config.values import check_range, check_within, element_of, fit, fit_hint, shown
-from urc.model.driver import Argument, Command, Driver, Message, Poll, TransportSpec
+from urc.model.driver import Argument, Command, Driver, LogLine, Message, Poll, TransportSpec
 from urc.model.values import NOTHING, Reading, Value
 from urc.registry import Registries
 
@@ -131,7 +131,16 @@ def _message(part: Node, lines: _Lines, problems: Problems) -> Message:
     context, answer = lines.context(transport), part.get("acknowledge")
     read = with_collected(part, parse_read(part, problems, context), problems)
     sent = None if answer is None else parse_write(answer, problems, context)
-    return Message(part.name, transport, read, sent)
+    return Message(part.name, transport, read, sent, _log_line(part.get("log"), problems))
+
+
+def _log_line(part: Node | None, problems: Problems) -> LogLine | None:
+    if part is None:
+        return None
+    level = part.get("level")
+    text = problems.template(part.must("text"))
+    found = problems.expression(level) if level is not None else None
+    return None if text is None else LogLine(text, found)
 
 
 def _poll(part: Node, lines: _Lines, commands: dict[str, Command], problems: Problems) -> Poll:

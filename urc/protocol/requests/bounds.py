@@ -179,6 +179,8 @@ def needs_readings(driver: Driver) -> bool:
             for one in driver.commands.values()
         )
         or any(poll.when is not None for poll in driver.polls)
-        or any(one.acknowledge is not None for one in driver.messages.values())
+        or any(
+            one.acknowledge is not None or one.log is not None for one in driver.messages.values()
+        )
         or any(spec.on_connect or spec.on_close or spec.keepalive for spec in specs)
     )

@@ -12,7 +12,7 @@ from urc.model.driver import TransportSpec
 from urc.model.payload import CountedFrame
 from urc.model.values import Sample
 from urc.patterns import Pattern
-from urc.protocol.events import Samples, Send, Violation
+from urc.protocol.events import Noted, Samples, Send, Violation
 from urc.protocol.forms.http_head import is_redirect
 from urc.protocol.framing.base import Decoder, Framing, StreamDecoder
 from urc.protocol.framing.receive_buffer import ReceiveBuffer
@@ -281,6 +281,9 @@ class FrameReceiver:
         events += [Violation(name, "bad-value", line) for line in refused]
         if self.replies:
             for one in self.replies:
+                if isinstance(one, Noted):
+                    events.append(one)
+                    continue
                 shared = one if isinstance(one, CountedFrame) else None
                 data = one.numbered.data if isinstance(one, CountedFrame) else one
                 events.append(Send(name, data, counted=shared))

@@ -1,29 +1,36 @@
-"""Additional effects of messages: values collected from several frames, and acknowledgements.
+"""Additional effects of messages: collected values, acknowledgements and log entries.
 
 Pure. Values are collected and messages acknowledged while fields are converted to samples, so
 exactly once per message. Incomplete collected values are discarded when the connection is lost.
-Acknowledgements wait in `Acknowledgements` until the conversation has reported the frame.
+Acknowledgements and log entries wait in `Acknowledgements` until the conversation has reported the
+frame.
 """
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final
 
-from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.expressions import COUNTERS, ExpressionError, Template, quoted
+from urc.model.driver import LogLine
 from urc.model.payload import Collect, CountedFrame, Numbered, Payload
+from urc.problems import printable
+from urc.protocol.events import Noted
 from urc.protocol.readings.readings import Decode
 from urc.protocol.requests.encode import BadArgument, Encode
 from urc.protocol.requests.rate import Counters
 from urc.protocol.values.convert import Unusable
 
-__all__ = ["Collector", "Acknowledgements", "answering", "collecting"]
+__all__ = ["Collector", "Acknowledgements", "answering", "collecting", "noting"]
 
 MOST_REPLIES: Final = 256
 """Maximum number of pending acknowledgements; each frame adds at most one."""
+LONGEST_NOTE: Final = 500
+"""Maximum length of a log entry from a message, in characters."""
+_LEVELS: Final = ("info", "warning", "error")
 
 
-class Acknowledgements(list[Payload | CountedFrame]):
-    """Pending acknowledgements of messages, in order."""
+class Acknowledgements(list[Payload | CountedFrame | Noted]):
+    """Pending acknowledgements and log entries of messages, in order."""
 
 
 class Collector:
@@ -145,3 +152,40 @@ def answering(
         return numbered
 
     return decode_answered  # type: ignore[return-value]
+
+
+def noting(
+    line: LogLine,
+    transport: str,
+    names: Callable[[float, Mapping[str, object]], Mapping[str, object]],
+    notes: Acknowledgements,
+    decode: Decode,
+) -> Decode:
+    """Return a variant of `decode` that also creates the log entry of the message.
+
+    Args:
+        line: declaration of the log entry.
+        transport: name of the transport.
+        names: function that returns the namespace for a time and fields.
+        notes: list of pending effects, to which the log entry is added.
+        decode: function that converts the fields to samples.
+    """
+
+    def decode_noted(found: Mapping[str, object], now: float) -> tuple[list[object], list[str]]:
+        samples, refused = decode(found, now)
+        known = names(now, found)
+        try:
+            level = "info" if line.level is None else line.level.evaluate(known)
+            if level is None or level == "":
+                return samples, refused  # type: ignore[return-value]
+            text = printable(str(line.text.evaluate(known)))[:LONGEST_NOTE]
+        except ExpressionError as error:
+            return samples, [*refused, f"the log entry cannot be created: {error}"]  # type: ignore[return-value]
+        if level not in _LEVELS:
+            fault = f"the level of a log entry is info, warning or error, found {quoted(level)}"
+            return samples, [*refused, fault]  # type: ignore[return-value]
+        if len(notes) < MOST_REPLIES:
+            notes.append(Noted(transport, level, text))  # type: ignore[arg-type]  # one of _LEVELS
+        return samples, refused  # type: ignore[return-value]
+
+    return decode_noted  # type: ignore[return-value]

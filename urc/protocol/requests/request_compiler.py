@@ -22,7 +22,13 @@ from urc.protocol.requests.condition_scope import SignalState
 from urc.protocol.requests.conversation import Conversation
 from urc.protocol.requests.encode import BadArgument, Encode, build_encode
 from urc.protocol.requests.exchange import CompiledRequest
-from urc.protocol.requests.message_effects import Acknowledgements, Collector, answering, collecting
+from urc.protocol.requests.message_effects import (
+    Acknowledgements,
+    Collector,
+    answering,
+    collecting,
+    noting,
+)
 from urc.protocol.requests.rate import RANKS, GcraLimiter
 from urc.protocol.requests.reply_match import Aside, CompiledReply, Matcher
 from urc.protocol.values.payload import CodecContext
@@ -63,7 +69,7 @@ class RequestCompiler:
                 spec.encoding, self._readings.settings, fresh, is_compiled, spec.has_keys
             )
             matchers = [self._message(one.read, context) for one in messages]
-            if any(one.acknowledge or one.read.collects for one in messages):
+            if any(one.acknowledge or one.log or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
             else:
                 self.lines[name] = Conversation(spec, matchers)
@@ -87,7 +93,7 @@ class RequestCompiler:
         matchers: list[Matcher],
         context: CodecContext,
     ) -> None:
-        """Add the acknowledgements and collected values that messages declare to their matchers."""
+        """Add the effects that messages declare, such as acknowledgements, to their matchers."""
         replies, kept = Acknowledgements(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
@@ -101,13 +107,15 @@ class RequestCompiler:
                 counts = COUNTERS in one.acknowledge.names
                 counters = (lambda: self.lines[name].counters) if counts else None
                 decode = answering(encode, partial(self._view, name), counters, replies, decode)
+            if one.log is not None:
+                decode = noting(one.log, name, partial(self._view, name), replies, decode)
             if decode is not matcher.decode:
                 matchers[place] = Matcher(matcher.reader, decode)
         line = self.lines[name] = Conversation(spec, matchers)
         line.receiver.replies, line.receiver.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the namespace for an acknowledgement: fields, signals and login fields."""
+        """Return the namespace for a message: fields, signals and login fields."""
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> CompiledRequest:
