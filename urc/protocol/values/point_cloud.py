@@ -25,6 +25,7 @@ import sys
 from array import array
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from itertools import compress
 from typing import Any, Final, NamedTuple
 
@@ -128,11 +129,7 @@ def _cloud(raw: Mapping[str, Any], colour: str, most: int) -> Cloud:
             f"a point cloud of {width} by {height} points of {step} bytes, with rows of {row}"
             f" bytes, needs {max(needed, count * step)} bytes, found {len(data)}"
         )
-    if row == width * step:
-        places = [one * step for one in _selected(count, most)]
-    else:
-        places = [one // width * row + one % width * step for one in _selected(count, most)]
-    unpack = layout.unpack.unpack_from
+    unpack, places = layout.unpack.unpack_from, _places(width, height, step, row, most)
     columns = dict(
         zip(layout.columns, zip(*[unpack(data, at) for at in places], strict=True), strict=True)
     )
@@ -170,6 +167,15 @@ def packed_cloud(
     if sys.byteorder == "big":
         values.byteswap()
     return Cloud(frame, colour, total, values.tobytes())
+
+
+@lru_cache(maxsize=4)
+def _places(width: int, height: int, step: int, row: int, most: int) -> Sequence[int]:
+    """Return the offset of each point to keep; most robots send the same sizes in each message."""
+    selected = _selected(width * height, most)
+    if row == width * step:
+        return [one * step for one in selected]
+    return [one // width * row + one % width * step for one in selected]
 
 
 def _selected(count: int, most: int) -> Sequence[int]:
