@@ -64,6 +64,26 @@ def odometry(x: float) -> bytes:
     return bytes(STORE.serialize_cdr(message, "nav_msgs/msg/Odometry"))
 
 
+def points() -> bytes:
+    """Return 100 points in big-endian order, with padding after each row of 25."""
+    types = STORE.types
+    places = np.zeros(
+        (4, 26), dtype=[("x", ">f4"), ("y", ">f4"), ("z", ">f4"), ("intensity", ">u2")]
+    )
+    places["x"] = np.arange(4)[:, None]
+    places["y"] = np.arange(26)
+    places["intensity"] = 7
+    codes = {"x": 7, "y": 7, "z": 7, "intensity": 4}
+    fields = [
+        types["sensor_msgs/msg/PointField"](name, 4 * at, code, 1)
+        for at, (name, code) in enumerate(codes.items())
+    ]
+    message = types["sensor_msgs/msg/PointCloud2"](
+        header(), 4, 25, fields, True, 14, 26 * 14, places.view(np.uint8).reshape(-1), True
+    )
+    return bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/PointCloud2"))
+
+
 class Robot:
     """Publishers, subscriptions and tokens, named as rmw_zenoh names them."""
 
@@ -130,6 +150,7 @@ def main() -> None:
     odom = robot.token("MP", "odom", "nav_msgs/msg/Odometry", "2::,5:,:,:,,")
     chatter = robot.token("MP", "robot1/chatter", "std_msgs/msg/String", "::,7:,:,:,,")
     odd = robot.token("MP", "odd", "std_msgs/msg/Int32", "::,7:,:,:,,", "RIHS01_" + "0" * 64)
+    cloud = robot.token("MP", "points", "sensor_msgs/msg/PointCloud2", "2::,5:,:,:,,")
     robot.told("cmd_vel", "geometry_msgs/msg/Twist")
     robot.told("cmd_stamped", "geometry_msgs/msg/TwistStamped")
     robot.told("other", "std_msgs/msg/Int32", "RIHS01_" + "0" * 64)
@@ -153,6 +174,7 @@ def main() -> None:
         session.put(odom, odometry(count / 100), attachment=told)
         word = bytes(STORE.serialize_cdr(text(data=f"hello {count}"), "std_msgs/msg/String"))
         session.put(chatter, word, attachment=told)
+        session.put(cloud, points(), attachment=told)
         session.put(odd, b"\0\1\0\0\1\0\0\0", attachment=told)
 
 

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xxhash
 
@@ -16,6 +17,7 @@ from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.peers.zenoh import other_program, warm_up
 from urc.config.load import load_profile
 from urc.model.payload import Envelope
+from urc.protocol.values.point_cloud import read_cloud
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
 from urc.transports.base import (
@@ -56,11 +58,13 @@ signals:
   word: { type: string }
   map: { type: string }
   odd: { type: integer }
+  cloud: { type: point_cloud }
 messages:
   odom: { subscribe: { topic: /odom, type: nav_msgs/Odometry }, json: { x: pose.pose.position.x } }
   word: { subscribe: { topic: /robot1/chatter, throttle: 200ms }, json: { word: data } }
   map: { subscribe: { topic: /robot1/map_name, type: std_msgs/String }, json: { map: data } }
   odd: { subscribe: { topic: /odd, type: std_msgs/Int32 }, json: { odd: data } }
+  points: { subscribe: { topic: /points, type: sensor_msgs/PointCloud2 }, json: { cloud: "@" } }
 commands:
   drive:
     args: { speed: { type: number, min: -1, max: 1, default: 0 } }
@@ -148,6 +152,16 @@ async def test_topics_are_read_and_published(distro: str, tmp_path: Path) -> Non
             before = value(session, "x")
             await until(lambda: value(session, "x") != before)
             await until(lambda: value(session, "map") == "kept")
+            await until(lambda: isinstance(value(session, "cloud"), bytes))
+            cloud = value(session, "cloud")
+            assert isinstance(cloud, bytes)
+            points = np.frombuffer(read_cloud(cloud).points, "<f4").reshape(-1, 4)
+            assert points[[0, 24, 25, 99]].tolist() == [
+                [0, 0, 0, 7],
+                [0, 24, 0, 7],
+                [1, 0, 0, 7],
+                [3, 24, 0, 7],
+            ]
             await until(lambda: re.fullmatch(r"hello \d+", str(value(session, "word"))) is not None)
             assert value(session, "odd") is None, "it was read by another definition"
             await session.command("nudge", {"speed": 0.25})
@@ -182,7 +196,7 @@ async def test_robot_sees_a_node_with_its_topics(distro: str, tmp_path: Path) ->
         rest = [key for key in other.tokens if "/NN/" not in key]
         assert all(re.fullmatch(own + r"/::,10:,:,:,,", key) for key in rest), rest
         topics = {key.split("/")[9] for key in rest if "/MS/" in key}
-        assert topics == {"%odom", "%robot1%map_name", "%odd"}
+        assert topics == {"%odom", "%robot1%map_name", "%odd", "%points"}
         (published,) = [key for key in rest if "/MP/" in key]
         gid = xxhash.xxh3_128_intdigest(published.encode()).to_bytes(16, "little")
         assert told["gid"] == gid.hex()
