@@ -17,6 +17,7 @@ from urc.problems import UrcError
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter
 from urc.protocol.values.occupancy_grid import Grid, encode_grid
+from urc.protocol.values.point_cloud import encode_cloud, packed_cloud
 from urc.simulator.faults import Faults
 from urc.simulator.simulated_body import SimulatedBody, has_rendering, rendered_signals
 from urc.simulator.world.world import PLAIN
@@ -39,12 +40,18 @@ _ROOM: Final = encode_grid(
 """An occupancy grid of 4 by 4 m with one occupied and one unknown cell."""
 
 
+_POINTS: Final = encode_cloud(packed_cloud("", "", 2, {"x": [1.0, 1.0], "y": [0.5, -0.5]}))
+"""A point cloud of two points in front of the robot."""
+
+
 def plausible(signal: Signal, now_s: float) -> Reading:
     """Return a value for `signal` at `now_s` that is within all limits."""
     if signal.type in ("image", "blob"):
         return _PIXEL if signal.size is None or signal.size >= len(_PIXEL) else b""
     if signal.type == "occupancy_grid":
         return _ROOM
+    if signal.type == "point_cloud":
+        return _POINTS
     if signal.type == "object":
         return _quaternion(now_s) if signal.axes else {}
     if signal.type != "array":

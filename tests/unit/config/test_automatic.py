@@ -122,6 +122,14 @@ def test_an_occupancy_grid_is_shown_on_a_map(tmp_path: Path) -> None:
     assert made(tmp_path, floor) == {}
 
 
+def test_a_point_cloud_is_shown_in_a_scene(tmp_path: Path) -> None:
+    cloud = Signal("cloud", "point_cloud", title="Points")
+    driver = Driver(signals={"cloud": cloud})
+    (use,) = automatic_slots(driver, WidgetFolder(shipped("widgets"))).values()
+    assert (use.widget, use.inputs, use.title) == ("scene3d", {"cloud": "cloud"}, "Points")
+    assert made(tmp_path, cloud) == {}
+
+
 def test_half_a_position_is_two_values(tmp_path: Path) -> None:
     """Or one of them in a unit that is none of an angle."""
     lone = made(tmp_path, Signal("lat", unit="deg"), Signal("lon", unit="V"))

@@ -22,10 +22,13 @@ from urc.model.payload import Envelope
 from urc.model.values import Signal
 from urc.protocol.engine import Engine
 from urc.protocol.events import Samples
+from urc.protocol.framing.table import build_framing
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_converter
 from urc.protocol.values.ros_image import ENCODINGS, MAX_16_BIT_PIXELS, MAX_RAW_PIXELS
 from urc.runtime.registries import built_in_catalog
+from urc.simulator.auto import DefaultResponder
+from urc.simulator.values import Values
 
 WIDTH, HEIGHT = 128, 64
 CLOSE = 6
@@ -280,12 +283,36 @@ def test_a_message_of_rosbags_arrives_over_foxglove(tmp_path: Path) -> None:
     assert near(pixels(sample.value), scene())
 
 
+def test_an_emulated_robot_sends_whole_messages(tmp_path: Path) -> None:
+    """Without a world, a plausible image and a plausible cloud."""
+    file = tmp_path / "viewer.yaml"
+    file.write_text(PROFILE + CLOUD, encoding="utf-8")
+    driver = load_profile(file, built_in_catalog()).driver
+    values = Values(driver, {})
+    framing = build_framing(driver.transports["ros"].framing)
+    line = DefaultResponder(driver, {}, values).line("ros", framing, talks=True)
+    engine = Engine(driver, {})
+    engine.start("ros", 0.0)
+    found = {}
+    for name in ("image", "points"):
+        for envelope in line.render(line.message(name), 1.0):
+            for event in engine.receive("ros", envelope, 1.0):
+                assert isinstance(event, Samples)
+                found |= {one.signal: one.value for one in event.samples}
+    assert found == {name: values.of(name, 1.0) for name in ("picture", "cloud")}
+
+
+CLOUD = """\
+  points:
+    subscribe: { topic: /points, type: sensor_msgs/PointCloud2 }
+    json: { cloud: "@" }
+"""
 PROFILE = """
 urc: 1
 kind: robot
 name: viewer
 transports: { ros: { type: ros, via: auto, host: 127.0.0.1, version: 2 } }
-signals: { picture: { type: image } }
+signals: { picture: { type: image }, cloud: { type: point_cloud } }
 messages:
   image:
     subscribe: { topic: /image, type: sensor_msgs/Image }

@@ -14,6 +14,7 @@ from typing import Any, Final, cast
 
 import msgspec
 
+from urc.images import media_type
 from urc.model.payload import Envelope, Payload, ReadSpec
 from urc.model.text import JsonPath
 from urc.protocol.forms.json_types import build_pick, plan_of
@@ -67,7 +68,7 @@ class JsonReader:
             raise NotWritable(f"{name}: a JMESPath expression cannot be inverted")
         for name, path in self._paths.items():  # in order: some readers need the kind first
             if name in fields and not path:
-                root = cast("dict[str, Any]", fields[name])  # the whole document
+                root = _whole(fields[name])
             elif name in fields:
                 _put(root, path, fields[name])
         try:
@@ -140,6 +141,13 @@ def _put(root: dict[str, Any], path: JsonPath, value: object) -> None:
         if inner is None:
             inner = holder[step] = [] if isinstance(after, int) else {}
         holder = inner
+
+
+def _whole(value: object) -> dict[str, Any]:
+    """Return a document that consists of one field; an image is a sensor_msgs/CompressedImage."""
+    if isinstance(value, bytes):
+        return {"format": media_type(value).partition("/")[2], "data": _plain(value)}
+    return cast("dict[str, Any]", value)
 
 
 def _plain(value: object) -> object:
