@@ -69,6 +69,10 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "sha256": ("'x' | sha256", "SHA-256 hash, in hexadecimal digits"),
     "sign": ("1.5 | fixed(2) | sign", "number as text, with a sign even if it is positive"),
     "signed": ("255 | signed(8)", "signed value of a two's complement number"),
+    "scan_points": (
+        "[2, none] | scan_points(0, 0.5)",
+        "x and y of the points of a laser scan in turn, from its distances, first angle and step",
+    ),
     "sin": ("0 | sin", "sine of an angle in radians"),
     "split": ("'a,b' | split(',')", "list of the pieces of a text, split at a separator"),
     "sqrt": ("9 | sqrt", "square root"),

@@ -53,7 +53,7 @@ _LOW_ROWS: Final = 2
 _BIG: Final = frozenset(
     (
         *("attitude", "camera", "depth", "dpad", "image", "joystick", "log", "map", "pano360"),
-        *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
+        *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "transforms", "vector-pad"),
     )
 )
 """Names of the widgets that span two rows and two columns."""
@@ -158,6 +158,8 @@ def _view(widget: Widget | None, name: str, signal: Signal) -> WidgetUse | None:
 def _candidates(signal: Signal) -> tuple[str, ...]:
     if signal.type == "image":
         return ("camera", "image")
+    if signal.type == "transform_tree":
+        return ("transforms",)
     if signal.type == "boolean" or signal.states:
         return ("state", "value")
     if signal.type not in ("integer", "number"):

@@ -39,6 +39,30 @@ def _clamped(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
+MAX_POINTS: Final = 1440
+"""Maximum number of points of a laser scan: four per degree. Of a larger scan, only every second,
+third … distance is used."""
+
+
+def _scan_points(ranges: object, first: object, step: object) -> list[float]:
+    """Return x and y of the points of a laser scan in turn.
+
+    Distances that are missing, or not above 0, are skipped: many scanners report 0 for no echo.
+    """
+    if not isinstance(ranges, (list, tuple)):
+        raise TypeError("expected a list of distances")
+    start, turn = _number(first), _number(step)
+    every = -(-len(ranges) // MAX_POINTS) or 1
+    found: list[float] = []
+    for place in range(0, len(ranges), every):
+        distance = ranges[place]
+        if distance is None or not _number(distance) > 0:
+            continue
+        angle = start + turn * place
+        found += (distance * math.cos(angle), distance * math.sin(angle))
+    return found
+
+
 GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "acos": (_of("acos", math.acos, "expected -1 to 1"), (0, 0)),
     "asin": (_of("asin", math.asin, "expected -1 to 1"), (0, 0)),
@@ -53,9 +77,10 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "hypot": (_of("hypot", math.hypot), (1, 1)),
     "log": (_of("log", math.log, "expected a number above 0"), (0, 0)),
     "radians": (_of("radians", math.radians), (0, 0)),
+    "scan_points": (_scan_points, (2, 2)),
     "sin": (_of("sin", math.sin), (0, 0)),
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Filters for angles, roots, rounding and limits, by name: function, and the range of the number of
-arguments."""
+"""Filters for angles, points, roots, rounding and limits, by name: function, and the range of the
+number of arguments."""

@@ -24,12 +24,14 @@ __all__ = [
     "Axes",
     "Conversion",
     "ElementType",
+    "FrameChange",
     "NOTHING",
     "Reading",
     "Sample",
     "Signal",
     "SignalType",
     "Value",
+    "WHOLE_TYPES",
     "state_texts",
 ]
 
@@ -49,10 +51,14 @@ SignalType = Literal[
     "blob",
     "occupancy_grid",
     "point_cloud",
+    "transform_tree",
 ]
-"""Signal types: a single value, an array of one type, a mapping, or bytes."""
+"""Signal types: a single value, an array of one type, a mapping, or bytes. The value of a transform
+tree is a mapping."""
 BINARY_TYPES: Final[tuple[SignalType, ...]] = ("image", "blob", "occupancy_grid", "point_cloud")
 """Types of signals whose values are bytes, which pages receive as binary messages."""
+WHOLE_TYPES: Final[tuple[SignalType, ...]] = ("occupancy_grid", "point_cloud", "transform_tree")
+"""Types of signals that are whole messages, which only the form ``json`` can read."""
 PICTURE_TYPES: Final[tuple[SignalType, ...]] = ("image", "occupancy_grid")
 """Types of signals whose values are image files; an occupancy grid is a PNG image."""
 MAX_POINTS: Final = 100_000
@@ -153,6 +159,17 @@ PLAIN = Conversion()
 """The identity conversion."""
 
 
+class FrameChange(NamedTuple):
+    """The change of a computed value to another coordinate frame."""
+
+    shape: Literal["pose", "points"]
+    """Shape of the value: a pose, or points as x and y in turn."""
+    source: Template
+    """Name of the coordinate frame of the formula's result."""
+    tree: str
+    """Name of the signal with the transform tree."""
+
+
 class Signal(NamedTuple):
     """A named, typed value of a robot, as declared in the driver."""
 
@@ -192,6 +209,21 @@ class Signal(NamedTuple):
     colour: str = ""
     """Name of the field that gives the points of a point cloud their colour; "" means the usual
     field."""
+    frame: Template | None = None
+    """Name of the coordinate frame to which the value refers, from settings and text signals; None
+    means that the driver declares none."""
+    transform: FrameChange | None = None
+    """Change of the formula's result to `frame`; None means no change."""
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """Names that a computed value depends on: signals, and others such as ``settings``."""
+        if self.formula is None:
+            return frozenset()
+        if self.transform is None or self.frame is None:
+            return self.formula.names
+        frames = self.frame.names | self.transform.source.names
+        return self.formula.names | frames | {self.transform.tree}
 
 
 class Sample(NamedTuple):

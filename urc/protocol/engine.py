@@ -25,7 +25,7 @@ from collections.abc import Mapping, Sequence
 
 from urc.model.driver import Command, Driver
 from urc.model.payload import Payload
-from urc.model.values import Reading, Sample, Value
+from urc.model.values import WHOLE_TYPES, Reading, Sample, Value
 from urc.protocol.events import (
     Close,
     Event,
@@ -109,7 +109,7 @@ class Engine:
         builder = RequestCompiler(driver, self.readings, self.known, fresh, is_compiled=is_compiled)
         self.lines: Mapping[str, Conversation] = builder.lines
         self._all_lines = tuple(self.lines.values())
-        self._grids = {name: _grids_of(driver, name) for name in driver.transports}
+        self._whole = {name: _whole_of(driver, name) for name in driver.transports}
         self._commands = driver.commands
         self._checks = {
             name: build_check(one, is_compiled=is_compiled) for name, one in driver.commands.items()
@@ -172,7 +172,7 @@ class Engine:
         """Record that `transport` is connected."""
         line = self.lines[transport]
         self._down(line, "the connection was replaced by a new one")
-        self.readings.forget_grids(self._grids[transport])
+        self.readings.forget(self._whole[transport])
         events = line.opened(now)
         greeting = self._greetings.get(transport)
         if greeting is None:
@@ -406,12 +406,12 @@ class Engine:
         return told
 
 
-def _grids_of(driver: Driver, transport: str) -> tuple[str, ...]:
-    """Return the signals of a transport whose occupancy grids are updated part by part."""
+def _whole_of(driver: Driver, transport: str) -> tuple[str, ...]:
+    """Return the signals of a transport whose messages update a part of the value."""
     return tuple(
         name
         for message in driver.messages.values()
         if message.transport == transport
         for name in message.read.fields
-        if name in driver.signals and driver.signals[name].type == "occupancy_grid"
+        if name in driver.signals and driver.signals[name].type in WHOLE_TYPES
     )

@@ -100,7 +100,7 @@ def signal_property(signal: Signal) -> dict[str, object]:
         return {"type": "string", "contentEncoding": "base64"}
     if signal.type == "array":
         return {"type": "array", "items": {"type": signal.items}}
-    return {"type": signal.type}
+    return {"type": "object" if signal.type == "transform_tree" else signal.type}
 
 
 def argument_property(argument: Argument) -> dict[str, object]:

@@ -27,6 +27,6 @@ def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -
     signal = driver.signals.get(name)
     if signal is not None and signal.formula is not None and name not in found:
         found[name] = {}
-        for other in sorted(signal.formula.names):
+        for other in sorted(signal.inputs):
             found[name] |= _add_sources(other, driver, found)
     return found.get(name, {})

@@ -38,6 +38,20 @@ _ROOM: Final = encode_grid(
     Grid(4, 4, 1.0, -2.0, -2.0, 0.0, "map", bytes(5) + bytes((100, 255)) + bytes(9))
 )
 """An occupancy grid of 4 by 4 m with one occupied and one unknown cell."""
+_TREE: Final = {
+    "frames": (
+        {"name": "map", "parent": "", "depth": 0},
+        {
+            "name": "odom",
+            "parent": "map",
+            "depth": 1,
+            "translation": (0.0, 0.0, 0.0),
+            "rotation": (0.0, 0.0, 0.0, 1.0),
+            "age": 0.0,
+        },
+    )
+}
+"""A transform tree with one transform."""
 
 
 _POINTS: Final = encode_cloud(packed_cloud("", "", 2, {"x": [1.0, 1.0], "y": [0.5, -0.5]}))
@@ -52,6 +66,8 @@ def plausible(signal: Signal, now_s: float) -> Reading:
         return _ROOM
     if signal.type == "point_cloud":
         return _POINTS
+    if signal.type == "transform_tree":
+        return _TREE
     if signal.type == "object":
         return _quaternion(now_s) if signal.axes else {}
     if signal.type != "array":

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from urc.config.link.coordinate_frames import link_coordinate_frames
 from urc.config.link.flow import (
     link_command,
     link_keepalives,
@@ -27,7 +28,7 @@ from urc.expressions import COUNTERS, NONCE, Template
 from urc.model.driver import Driver
 from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.profile import Setting
-from urc.model.values import NOTHING, Reading
+from urc.model.values import NOTHING, WHOLE_TYPES, Reading
 from urc.model.world import WorldSpec
 
 __all__ = ["NameUses", "link_driver", "link_simulator"]
@@ -112,7 +113,7 @@ class _Linker:
                 self.field(part.must("head").must(field), field, {"key": True})
             elif field in read.collects:
                 self.field(part.must("collect").must(field), field, {"key": True})
-            elif kind := self._unread_type(field, read):
+            elif kind := self._whole_type(field, read):
                 self.problems.error(
                     inner,
                     "wrong-type",
@@ -124,12 +125,11 @@ class _Linker:
                 self.field(place, field, where)
         self._beside(part, read)
 
-    def _unread_type(self, field: str, read: ReadSpec) -> str:
-        """Return the type of a field that is a whole message which `read` cannot read, or ""."""
+    def _whole_type(self, field: str, read: ReadSpec) -> str:
+        """Return the type of a signal that is a whole message, if this form can't read it."""
         signal = self.driver.signals.get(field)
-        if signal is None or read.form == "json":
-            return ""
-        return signal.type if signal.type in ("occupancy_grid", "point_cloud") else ""
+        is_whole = signal is not None and signal.type in WHOLE_TYPES
+        return signal.type if signal is not None and is_whole and read.form != "json" else ""
 
     def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
         """Check the name of one signal that `part` sets."""
@@ -269,6 +269,7 @@ def link_driver(
         link_poll(linker, inner, poll)
     _check_poll_names(part, driver, problems)
     link_signals(part, driver, linker.template, problems)
+    link_coordinate_frames(part, driver, linker.template, problems)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         linker.transport(inner, "to", command.transport)

@@ -59,7 +59,7 @@ def _value(part: Node, signal: Signal, problems: Problems) -> Reading:
     data = part.data
     if data is None:
         return None
-    if signal.type in ("object", *BINARY_TYPES):
+    if signal.type in ("object", "transform_tree", *BINARY_TYPES):
         text = f"signal {signal.name!r}: a value of type {signal.type} cannot be set here"
         problems.error(part, "wrong-type", text)
         return None

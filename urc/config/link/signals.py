@@ -80,6 +80,5 @@ def _set_by_frames(driver: Driver) -> dict[str, str]:
 
 
 def _needed(name: str, signals: Mapping[str, Signal]) -> list[str]:
-    """Return the signals that the formula for the signal `name` uses."""
-    formula = signals[name].formula
-    return sorted(formula.names & signals.keys()) if formula else []
+    """Return the signals that the computed signal `name` depends on."""
+    return sorted(signals[name].inputs & signals.keys())

@@ -194,7 +194,7 @@ def _fitting(part: Node, signal: Signal, kind: str, problems: Problems) -> Value
     value: Value = part.data
     if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
         return value
-    if kind in ("object", *BINARY_TYPES):
+    if kind in ("object", "transform_tree", *BINARY_TYPES):
         text = f"signal {signal.name!r}: a value of type {kind} cannot be compared"
         problems.error(
             part,

@@ -17,6 +17,7 @@ from urc.config.parse.flow import (
 )
 from urc.config.parse.form import FormContext, parse_read, parse_write
 from urc.config.parse.form_options import with_collected
+from urc.config.parse.frame import with_frame_changes
 from urc.config.parse.reply import implied_reply, parse_reply
 from urc.config.parse.signal import parse_signal, with_ages
 from urc.config.parse.transport import parse_transport
@@ -56,6 +57,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: parse_signal(inner, spoken_name(name), problems)
         for name, inner in part.named("signals").items()
     }
+    signals = with_frame_changes(signals)
     return Driver(
         transports=transports,
         signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),

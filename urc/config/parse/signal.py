@@ -5,6 +5,7 @@ from typing import Final
 
 from urc.config.node import Node, Problems
 from urc.config.parse.conversion import CONVERSION_KEYS, parse_conversion, parse_states
+from urc.config.parse.frame import parse_frame, parse_frame_change
 from urc.config.parse.limits import parse_limits
 from urc.config.values import check_range
 from urc.expressions import Template
@@ -41,6 +42,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         )
     axes = _axes(part, kind, problems)
     states = parse_states(part, element, problems)
+    frame = parse_frame(part, element, problems)
     return Signal(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -61,6 +63,8 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         deadband=_deadband(part, element, (low, high), problems),
         debounce_s=_debounce_s(part, kind, problems),
         colour=part.text("colour"),
+        frame=frame,
+        transform=parse_frame_change(part, frame, kind, problems),
     )
 
 
@@ -92,7 +96,7 @@ def _bases(name: str, signals: Mapping[str, Signal]) -> set[str]:
         if one.formula is None:
             found.add(one.name)
         else:
-            waiting += one.formula.names
+            waiting += one.inputs
     return found
 
 

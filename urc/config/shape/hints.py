@@ -66,6 +66,7 @@ _SAME_TYPES: Final = {
     "costmap": "occupancy_grid",
     "pointcloud": "point_cloud",
     "PointCloud2": "point_cloud",
+    "tf": "transform_tree",
     "bytes": "blob",
 }
 """URC type names, by the corresponding type name in another tool."""

@@ -14,7 +14,7 @@ from urc.key_expressions import key_matches
 from urc.model.driver import Driver, Reply
 from urc.model.payload import Envelope, Payload, ReadSpec, each_of
 from urc.model.sequence import ExpectStep, all_steps
-from urc.model.values import Value
+from urc.model.values import WHOLE_TYPES, Value
 from urc.problems import UrcError
 from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
@@ -120,14 +120,23 @@ def listened(
     """Return a driver's subscription options for a transport, keyed by topic.
 
     If several declarations have the same topic, the first options take precedence, and later
-    options add missing keys. An empty topic, such as from an empty setting, is left out.
+    options add missing keys. An empty topic, such as from an empty setting, is left out. For the
+    topic of a transform tree, the engine applies ``throttle`` itself. Several programs publish on
+    this topic, and a throttle in the bridge would drop the transforms of some of them.
     """
     topics: dict[str, dict[str, Value]] = {}
+    trees: set[str] = set()
     for read in _reads(driver, transport):
         if read.topic is not None and (topic := topic_of(read, settings)):
             mine = topics.setdefault(topic, {})
             for name, value in read.listen.items():
                 mine.setdefault(name, value)
+            signals = (driver.signals.get(field) for field in read.fields)
+            if any(one is not None and one.type == "transform_tree" for one in signals):
+                trees.add(topic)
+    for topic in trees:
+        for name in ("throttle", "queue_length"):
+            topics[topic].pop(name, None)
     return dict(topics)
 
 
@@ -197,11 +206,15 @@ def paths_by_topic(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, list[Path]]:
     """Return the paths that a driver reads in each topic's messages; see `paths_of`."""
+    kinds = {
+        kind: {name for name, one in driver.signals.items() if one.type == kind}
+        for kind in WHOLE_TYPES
+    }
     found: dict[str, list[Path]] = {}
     for read in _reads(driver, transport):
         if read.topic is not None:
-            grids = {name for name, one in driver.signals.items() if one.type == "occupancy_grid"}
-            found.setdefault(topic_of(read, settings), []).extend(paths_of(read, grids))
+            paths = paths_of(read, kinds["occupancy_grid"], kinds["transform_tree"])
+            found.setdefault(topic_of(read, settings), []).extend(paths)
     return found
 
 

@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from urc.expressions import ExpressionError, Template, defaulted_names
-from urc.model.values import NOTHING, Alarm, Reading, Sample, Signal
+from urc.model.values import NOTHING, Alarm, FrameChange, Reading, Sample, Signal
 from urc.protocol.readings.alarms import AlarmMonitor
 from urc.protocol.readings.data_change_filter import DataChangeFilter
+from urc.protocol.readings.tree_readings import STATIC_TOPIC, TreeReadings, tree_of
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import Convert, build_converter
 from urc.protocol.values.occupancy_grid import GridConverter
+from urc.protocol.values.transform_tree import NotConnected
 
 __all__ = ["Decode", "Readings"]
 
@@ -32,6 +34,8 @@ class _Computed(NamedTuple):
     shortest_s: float
     """Minimum ``stale_after`` of the inputs, in seconds."""
     convert: Convert
+    frame: Template | None
+    change: FrameChange | None
 
 
 class Readings:
@@ -47,6 +51,8 @@ class Readings:
     ) -> None:
         self.signals = signals
         self.settings: Mapping[str, object] = names.get("settings", NOTHING)  # type: ignore[assignment]
+        self.tree = tree_of(signals)
+        """The transform tree of the driver; None if the driver has none."""
         self._converters: dict[str, Convert] = {}
         self._defers_grids = False
         self._kept: frozenset[str] = frozenset()  # `_in_order` below creates converters
@@ -68,12 +74,27 @@ class Readings:
         inputs = (name for one in self._computed for name in one.inputs)
         self._kept = frozenset((*inputs, *self._timed))
 
-    def decoder(self, fields: Iterable[str]) -> Decode:
+    def decoder(
+        self, fields: Iterable[str], topic: str = "", throttle_s: float | None = None
+    ) -> Decode:
         """Return a function that converts the given fields of a frame to samples.
 
         Fields whose names start with ``_`` are private to the document and are not converted.
+
+        Args:
+            fields: names of the frame's fields.
+            topic: topic of the frame, which determines whether transforms are static.
+            throttle_s: minimum time between two samples of a transform tree, in seconds; None means
+                the default.
         """
-        converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
+        names = [name for name in fields if not name.startswith("_")]
+        tree = self.tree
+        if tree is not None and tree.name in names:
+            if throttle_s is not None:
+                tree.listen(throttle_s)
+            others = self.decoder([name for name in names if name != tree.name])
+            return self._tree_decoder(tree, others, topic.split("/")[-1] == STATIC_TOPIC)
+        converters = {name: self._converter(name) for name in names}
 
         def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
             samples: list[Sample] = []
@@ -97,12 +118,40 @@ class Readings:
 
         return decode
 
-    def forget_grids(self, names: Iterable[str]) -> None:
-        """Drop the last occupancy grids of the given signals; updates then wait for new grids."""
+    def _tree_decoder(self, tree: TreeReadings, others: Decode, is_static: bool) -> Decode:
+        """Return a function that converts the fields of a frame with transforms."""
+
+        def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+            samples, refused = others(found, now)
+            if found.get(tree.name) is None:
+                return samples, refused
+            try:
+                faults = tree.receive(found[tree.name], now, is_static=is_static)
+            except BadValue as fault:
+                faults = [str(fault)]
+            refused += [f"{tree.name}: {fault}" for fault in faults]
+            return samples + self._tree_samples(tree, refused, now), refused
+
+        return decode
+
+    def _tree_samples(self, tree: TreeReadings, refused: list[str], now: float) -> list[Sample]:
+        """Return the sample of the transform tree, and of all signals that depend on it."""
+        sample = tree.sample(now)
+        if sample is None:
+            return []
+        samples = [sample]
+        if self._kept:
+            self.follow(samples, refused, now)
+        return samples
+
+    def forget(self, names: Iterable[str]) -> None:
+        """Drop what the given signals have kept for updates: occupancy grids and transforms."""
         for name in names:
             convert = self._converters.get(name)
             if isinstance(convert, GridConverter):
                 convert.forget()
+            elif self.tree is not None and name == self.tree.name:
+                self.tree.forget()
 
     def defer_grids(self) -> None:
         """Return occupancy grids as `UnencodedGrid` from now on, except those that formulas use."""
@@ -133,28 +182,32 @@ class Readings:
     @property
     def is_timed(self) -> bool:
         """Whether samples can change over time without new data."""
-        return bool(self._timed or self._change_filter)
+        return bool(self._timed or self._change_filter or self.tree)
 
     @property
     def deadline(self) -> float | None:
         """Time at which `tick` may return samples; None if only a frame can change samples."""
-        if not self._timed and not self._change_filter:
+        if not self.is_timed:
             return None
         times = [self._alarm_monitors[name].deadline for name in self._timed]
         times += [one.deadline for one in self._change_filter.values()]
+        times += [self.tree.deadline] if self.tree is not None else []
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
         """Return the samples that have changed by `now` without new data, with their arrival times.
 
         The result contains the newest samples of signals whose alarm has changed, and debounced
-        samples.
+        samples. After a burst of transforms, it also contains the sample of the transform tree.
         """
         samples: list[Sample] = []
+        if self.tree is not None:
+            samples += self._tree_samples(self.tree, [], now)
         if self._change_filter:
-            settled = (one.tick(now) for one in self._change_filter.values())
-            samples += [sample for sample in settled if sample is not None]
-            self.follow(samples, [], now)
+            found = [one.tick(now) for one in self._change_filter.values()]
+            settled = [sample for sample in found if sample is not None]
+            self.follow(settled, [], now)
+            samples += settled
         for name in self._timed:
             due = self._alarm_monitors[name].deadline
             if due is not None and due <= now:
@@ -199,6 +252,8 @@ class Readings:
         """Return the sample; None if a required input has never been received."""
         time_s, is_absent = now, False
         for name in computed.inputs:
+            if computed.change is not None and name == computed.change.tree:
+                continue  # only the age of the transforms between the two frames counts
             sample = self._last.get(name)
             if sample is None:
                 if name in computed.spare:
@@ -209,8 +264,19 @@ class Readings:
             time_s = min(time_s, sample.time_s + left_s)
             is_absent |= sample.value is None
         try:
-            value = computed.convert(computed.formula.evaluate(self._namespace))
-        except ExpressionError:
+            move = None
+            if computed.change is not None and computed.frame is not None and self.tree is not None:
+                names = self._namespace
+                move, oldest_s = self.tree.change(computed.change, computed.frame, names)
+                left_s = self.tree.stale_after_s - computed.shortest_s
+                time_s = min(time_s, oldest_s + left_s)
+            raw = computed.formula.evaluate(self._namespace)
+            value = computed.convert(raw if move is None else move(raw))
+        except NotConnected:
+            if self.tree is None or not self.tree.tree.links:
+                return None  # no transforms have been received
+            value = None
+        except (ExpressionError, BadValue):
             if not is_absent:
                 raise
             value = None
@@ -230,14 +296,15 @@ class Readings:
             ready = [
                 name
                 for name, one in waiting.items()
-                if one.formula and not any(other in waiting for other in one.formula.names)
+                if one.formula and not any(other in waiting for other in one.inputs)
             ]
             if not ready:
                 raise ValueError(f"signals depend on each other: {', '.join(waiting)}")
             for name in ready:
-                formula = waiting.pop(name).formula
+                signal = waiting.pop(name)
+                formula, change = signal.formula, signal.transform
                 if formula is not None:
-                    inputs = tuple(one for one in sorted(formula.names) if one in self.signals)
+                    inputs = tuple(one for one in sorted(signal.inputs) if one in self.signals)
                     ages = [self.signals[one].stale_after_s for one in inputs]
                     yield _Computed(
                         name,
@@ -246,4 +313,6 @@ class Readings:
                         defaulted_names(formula),
                         min(ages, default=0.0),
                         self._converter(name),
+                        signal.frame,
+                        change,
                     )

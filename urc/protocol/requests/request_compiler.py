@@ -13,7 +13,7 @@ from urc.model.values import NOTHING
 from urc.protocol.forms.http_head import LOCATION
 from urc.protocol.forms.json_text import filled
 from urc.protocol.forms.table import build_reader
-from urc.protocol.forms.topics import paths_by_topic
+from urc.protocol.forms.topics import paths_by_topic, topic_of
 from urc.protocol.framing.table import build_framing
 from urc.protocol.readings.compiled import build_fast_read
 from urc.protocol.readings.readings import Readings
@@ -247,7 +247,11 @@ class RequestCompiler:
         return Matcher(matcher.reader, matcher.decode, compiled)
 
     def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
-        return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
+        topic = "" if read.topic is None else topic_of(read, context.settings)
+        throttle = read.listen.get("throttle")
+        throttle_s = throttle if isinstance(throttle, float) else None
+        decode = self._readings.decoder(read.fields, topic, throttle_s)
+        return Matcher(build_reader(read, context), decode)
 
 
 def _converting(encode: Encode, codec: "TopicCodec") -> Encode:

@@ -21,7 +21,8 @@ from typing import Any, Final
 
 from urc.protocol.compile.source import function_of
 from urc.protocol.ros.definition import SIZES, Array, BadDefinition, Layout, Primitive, Record, Text
-from urc.protocol.ros.wanted import EACH, PACKED, Wanted
+from urc.protocol.ros.wanted import EACH, FEW, PACKED, Wanted
+from urc.protocol.values.transform_tree import MAX_TRANSFORMS
 
 __all__ = ["MAX_ELEMENTS", "BadRosMessage", "Read", "build_read", "read_safely"]
 
@@ -107,7 +108,7 @@ def _wide(data: bytes, order: str) -> str:
 _SCOPE: Final[dict[str, Any]] = {
     "len": len, "list": list, "range": range, "bytes": bytes,
     "bad": _bad, "finite": _finite, "all_finite": _all_finite, "numbers": _numbers, "wide": _wide,
-    "MAX_ELEMENTS": MAX_ELEMENTS, "MAX_NUMBERS": MAX_NUMBERS,
+    "MAX_ELEMENTS": MAX_ELEMENTS, "MAX_NUMBERS": MAX_NUMBERS, "MAX_TRANSFORMS": MAX_TRANSFORMS,
 }  # fmt: skip
 
 
@@ -279,9 +280,15 @@ class _ReadGenerator:
     def _array(self, layout: Array, wanted: Wanted) -> str:
         element = layout.element
         is_packed = isinstance(wanted, dict) and PACKED in wanted
+        is_few = isinstance(wanted, dict) and FEW in wanted
         if isinstance(wanted, dict):
-            wanted = is_packed or wanted.get(EACH, False)
+            wanted = is_packed or wanted.get(FEW if is_few else EACH, False)
         count = str(layout.length) if layout.length else self._counter()
+        if is_few:
+            with self._block(f"if {count} > MAX_TRANSFORMS:"):
+                self._emit(
+                    f"bad(f'a message with {{{count}}} transforms; the limit is {MAX_TRANSFORMS}')"
+                )
         if isinstance(element, Primitive):
             code = "B" if is_packed and element.code == "b" else element.code
             return self._number_array(code, layout.length, count, wanted)

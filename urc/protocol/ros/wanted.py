@@ -9,11 +9,13 @@ from typing import Any, Final, TypeAlias, cast
 
 from urc.model.payload import ReadSpec
 
-__all__ = ["ALL", "EACH", "PACKED", "Path", "Wanted", "paths_of", "wanted_of"]
+__all__ = ["ALL", "EACH", "FEW", "PACKED", "Path", "Wanted", "paths_of", "wanted_of"]
 
 ALL: Final = True
 EACH: Final = "*"
 """Path step for the elements of an array."""
+FEW: Final = "few"
+"""Path step for the elements of an array of transforms, whose number is limited."""
 
 PACKED: Final = "packed"
 """Last path step for an array of small numbers that is read as bytes."""
@@ -28,6 +30,7 @@ _GRID_PARTS: Final[tuple[Path, ...]] = (
     ("data", PACKED),
 )
 """Paths in an occupancy grid or in its update; a message has only some of them."""
+_TREE_PART: Final[Path] = ("transforms", FEW)
 _AROUND: Final = frozenset(
     (
         "multi_select_list",
@@ -64,12 +67,15 @@ def wanted_of(paths: Iterable[Path]) -> Wanted:
     return root
 
 
-def paths_of(read: ReadSpec, grids: Container[str] = ()) -> Iterator[Path]:
+def paths_of(
+    read: ReadSpec, grids: Container[str] = (), trees: Container[str] = ()
+) -> Iterator[Path]:
     """Yield the paths that a declaration reads; the empty path means the whole message.
 
     Args:
         read: the declaration.
         grids: fields that are occupancy grids; only the parts of a grid are read.
+        trees: fields that are transform trees.
     """
     paths = read.options.get("paths")
     if read.form != "json" or not isinstance(paths, Mapping):
@@ -78,6 +84,8 @@ def paths_of(read: ReadSpec, grids: Container[str] = ()) -> Iterator[Path]:
     for field, path in paths.items():
         if isinstance(path, tuple) and field in grids:
             yield from (path + part for part in _GRID_PARTS)
+        elif isinstance(path, tuple) and field in trees:
+            yield path + _TREE_PART
         elif isinstance(path, tuple):
             yield tuple(step if isinstance(step, str) else EACH for step in path)
         else:

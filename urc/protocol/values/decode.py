@@ -21,6 +21,7 @@ from urc.protocol.values.convert import (
 )
 from urc.protocol.values.occupancy_grid import GridConverter, grid_message
 from urc.protocol.values.point_cloud import cloud_converter, cloud_message
+from urc.protocol.values.transform_tree import tree_message
 from urc.protocol.values.vectors import array_converter, bytes_converter, object_converter
 
 __all__ = ["BadValue", "Convert", "build_converter", "build_raw"]
@@ -34,7 +35,7 @@ _BOTH = frozenset(("true", "false"))
 
 def build_converter(signal: Signal) -> Convert:
     """Return a function that converts a raw field to a value of `signal`, or raises `BadValue`."""
-    if signal.type == "object":
+    if signal.type in ("object", "transform_tree"):
         return _usable(object_converter)
     if signal.type == "occupancy_grid":
         return GridConverter()
@@ -57,6 +58,8 @@ def build_raw(signal: Signal) -> Callable[[object], object]:
         return lambda value: grid_message(value) if isinstance(value, bytes) else value
     if signal.type == "point_cloud":
         return lambda value: cloud_message(value) if isinstance(value, bytes) else value
+    if signal.type == "transform_tree":
+        return tree_message
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)
     if back is None:

@@ -86,6 +86,7 @@ _KINDS: Final[Mapping[str, type | tuple[type, ...]]] = {
     "string": str,
     "array": list,
     "object": dict,
+    "transform_tree": dict,
     "image": str,
     "occupancy_grid": str,
     "point_cloud": str,

@@ -18,8 +18,8 @@ OURS = frozenset({
     "compass", "deadman", "depth", "dpad", "gamepad", "gauge", "hold-button", "iframe", "image",
     "joystick", "keyboard", "knob", "link", "log", "map", "markdown", "number", "pano360",
     "path-pad", "plot", "range", "recorder", "scan", "scene3d", "select", "sequence", "signal",
-    "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
-    "vector-pad",
+    "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt",
+    "transforms", "value", "vector-pad",
 })  # fmt: skip
 """Names of URC's own widgets. Widgets in all other folders are not trusted."""
 

@@ -26,7 +26,7 @@ __all__ = ["VALUES", "Cards", "small_values"]
 VALUES = 4
 """Maximum number of values displayed on a card without an image."""
 _FRESH = {"cache-control": "no-store"}
-_UNSHOWN = (*BINARY_TYPES, "array")
+_UNSHOWN = (*BINARY_TYPES, "array", "transform_tree")
 
 
 class Cards:

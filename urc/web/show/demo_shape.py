@@ -26,7 +26,7 @@ _ALARM: Final = {
     "else": {"enum": [*_WORDS, *_SEVERITIES]},
 }
 _ELEMENTS: Final = ["integer", "number", "boolean", "string"]
-_TYPES: Final = [*_ELEMENTS, "array", "object", *BINARY_TYPES]
+_TYPES: Final = [*_ELEMENTS, "array", "object", "transform_tree", *BINARY_TYPES]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import { Sheet } from "./offscreen_canvas.js";
 import { mark } from "../core/words.js";
 
 export { digitsIn, figure } from "../core/number_format.js";
-export { inTurn, wordOf } from "../core/formatting.js";
+export { ageText, inTurn, wordOf } from "../core/formatting.js";
 export { mark, t } from "../core/words.js";
 
 /** Text of an unknown value, which is never shown as 0. */
