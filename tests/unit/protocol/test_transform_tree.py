@@ -1,7 +1,6 @@
 """Transform trees: chains as in tf2's own tests, ages, bounds, and messages that lie."""
 
 import math
-import time
 from typing import Any
 
 import pytest
@@ -266,10 +265,8 @@ def test_a_message_without_transforms_is_described(raw: object) -> None:
 def test_a_flood_of_transforms_is_rejected_as_a_whole() -> None:
     made = TransformTree()
     many = [stamped("map", f"f{at}") for at in range(5000)]
-    began = time.perf_counter()
     with pytest.raises(BadValue, match=f"5000 transforms; the limit is {MAX_TRANSFORMS}"):
         made.update({"transforms": many}, 1)
-    assert time.perf_counter() - began < 0.01
     assert not made.links
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -255,24 +256,28 @@ def test_a_binary_flood_of_transforms_is_refused_before_it_is_read(tmp_path: Pat
     announce(robot, ROS2, "cdr")
     turn = (0.0, 0.0, 0.0, 1.0)
     many = [stamped("map", f"f{at}", (0.0, 0.0, 0.0), turn, sec=1) for at in range(5000)]
-    body = binary(ROS2, many, "cdr")
-    began = time.perf_counter()
-    (fault,) = [
-        one.message
-        for one in robot.engine.receive(
-            "ros", Envelope("message", {"topic": "/tf", "encoding": "cdr"}, body), 1
-        )
-        if isinstance(one, Violation)
-    ]
+    envelope = Envelope("message", {"topic": "/tf", "encoding": "cdr"}, binary(ROS2, many, "cdr"))
+    events = robot.engine.receive("ros", envelope, 1)
+    (fault,) = [one.message for one in events if isinstance(one, Violation)]
     assert "a message with 5000 transforms; the limit is 1000" in fault
-    assert time.perf_counter() - began < 0.01
+    # Reading all of them takes 14 ms on the same computer.
+    assert fastest(lambda: robot.engine.receive("ros", envelope, 1)) < 0.005
+
+
+def fastest(call: Callable[[], object]) -> float:
+    """Return the shortest time of several calls in seconds, because the computer may be busy."""
+    times = []
+    for _ in range(10):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return min(times)
 
 
 def test_a_flood_of_transforms_costs_little(tmp_path: Path) -> None:
     robot = Robot(tmp_path)
     many = [stamped("map", f"f{at}") for at in range(5000)]
-    began = time.perf_counter()
     assert robot.faults("/tf", {"transforms": many}, 1) == [
         "frames: a message with 5000 transforms; the limit is 1000"
     ]
-    assert time.perf_counter() - began < 0.02
+    assert fastest(lambda: robot.faults("/tf", {"transforms": many}, 1)) < 0.005
