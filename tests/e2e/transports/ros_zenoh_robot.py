@@ -5,6 +5,7 @@ program publishes odometry, a map for late joiners and an unknown type, and prin
 """
 
 import json
+import math
 import sys
 import threading
 import time
@@ -23,6 +24,7 @@ from zenoh.ext import (
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 GID = bytes(range(16))
+TREE = "tf2_msgs/msg/TFMessage"
 
 
 def hashed(name: str, distro: str) -> str:
@@ -82,6 +84,20 @@ def points() -> bytes:
         header(), 4, 25, fields, True, 14, 26 * 14, places.view(np.uint8).reshape(-1), True
     )
     return bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/PointCloud2"))
+
+
+def transform(parent: str, child: str, x: float, yaw: float = 0.0) -> bytes:
+    types = STORE.types
+    z, w = math.sin(yaw / 2), math.cos(yaw / 2)
+    stamped = types["geometry_msgs/msg/TransformStamped"](
+        header=types["std_msgs/msg/Header"](header().stamp, frame_id=parent),
+        child_frame_id=child,
+        transform=types["geometry_msgs/msg/Transform"](
+            translation=types["geometry_msgs/msg/Vector3"](x=x, y=0.0, z=0.0),
+            rotation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=z, w=w),
+        ),
+    )
+    return bytes(STORE.serialize_cdr(types[TREE](transforms=[stamped]), TREE))
 
 
 class Robot:
@@ -163,6 +179,14 @@ def main() -> None:
     text = STORE.types["std_msgs/msg/String"]
     told = z_serialize((Int64(1), Int64(time.time_ns()), GID))
     kept.put(bytes(STORE.serialize_cdr(text(data="kept"), "std_msgs/msg/String")), attachment=told)
+    fixed = declare_advanced_publisher(
+        session,
+        robot.token("MP", "tf_static", TREE, ":1:,1:,:,:,,"),
+        cache=CacheConfig(1),
+        publisher_detection=True,
+    )
+    fixed.put(transform("base_link", "laser", 0.5, math.pi / 2), attachment=told)
+    moving = robot.token("MP", "tf", TREE, "::,100:,:,:,,")
     robot.graph()
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
@@ -175,6 +199,9 @@ def main() -> None:
         word = bytes(STORE.serialize_cdr(text(data=f"hello {count}"), "std_msgs/msg/String"))
         session.put(chatter, word, attachment=told)
         session.put(cloud, points(), attachment=told)
+        # Two programs, whose messages alternate: localisation and the base.
+        session.put(moving, transform("map", "odom", 10.0, math.pi / 2), attachment=told)
+        session.put(moving, transform("odom", "base_link", 2.0), attachment=told)
         session.put(odd, b"\0\1\0\0\1\0\0\0", attachment=told)
 
 

@@ -131,7 +131,7 @@ async def test_a_large_map_a_plan_and_a_pose_arrive_over_the_real_server() -> No
                 if robot.latest("floor") is None:
                     rover.publish("/map", GRID, occupancy(cells))
 
-            names = ("floor", "plan", "goal_y", "offset_x", "map_x")
+            names = ("floor", "map_plan", "goal_y", "frames", "map_x")
             await until(lambda: all(robot.latest(one) for one in names), publish)
 
             def near(name: str, expected: float) -> bool:
@@ -141,7 +141,7 @@ async def test_a_large_map_a_plan_and_a_pose_arrive_over_the_real_server() -> No
             await until(lambda: near("map_x", 9.0) and near("map_y", 22.0), publish)
             assert near("map_yaw", math.pi / 2)
             assert near("goal_y", 3.0)
-            found: Any = robot.latest("plan")
+            found: Any = robot.latest("map_plan")
             assert found.value == (1.0, 2.0, 1.5, 2.0, 1.5, 3.0)
             floor: Any = robot.latest("floor")
             grid = read_grid(floor.value)

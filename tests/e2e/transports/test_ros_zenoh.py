@@ -7,6 +7,7 @@ import struct
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,8 +60,17 @@ signals:
   map: { type: string }
   odd: { type: integer }
   cloud: { type: point_cloud }
+  ahead: { type: number, unit: m, frame: laser }
+  frames: { type: transform_tree }
+  seen: { type: array, value: "[ahead, 0]", frame: map, transform: points }
 messages:
-  odom: { subscribe: { topic: /odom, type: nav_msgs/Odometry }, json: { x: pose.pose.position.x } }
+  odom:
+    subscribe: { topic: /odom, type: nav_msgs/Odometry }
+    json: { x: pose.pose.position.x, ahead: pose.pose.orientation.w }
+  moving:
+    subscribe: { topic: /tf, type: tf2_msgs/TFMessage, throttle: 500ms }
+    json: { frames: "@" }
+  fixed: { subscribe: { topic: /tf_static, type: tf2_msgs/TFMessage }, json: { frames: "@" } }
   word: { subscribe: { topic: /robot1/chatter, throttle: 200ms }, json: { word: data } }
   map: { subscribe: { topic: /robot1/map_name, type: std_msgs/String }, json: { map: data } }
   odd: { subscribe: { topic: /odd, type: std_msgs/Int32 }, json: { odd: data } }
@@ -179,6 +189,27 @@ async def test_topics_are_read_and_published(distro: str, tmp_path: Path) -> Non
 
 
 @DISTROS
+async def test_transforms_of_several_programs_form_one_tree(distro: str, tmp_path: Path) -> None:
+    """The static transform was sent before URC connected; the others alternate on one topic."""
+    async with robot(distro) as other, driven(tmp_path, other.port, distro) as session:
+        await until(lambda: value(session, "seen") is not None)
+        await until(lambda: len(rows(session)) == 4)
+        assert [(row["name"], row["parent"]) for row in rows(session)] == [
+            ("map", ""), ("odom", "map"), ("base_link", "odom"), ("laser", "base_link"),
+        ]  # fmt: skip
+        await until(lambda: value(session, "seen") == pytest.approx((9.0, 2.5)))
+        assert rows(session)[3]["age"] is None
+        assert rows(session)[1]["age"] < 1
+        assert rows(session)[1]["stamp"] == 12.0
+
+
+def rows(session: Session) -> list[Mapping[str, Any]]:
+    """Return the frames of the transform tree."""
+    found = value(session, "frames")
+    return list(found["frames"]) if isinstance(found, Mapping) else []
+
+
+@DISTROS
 async def test_robot_sees_a_node_with_its_topics(distro: str, tmp_path: Path) -> None:
     """The tokens are valid, and the identifier of the messages is the hash of one of them."""
     async with robot(distro) as other, driven(tmp_path, other.port, distro) as session:
@@ -192,11 +223,11 @@ async def test_robot_sees_a_node_with_its_topics(distro: str, tmp_path: Path) ->
         head = re.fullmatch(r"(@ros2_lv/0/[0-9a-f]{1,32}/0)/0/NN/%/%/(urc_[0-9a-f]{6})", nodes[0])
         assert head is not None
         hashed = r"TypeHashNotSupported" if distro == "humble" else r"RIHS01_[0-9a-f]{64}"
-        own = rf"{head[1]}/\d+/M[PS]/%/%/{head[2]}/%[^/]+/[a-z_]+::msg::dds_::\w+_/{hashed}"
+        own = rf"{head[1]}/\d+/M[PS]/%/%/{head[2]}/%[^/]+/[a-z0-9_]+::msg::dds_::\w+_/{hashed}"
         rest = [key for key in other.tokens if "/NN/" not in key]
         assert all(re.fullmatch(own + r"/::,10:,:,:,,", key) for key in rest), rest
         topics = {key.split("/")[9] for key in rest if "/MS/" in key}
-        assert topics == {"%odom", "%robot1%map_name", "%odd", "%points"}
+        assert topics == {"%odom", "%robot1%map_name", "%odd", "%points", "%tf", "%tf_static"}
         (published,) = [key for key in rest if "/MP/" in key]
         gid = xxhash.xxh3_128_intdigest(published.encode()).to_bytes(16, "little")
         assert told["gid"] == gid.hex()
