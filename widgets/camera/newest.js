@@ -13,7 +13,7 @@
 export class Newest {
   /**
    * @param {(bitmap: ImageBitmap) => void} show shows an image, and may keep its bitmap
-   * @param {(error: unknown) => void} failed
+   * @param {(blob: Blob) => void} failed receives an image that cannot be decoded
    */
   constructor(show, failed) {
     this.show = show;
@@ -47,8 +47,8 @@ export class Newest {
         const bitmap = await createImageBitmap(blob);
         if (this.isOver || source !== this.source) bitmap.close();
         else this.replace(bitmap, blob);
-      } catch (error) {
-        if (!this.isOver && source === this.source) this.failed(error);
+      } catch {
+        if (!this.isOver && source === this.source) this.failed(blob);
       }
     }
     this.isBusy = false;

@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./frame.js").Fit} Fit */
-import { DASH, attribute, button, many, noteOf, part, write } from "urc/kit";
+import { DASH, attribute, button, faultOf, many, noteOf, part, write } from "urc/kit";
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 import { Screen } from "./screen.js";
@@ -74,8 +74,8 @@ class Camera {
         if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },
-      () => {
-        this.fault = `▲ ${t("this picture cannot be shown")}`;
+      (blob) => {
+        this.fault = faultOf(blob, t);
         this.tell();
       },
     );

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { attribute, noteOf, part, write } from "urc/kit";
+import { attribute, faultOf, noteOf, part, write } from "urc/kit";
 import { Sheet } from "urc/offscreen_canvas";
 import { pictureOf } from "./source.js";
 
@@ -22,12 +22,14 @@ export default {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", words);
     let fault = "";
-    const tell = (/** @type {string} */ said) => write(note, [fault, said].filter(Boolean).join(" · "));
+    let said = "";
+    const tell = () => write(note, [fault, said].filter(Boolean).join(" · "));
+    const fail = (/** @type {string} */ problem) => {
+      fault = problem;
+      tell();
+    };
     if (options["file"] || options["source"]) {
-      still(ctx, root, place, words, (problem) => {
-        fault = problem;
-        tell("");
-      });
+      still(ctx, root, place, words, fail);
     }
 
     ctx.picture("picture", (bitmap) => {
@@ -36,14 +38,16 @@ export default {
       sheet.pen.drawImage(bitmap, 0, 0);
       sheet.show();
       if (canvas.parentElement !== place) place.replaceChildren(canvas);
-    });
+      fail("");
+    }, (blob) => fail(faultOf(blob, t)));
 
     return {
       update({ picture }) {
         if (!picture) return;
         attribute(root, "data-state", picture.state);
         const isNone = picture.state === "none";
-        tell(isNone ? t("no picture yet") : noteOf(picture, t));
+        said = isNone ? t("no picture yet") : noteOf(picture, t);
+        tell();
         // An old image must not look current.
         canvas.hidden = picture.state === "gone";
         attribute(root, "data-gone", canvas.hidden ? "yes" : null);

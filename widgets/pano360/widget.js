@@ -6,7 +6,7 @@
 /** @typedef {import("./look.js").Pose} Pose */
 /** @typedef {import("./look.js").View} View */
 /** @typedef {import("./stage.js").ViewSwitch} ViewSwitch */
-import { DASH, attribute, button, noteOf, part, write } from "urc/kit";
+import { DASH, attribute, button, faultOf, noteOf, part, write } from "urc/kit";
 import { MOST_XMP, bearing, firstView, poseOf, tilted, turned } from "./look.js";
 import { flat, sphere } from "./stage.js";
 
@@ -78,13 +78,18 @@ class Panorama {
     this.hasMoved = false;
     this.isAsked = false;
     this.outcome = "";
+    /** Note for the newest image if it is damaged. */
+    this.fault = "";
     /** @type {Reading | undefined} */
     this.reading = undefined;
     stage.canvas.className = "pano360-picture urc-view-picture";
     stage.canvas.setAttribute("aria-hidden", "true");
     this.face.append(stage.canvas);
     this.resize();
-    ctx.picture("image", (bitmap, reading) => this.show(bitmap, reading));
+    ctx.picture("image", (bitmap, reading) => this.show(bitmap, reading), (blob) => {
+      this.fault = faultOf(blob, t);
+      this.tell();
+    });
     this.listen();
     if (options["tilt"] !== false) this.offerTilt();
   }
@@ -95,6 +100,7 @@ class Panorama {
    */
   show(bitmap, reading) {
     this.hasPicture = true;
+    this.fault = "";
     this.stage.show(bitmap, this.pose);
     this.stage.draw(this.view);
     this.tell();
@@ -278,7 +284,7 @@ class Panorama {
     const up = pitch > 0 ? t("up {n}°", { n: pitch }) : pitch < 0 ? t("down {n}°", { n: -pitch }) : "";
     write(this.where, isShown ? [side || across, up].filter(Boolean).join(" · ") : DASH);
     const note = !reading || reading.state === "none" ? t("no picture yet") : noteOf(reading, t);
-    write(this.note, [this.outcome, note].filter(Boolean).join(" · "));
+    write(this.note, [this.outcome, this.fault, note].filter(Boolean).join(" · "));
   }
 }
 

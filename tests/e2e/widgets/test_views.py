@@ -186,7 +186,7 @@ async def test_a_camera_shows_the_newest_picture_and_its_age(new_page: PageMaker
         await page.wait_for_selector(".camera[data-frozen='yes']")
         assert "s old" in await page.inner_text(".camera-age")
         robot.set_reading("arm", b"GIF89a broken")
-        await until_text(page, ".camera-note", "▲ this picture cannot be shown")
+        await until_text(page, ".camera-note", "▲ this picture is damaged: image/gif, 13 bytes")
 
 
 class Watcher(Wire):

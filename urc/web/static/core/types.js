@@ -262,9 +262,10 @@
  * @property {<T extends keyof Topics>(what: T, listener: (news: Topics[T]) => void) => void} follow
  *   Calls the listener in the next animation frame, and in one after every change, with data of the
  *   page besides signals.
- * @property {(input: string, listener: (bitmap: ImageBitmap, reading: Reading) => void) => void} picture
+ * @property {(input: string, listener: (bitmap: ImageBitmap, reading: Reading) => void, failed?: (blob: Blob) => void) => void} picture
  *   Decodes the images of an input. Only the newest image counts; late images are dropped. The
- *   bitmap is closed when the next one arrives, so draw it immediately.
+ *   bitmap is closed when the next one arrives, so draw it immediately. `failed` receives an image
+ *   that the browser cannot decode.
  * @property {(input: string, places: readonly number[]) => void} look Selects the visible images of
  *   an input by their indexes from 0; the server sends only these. By default, all images are
  *   visible.

@@ -10,6 +10,7 @@
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").StopState} StopState
  * @typedef {import("../core/types.js").Topics} Topics
+ * @typedef {(bitmap: ImageBitmap, reading: Reading) => void} Shows
  */
 import { t } from "../widgets/kit.js";
 import { Decoder } from "../widgets/image_decoder.js";
@@ -81,8 +82,8 @@ export function contextOf(frame, options) {
       frame.follow(what, listener);
     },
     alarms: Object.freeze({ may: () => false, acknowledge: refused, shelve: refused, open: refused }),
-    picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
-      picture(frame, input, show);
+    picture: (/** @type {string} */ input, /** @type {Shows} */ show, /** @type {((blob: Blob) => void) | undefined} */ failed) => {
+      picture(frame, input, show, failed);
     },
     look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => frame.say({ t: "look", input, places }),
     t,
@@ -121,16 +122,19 @@ function memoryOf(frame) {
 /**
  * @param {Frame} frame
  * @param {string} input
- * @param {(bitmap: ImageBitmap, reading: Reading) => void} show
+ * @param {Shows} show
+ * @param {(blob: Blob) => void} [failed]
  */
-function picture(frame, input, show) {
+function picture(frame, input, show, failed) {
   /** @type {Reading | null} */
   let newest = null;
   const draw = frame.guarded((/** @type {ImageBitmap} */ bitmap) => {
     if (newest) show(bitmap, newest);
   });
-  const decoder = new Decoder(draw, (error) => {
+  const fail = frame.guarded((/** @type {Blob} */ blob) => failed?.(blob));
+  const decoder = new Decoder(draw, (error, { blob }) => {
     console.info(`widget ${frame.widget}: an image could not be decoded:`, error);
+    fail(blob);
   });
   frame.end.signal.addEventListener("abort", () => decoder.end());
   const take = (/** @type {Reading} */ reading) => {

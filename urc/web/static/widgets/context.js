@@ -10,6 +10,7 @@
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").StopState} StopState
  * @typedef {import("../core/types.js").Topics} Topics
+ * @typedef {(bitmap: ImageBitmap, reading: Reading) => void} Shows
  */
 import { questionsOf } from "../control/confirm_dialog.js";
 import { t } from "./kit.js";
@@ -64,8 +65,8 @@ export function contextOf(cell) {
         doors.alarms.shelve([signal], minutes),
       open: () => doors.alarms.open(),
     }),
-    picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
-      picture(cell, input, show);
+    picture: (/** @type {string} */ input, /** @type {Shows} */ show, /** @type {((blob: Blob) => void) | undefined} */ failed) => {
+      picture(cell, input, show, failed);
     },
     look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => cell.look(input, places),
     t,
@@ -138,16 +139,19 @@ function each(cell, input, listener) {
 /**
  * @param {Cell} cell
  * @param {string} input
- * @param {(bitmap: ImageBitmap, reading: Reading) => void} show
+ * @param {Shows} show
+ * @param {(blob: Blob) => void} [failed]
  */
-function picture(cell, input, show) {
+function picture(cell, input, show, failed) {
   /** @type {Reading | null} */
   let newest = null;
   const draw = cell.guarded((/** @type {ImageBitmap} */ bitmap) => {
     if (newest) show(bitmap, newest);
   });
-  const decoder = new Decoder(draw, (error) => {
+  const fail = cell.guarded((/** @type {Blob} */ blob) => failed?.(blob));
+  const decoder = new Decoder(draw, (error, { blob }) => {
     console.info(`widget ${cell.config.widget}: an image could not be decoded:`, error);
+    fail(blob);
   });
   cell.end.signal.addEventListener("abort", () => decoder.end());
   const take = (/** @type {Reading} */ reading) => {

@@ -10,7 +10,7 @@ export class Decoder {
   /**
    * @param {(bitmap: ImageBitmap, picture: Picture) => void} show Shows an image. The bitmap is closed
    *   after the next one is shown.
-   * @param {(error: unknown) => void} failed Handles an image that cannot be decoded.
+   * @param {(error: unknown, picture: Picture) => void} failed Handles an image that cannot be decoded.
    * @param {(blob: Blob) => Promise<ImageBitmap>} [decode]
    */
   constructor(show, failed, decode = (blob) => createImageBitmap(blob)) {
@@ -44,7 +44,7 @@ export class Decoder {
         if (this.isOver) bitmap.close();
         else this.replace(bitmap, picture);
       } catch (error) {
-        this.failed(error);
+        this.failed(error, picture);
       }
     }
     this.isBusy = false;

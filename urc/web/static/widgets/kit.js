@@ -302,6 +302,20 @@ export function noteOf({ state, age, alarm }, t) {
 }
 
 /**
+ * Return the note for an image that the browser cannot decode.
+ *
+ * @param {Blob} blob
+ * @param {(text: string, names?: Record<string, string | number>) => string} t `t` of the context
+ */
+export function faultOf({ type, size }, t) {
+  const isKnown = type.startsWith("image/");
+  const fault = isKnown
+    ? t("this picture is damaged: {type}, {size} bytes", { type, size })
+    : t("not a picture, or in an unknown format: {size} bytes", { size });
+  return `▲ ${fault}`;
+}
+
+/**
  * Return the common state of several readings, for `noteOf`: the oldest known reading, and the
  * worst alarm. Missing readings are ignored if others are known.
  *
