@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
 import { CommandState, PendingValue } from "urc/command_kit";
-import { attribute, noteOf, part, wordOf, write } from "urc/kit";
+import { DASH, attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 /** @typedef {{value: Value, label: string}} Choice */
 
@@ -27,7 +27,7 @@ export default {
 class Select {
   /** @param {Context} ctx */
   constructor(ctx) {
-    const { el, options, signal, t, onStop } = ctx;
+    const { el, options, signal, t, onStop, memory } = ctx;
     this.ctx = ctx;
     this.root = part(el, ".select");
     this.now = part(el, ".select-now");
@@ -42,6 +42,8 @@ class Select {
     this.made = "";
     /** @type {Value} */
     this.chosen = null;
+    /** Last sent value, shown if no state is bound. @type {unknown} */
+    this.last = memory.read();
     const show = () => this.show();
     this.giver = new CommandState({ give: (args) => this.give(args), show, t, signal, onStop });
     this.wish = new PendingValue({
@@ -97,6 +99,10 @@ class Select {
       this.wish.drop();
       throw error;
     }
+    if (this.state) return;
+    this.last = args["value"] ?? null;
+    this.ctx.memory.write(this.last);
+    this.show();
   }
 
   show() {
@@ -108,9 +114,11 @@ class Select {
     attribute(this.root, "data-alarm", state?.alarm ?? "");
     attribute(this.root, "data-phase", giver.phase);
     attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
-    const now = this.choices.find(({ value }) => this.word(value) === shown);
+    // The last sent value is shown as text only: the list stays free, so that it can be sent again.
+    const known = state || this.last === null ? shown : String(this.last);
+    const now = this.choices.find(({ value }) => this.word(value) === known);
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
-    write(this.now, (state ? (now?.label ?? state.text) : "—") + sign);
+    write(this.now, (now?.label ?? state?.text ?? DASH) + sign);
     this.mark(shown, !giver.isReady);
     const wished = this.choices.find(({ value }) => value === wish.value)?.label ?? "";
     const missed = wish.isMissed ? ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";

@@ -218,6 +218,44 @@ async def test_each_control_gives_exactly_its_command(
         assert robot.lines == []
 
 
+SENT_ONLY = """
+  mode: { use: select, bind: { change: set_mode } }
+  turn: { use: knob, bind: { change: set_volts }, options: { step: 1, send: release } }
+"""
+
+
+async def test_what_was_sent_is_shown_after_a_reload_where_the_robot_says_nothing(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """It is sent no second time, may be sent again by hand, and another tab shows no value."""
+    async with crane(urc_process, tmp_path, SENT_ONLY) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, "select.select-list")
+        await until_text(page, ".select-now", "—")
+        await page.select_option("select.select-list", label="auto")
+        await robot.until_got("MODE auto")
+        await until_text(page, ".select-now", "auto")
+        await page.locator(".knob-dial").focus()
+        await page.keyboard.press("End")
+        await robot.until_got("VOLT 10")
+        await page.wait_for_selector(".knob[data-phase='done']")
+
+        await page.reload()
+        await until_attribute(page, ".knob-dial", "aria-valuetext", "10 V")
+        await until_text(page, ".select-now", "auto")
+        await ready(page, "select.select-list")
+        assert robot.lines == []
+        await page.select_option("select.select-list", label="auto")
+        await robot.until_got("MODE auto")
+
+        other = await new_page(size="desktop")
+        await other.goto(address)
+        await ready(other, "select.select-list")
+        await until_text(other, ".select-now", "—")
+        assert await other.get_attribute(".knob-dial", "aria-valuetext") == "— V"
+
+
 WISHED = """
   lamp: { use: switch, bind: { state: lamp, change: set_lamp }, \
 options: { echo: optimistic, echo_s: 60 } }

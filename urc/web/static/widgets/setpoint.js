@@ -19,7 +19,7 @@ export class Setpoint {
    * @param {() => void} show called after each change
    */
   constructor(ctx, show) {
-    const { options, signal, send, t, onStop } = ctx;
+    const { options, signal, send, t, onStop, memory } = ctx;
     this.ctx = ctx;
     this.show = show;
     this.isLive = options["send"] !== "release";
@@ -29,12 +29,16 @@ export class Setpoint {
     this.hand = null;
     /** Cancels the gesture. Set by the view. */
     this.drop = () => this.cancel();
-    /** Last sent value. @type {number | null} */
-    this.last = null;
+    const kept = memory.read();
+    /** Last sent value, kept across reloads of the page. @type {number | null} */
+    this.last = typeof kept === "number" ? kept : null;
     /** @type {Reading | undefined} */
     this.state = undefined;
     const everyMs = Number(options["every_ms"] ?? 100);
-    const give = (/** @type {Record<string, Value>} */ args) => this.sent(send("change", args));
+    const give = async (/** @type {Record<string, Value>} */ args) => {
+      await this.sent(send("change", args));
+      if (!this.state) memory.write(args["value"]);
+    };
     this.giver = new CommandState({ give, show, t, signal, everyMs, onStop });
     this.wish = new PendingValue({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
