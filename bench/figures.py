@@ -1,7 +1,7 @@
 """Results of a run: printed as lines of JSON, and optionally written into the documentation.
 
-`./dev bench --full --write-docs` writes the results into docs/motion.md and docs/performance.md,
-between the HTML comments that mark each result's place.
+`./dev bench --full --write-docs` writes the results into docs/motion-measurements.md and
+docs/performance.md, between the HTML comments that mark each result's place.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 __all__ = ["PAGES", "distribution", "tell", "told", "write_docs"]
 
 _DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGES = (_DOCS / "motion.md", _DOCS / "performance.md")
+PAGES = (_DOCS / "motion-measurements.md", _DOCS / "performance.md")
 BARS = 40
 """Longest bar of a histogram, in characters."""
 

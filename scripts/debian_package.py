@@ -1,8 +1,8 @@
 """Build the Debian package with debhelper from a folder of wheels, for `./dev release --debian`.
 
 This script must run on the package's target Debian release, because the package contains a virtual
-environment of that release's Python. The script needs the packages `debhelper`, `dpkg-dev` and
-`python3-venv`, but no network.
+environment of that release's Python. The script needs the packages `build-essential`,
+`debhelper` and `python3-venv`, but no network.
 
     python -m scripts.debian_package RELEASE WHEELS
 """
@@ -73,8 +73,8 @@ def build_package(release: Path, wheels: Path, epoch: int) -> Path:
     """
     if shutil.which("dpkg-buildpackage") is None or shutil.which("dh") is None:
         raise SystemExit(
-            "release: building the Debian package needs debhelper and dpkg-dev;"
-            " run 'apt-get install debhelper dpkg-dev'"
+            "release: building the Debian package needs debhelper and build-essential;"
+            " run 'apt-get install build-essential debhelper python3-venv'"
         )
     with TemporaryDirectory(prefix="urc-debian-") as folder:
         source = Path(folder, f"urc-{__version__}")

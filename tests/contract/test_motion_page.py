@@ -1,4 +1,4 @@
-"""What docs/motion.md names as the place and the proof of a promise is there."""
+"""What docs/motion-promises.md names as the place and the proof of a promise is there."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "motion.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "motion-promises.md").read_text("utf-8")
 PLACES = sorted(set(re.findall(r"`((?:urc|bench|tests)/[^`:]+)(?:::\w+)?`", PAGE)))
 TESTS = sorted(set(re.findall(r"`(tests/[^`:]+\.py)::(\w+)`", PAGE)))
 

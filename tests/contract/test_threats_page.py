@@ -15,7 +15,8 @@ ROWS = {
         if re.match(r"\| [TPK]\d+ \|", line)
     )
 }
-PROMISES = set(re.findall(r"^\| ([SR]\d+) \|", (ROOT / "docs/motion.md").read_text("utf-8"), re.M))
+CONTRACT = (ROOT / "docs" / "motion-promises.md").read_text("utf-8")
+PROMISES = set(re.findall(r"^\| ([SR]\d+) \|", CONTRACT, re.M))
 
 
 def ids(letter: str, most: int) -> list[str]:
