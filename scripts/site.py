@@ -22,7 +22,7 @@ PROCESSES = "2"
 
 def main() -> int:
     """Build the site, by default in .site/; return the exit code."""
-    folder = Path(sys.argv[1]) if __name__ == "__main__" and len(sys.argv) > 1 else HTML
+    folder = Path(sys.argv[1]).resolve() if __name__ == "__main__" and len(sys.argv) > 1 else HTML
     code = build(folder)
     print(f"site: {(folder / 'index.html').as_uri()}" if code == 0 else "site: the build failed")
     return code
