@@ -159,10 +159,12 @@ class OptionReader:
         kind = auth.choice("type", kinds, "")
         if kind == "bearer":
             if not (token := auth.text("token")):
-                raise TransportError(f"{self.kind} needs a token for auth of type bearer")
+                raise TransportError(
+                    f"{self.kind}: the token of auth is empty: fill in its setting"
+                )
             return Credentials(kind, "", token)
         if not (user := auth.text("user")):
-            raise TransportError(f"{self.kind} needs a user for auth of type {kind}")
+            raise TransportError(f"{self.kind}: the user of auth is empty: fill in its setting")
         return Credentials(kind, user, auth.text("password"))
 
     def tls(self, place: WebOrigin) -> Tls | None:
