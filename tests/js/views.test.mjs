@@ -237,6 +237,26 @@ test("a picture fits its box whichever way it is turned", () => {
   assert.deepEqual([filled.width, filled.height], [400, 100]);
 });
 
+test("a picture as the background keeps its lower edge, and two thirds of its height", () => {
+  const look = { fit: /** @type {const} */ ("ground"), rotate: 0, mirror: false };
+  const camera = { width: 400, height: 300 };
+  // A tablet: filled, without some of the upper edge.
+  const tablet = place(camera, { width: 1200, height: 800 }, look);
+  assert.deepEqual([tablet.width, tablet.height, tablet.y + tablet.height / 2], [1200, 900, 800]);
+  // A low phone: filled, it would lose half of its height, so the sides stay empty.
+  const low = place(camera, { width: 844, height: 342 }, look);
+  assert.deepEqual([low.height, low.y + low.height / 2], [513, 342]);
+  assert.ok(low.width < 844);
+  // A box that is higher than the image loses the sides, in equal parts.
+  const tall = place(camera, { width: 300, height: 300 }, look);
+  assert.deepEqual([tall.x, tall.y, tall.width, tall.height], [150, 150, 400, 300]);
+  // On its side, its lower edge on the screen is a side of the image.
+  const lying = place(camera, { width: 300, height: 300 }, { ...look, rotate: 90 });
+  assert.deepEqual([lying.width, lying.height, lying.y], [400, 300, 100]);
+  // As large as its box, the image is where it was.
+  assert.equal(place(camera, { width: 800, height: 600 }, look).y, 300);
+});
+
 test("a camera turns against the finger, never further than all the way", () => {
   const box = { width: 200, height: 100 };
   assert.deepEqual(lookOf({ x: 25, y: 0, startX: 0, startY: 0 }, box), { pan: 0.5, tilt: 0 });

@@ -2,7 +2,8 @@
 /**
  * The placement of an image in its box. Pure: no DOM.
  *
- * @typedef {"contain" | "cover" | "fill" | "zoom"} Fit "zoom": as "cover", but at most 1.9 times as large as whole
+ * @typedef {"contain" | "cover" | "fill" | "ground"} Fit "ground": as "cover", but with the lower edge of the
+ *   image, and without more than a third of it lost
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -16,8 +17,8 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Maximum enlargement of an image that fills the background: half of the image stays visible. */
-const MOST_ZOOM = 1.9;
+/** Maximum enlargement of an image as the background: two thirds of the image stay visible. */
+const MOST_ZOOM = 1.5;
 
 /**
  * @param {Size} picture
@@ -32,14 +33,16 @@ export function place(picture, box, { fit, rotate, mirror }) {
   const [wide, high] = [box.width / Math.max(1, across), box.height / Math.max(1, down)];
   const whole = Math.min(wide, high);
   const filled = Math.max(wide, high);
-  const scale = fit === "cover" ? filled : fit === "zoom" ? Math.min(filled, whole * MOST_ZOOM) : whole;
+  const scale = fit === "cover" ? filled : fit === "ground" ? Math.min(filled, whole * MOST_ZOOM) : whole;
   const [scaleX, scaleY] = fit === "fill" ? [wide, high] : [scale, scale];
   const [width, height] = isLying
     ? [picture.width * scaleY, picture.height * scaleX]
     : [picture.width * scaleX, picture.height * scaleY];
+  // The ground next to the robot is at the lower edge of the image, so the upper edge is lost.
+  const lostPx = fit === "ground" ? Math.max(0, down * scaleY - box.height) : 0;
   return {
     x: box.width / 2,
-    y: box.height / 2,
+    y: (box.height - lostPx) / 2,
     angle: (turns * Math.PI) / 2,
     width,
     height,

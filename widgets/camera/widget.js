@@ -48,6 +48,7 @@ class Camera {
     const canvas = el.querySelector("canvas");
     if (!canvas) throw new Error("the template has no canvas");
     this.canvas = canvas;
+    this.cross = el.querySelector(".camera-cross");
     this.screen = new Screen(canvas);
     this.look = {
       fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
@@ -204,7 +205,7 @@ class Camera {
     const { fit } = this.look;
     if (fit !== "auto") return fit;
     const isGround = this.root.closest('[data-place="ground"]') !== null;
-    return isGround && !this.isWhole ? "zoom" : "contain";
+    return isGround && !this.isWhole ? "ground" : "contain";
   }
 
   /** Place the image in its box. The browser scales the image, so that no frame must be redrawn. */
@@ -217,6 +218,8 @@ class Camera {
     style.width = `${width}px`;
     style.height = `${height}px`;
     style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
+    // The crosshair marks the middle of the image.
+    if (this.cross instanceof SVGElement) this.cross.style.transform = `translateY(${y - size.height / 2}px)`;
   }
 
   tell() {
