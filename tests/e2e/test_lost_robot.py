@@ -1,12 +1,17 @@
 """The card of a lost robot in a real browser: cause, next step, Try now; and widgets keep quiet."""
 
+import re
+
 import pytest
 from playwright.async_api import Page, expect
 
 from tests.e2e.axe import faults, prepare
 from tests.e2e.browser import Size, choose_theme
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, until
+from tests.e2e.dashboards import running_dashboard, until, until_attribute
+from tests.e2e.drawn import RED, plain
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
+from urc.model.values import Signal
 from urc.runtime.hub import LinkState
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -48,6 +53,97 @@ async def test_one_card_has_cause_and_next_step_and_tries_at_once(new_page: Page
         await until(lambda: robot.reconnects == 1)
         robot.link("live")
         await expect(page.locator(CARD)).to_be_hidden()
+
+
+def seeing_robot() -> FakeRobot:
+    """Return a robot whose camera is the background, with a battery in front."""
+    signals = {
+        "eye": Signal("eye", "image", stale_after_s=1.0),
+        "battery": Signal("battery", "integer", unit="%", stale_after_s=1.0),
+    }
+    uses = (
+        WidgetUse("eye", "camera", {"image": "eye"}),
+        WidgetUse("battery", "battery", {"level": "battery"}),
+    )
+    profile = dashboard_profile(signals=signals, uses=uses)
+    grid = Layout(2, 2, (Slot("eye", 1, 1), Slot("battery", 0, 0)))
+    interface = Interface("default", "Default", {"landscape": grid}, background="eye")
+    return FakeRobot(profile._replace(interfaces={"default": interface}))
+
+
+GROUND_CELL = "[data-place='ground']"
+OF_PICTURE = """() => {
+  const canvas = document.querySelector(".camera-picture");
+  const { visibility, filter } = getComputedStyle(canvas);
+  const hatch = getComputedStyle(canvas.closest(".urc-cell"), "::before").backgroundImage;
+  return { visibility, filter, hatch, width: canvas.width };
+}"""
+
+
+@pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
+async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
+    new_page: PageMaker, size: Size
+) -> None:
+    """Far longer than values of a live link; also after a reload; no longer than the loss."""
+    robot = seeing_robot()
+    async with running_dashboard(robot) as address:
+        page = await new_page(size=size)
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("eye", plain(RED))
+        robot.set_reading("battery", 73)
+        await until_attribute(page, ".camera", "data-state", "live")
+        await expect(page.locator(GROUND_CELL)).not_to_have_attribute("data-old", re.compile(""))
+        robot.set_reading("eye", plain(RED), age_s=125)
+        robot.set_reading("battery", 73, age_s=125)
+        robot.link("lost", REFUSED, age_s=125)
+        for _ in range(2):
+            await expect(page.locator(CARD)).to_be_visible()
+            await expect(page.locator("[data-lost-age]")).to_have_text("Last picture: 2 min ago")
+            await until_attribute(page, GROUND_CELL, "data-old", "2 min old")
+            await page.wait_for_function("document.querySelector('.camera-picture').width === 8")
+            look = await page.evaluate(OF_PICTURE)
+            assert look["visibility"] == "visible"
+            assert "grayscale(1)" in look["filter"]
+            assert "repeating-linear-gradient" in look["hatch"]
+            await expect(page.locator(".battery")).to_contain_text("73")
+            await expect(page.locator(".battery")).to_contain_text("2 min old")
+            assert await page.evaluate(COVERED) == []
+            await page.reload()
+        robot.link("live")
+        robot.set_reading("eye", plain(RED))
+        robot.set_reading("battery", 73)
+        await expect(page.locator(CARD)).to_be_hidden()
+        await expect(page.locator(GROUND_CELL)).not_to_have_attribute("data-old", re.compile(""))
+
+
+COVERED = """() => {
+  const box = (selector) => document.querySelector(selector).getBoundingClientRect();
+  const card = box(".urc-lost-card");
+  return [".battery", ".urc-stop-button", ".urc-bar"].filter((name) => {
+    const { left, right, top, bottom } = box(name);
+    return left < card.right && right > card.left && top < card.bottom - 1 && bottom > card.top + 1;
+  });
+}"""
+"""What the card covers of what must stay in sight."""
+
+
+async def test_what_is_shown_is_old_at_once_when_the_server_is_gone(new_page: PageMaker) -> None:
+    """Before the card, which waits for a moment; the age counts on without the server."""
+    robot = seeing_robot()
+    page = await new_page()
+    async with running_dashboard(robot) as address:
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("eye", plain(RED))
+        robot.set_reading("battery", 73)
+        await until_attribute(page, ".camera", "data-state", "live")
+    await expect(page.locator(GROUND_CELL)).to_have_attribute("data-old", re.compile(r"\d s old$"))
+    await expect(page.locator(CARD)).to_contain_text("No connection to URC")
+    await expect(page.locator("[data-lost-age]")).to_have_text(
+        re.compile(r"^Last picture: ([3-9]|\d\d) s ago$")
+    )
+    await expect(page.locator(".battery")).to_contain_text("73")
 
 
 async def test_the_card_stays_in_another_interface(new_page: PageMaker) -> None:

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { lossOf, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
+import { lastWords, lossOf, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -31,6 +31,17 @@ test("a robot is lost if no connection is good and one is lost", () => {
   const loss = lossOf(robot({ wire: "idle", eye: "lost" }), socket());
   assert.equal(loss?.of, "robot");
   assert.deepEqual(loss, { of: "robot", transport: "eye", cause: "refused", address: "ros 127.0.0.1:9 eye", detail: "x" });
+});
+
+test("the card says how old the background behind it is", () => {
+  const ground = (/** @type {Record<string, string>} */ given) => /** @type {any} */ ({
+    getAttribute: (/** @type {string} */ name) => given[name] ?? null,
+    hasAttribute: (/** @type {string} */ name) => name in given,
+  });
+  assert.equal(lastWords(ground({ "data-old-age": "12 s", "data-picture": "" })), "Last picture: 12 s ago");
+  assert.equal(lastWords(ground({ "data-old-age": "12 s" })), "Last values: 12 s ago");
+  assert.equal(lastWords(ground({ "data-picture": "" })), "", "nothing was received");
+  assert.equal(lastWords(null), "");
 });
 
 test("a page waits for the server, and for a connection that is not open yet", () => {

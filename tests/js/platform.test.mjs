@@ -216,6 +216,37 @@ test("an image has an age like every value, and goes with it", () => {
   assert.deepEqual([store.reading("s0", 60_000).state, store.reading("s0", 60_000).image], ["gone", null]);
 });
 
+test("the last values of a lost link stay, with their ages, for as long as it is lost", () => {
+  const store = storeOf({ type: "image", stale_after_s: 1 }, { stale_after_s: 1 });
+  store.setUp(true, 0);
+  const link = (/** @type {string} */ state, /** @type {number} */ nowMs) =>
+    store.setLinks(/** @type {any} */ ([{ transport: "wire", state, since: 0 }]), nowMs);
+  link("live", 0);
+  store.picture({ index: 0, ageMs: 0, sentMs: 0, type: "image/png", bytes: new Uint8Array(9) }, 0);
+  assert.equal(store.lastAgeMs("s0", 500), -1, "a live value is not the last one");
+  link("lost", 500);
+  assert.equal(store.reading("s0", 501).state, "stale", "at once");
+  const hourMs = 3_600_000;
+  const late = store.reading("s0", hourMs);
+  assert.deepEqual([late.state, late.age, late.image?.blob.size], ["stale", "1 h", 9]);
+  assert.equal(store.lastAgeMs("s0", hourMs), hourMs);
+  assert.equal(store.lastAgeMs("s1", hourMs), -1, "nothing was received");
+  link("live", hourMs);
+  assert.equal(store.reading("s0", hourMs).state, "gone", "a link that is back has newer values");
+  link("lost", hourMs);
+  assert.equal(store.reading("s0", hourMs + 1).state, "gone", "too old before the loss");
+});
+
+test("without the server, the last values stay too", () => {
+  const store = storeOf({ stale_after_s: 1 });
+  store.setUp(true, 0);
+  store.setLinks(/** @type {any} */ ([{ transport: "wire", state: "live", since: 0 }]), 0);
+  store.values(/** @type {any} */ ({ n: 0, i: [0], v: [7], a: 0 }), 0);
+  store.setUp(false, 400);
+  const late = store.reading("s0", 90_000);
+  assert.deepEqual([late.state, late.value, late.age, store.lastAgeMs("s0", 90_000)], ["stale", 7, "1 min", 90_000]);
+});
+
 test("the kit writes numbers for people, and never takes none for zero", () => {
   assert.equal(format(12.3456, 2), "12.35");
   assert.equal(format(-0.001, 1), "0.0");

@@ -1,7 +1,8 @@
 // @ts-check
 /**
- * The card in the middle of an unreachable robot's page, with the cause, a hint, and buttons.
- * Meanwhile, the widgets show no messages, because the card replaces them.
+ * The card above STOP on the page of an unreachable robot, with the cause, a hint, buttons, and the
+ * age of the background. Meanwhile, the widgets show no messages, because the card replaces them.
+ * They keep their last values, with their ages.
  *
  * @typedef {import("../core/types.js").Link} Link
  * @typedef {import("./store.js").Store} Store
@@ -33,6 +34,7 @@ export class LostCard {
     this.step = part(el, "[data-lost-step]");
     this.tries = part(el, "[data-lost-tries]");
     this.again = part(el, "[data-lost-again]");
+    this.age = part(el, "[data-lost-age]");
     this.shown = "";
     /** Transports that only commands open. @type {string[]} */
     this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
@@ -73,6 +75,8 @@ export class LostCard {
     const isShown = loss !== null && (!this.wasGood || nowMs - this.lostMs >= GRACE_MS);
     const tries = isShown ? triesWords(loss, store, this.kindMs, nowMs) : "";
     if (this.tries.textContent !== tries) this.tries.textContent = tries;
+    const age = isShown ? lastWords(this.root.querySelector('[data-place="ground"]')) : "";
+    if (this.age.textContent !== age) this.age.textContent = age;
     const key = isShown ? JSON.stringify(loss) : "";
     if (key === this.shown) return;
     this.shown = key;
@@ -120,6 +124,17 @@ export function wordsOf(loss, title) {
     case "server":
       return { heading: t("No connection to URC"), cause: "", step: t("Is the server running? Is this device on its network?"), isForeign: false };
   }
+}
+
+/**
+ * Return the age of the background behind the card; "" without a background or without an age.
+ *
+ * @param {Element | null} ground
+ */
+export function lastWords(ground) {
+  const age = ground?.getAttribute("data-old-age");
+  if (!ground || !age) return "";
+  return ground.hasAttribute("data-picture") ? t("Last picture: {age} ago", { age }) : t("Last values: {age} ago", { age });
 }
 
 /**

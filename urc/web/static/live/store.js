@@ -28,13 +28,11 @@ import { TopicNotes } from "./topic_notes.js";
 
 export { ageText, DASH } from "../core/formatting.js";
 
-/** Multiple of the largest age after which a value is no longer shown. */
-const GONE_AFTER = 10;
 /**
- * Time after which a value from a lost link is no longer shown, regardless of its `stale_after`,
- * because it may have changed meanwhile.
+ * Multiple of the largest age after which a value is no longer shown. While its link is lost, the
+ * last value stays in sight with its age, because it is all that is known about the robot.
  */
-const CUT_OFF_MS = 60_000;
+const GONE_AFTER = 10;
 /**
  * Age up to which an equal value is not redrawn, because the page draws all ages at this interval
  * anyway.
@@ -319,8 +317,8 @@ export class Store {
     if (!sample || sample.value === null) return "none";
     const limitMs = (signal.stale_after_s ?? 0) * 1000;
     const cutOffMs = this.cutOffMs(signal, nowMs);
-    if (limitMs > 0 && ageMs > GONE_AFTER * limitMs) return "gone";
-    if (cutOffMs > CUT_OFF_MS) return "gone";
+    const ageAtLossMs = ageMs - Math.max(0, cutOffMs);
+    if (limitMs > 0 && ageAtLossMs > GONE_AFTER * limitMs) return "gone";
     if (limitMs > 0 && ageMs > limitMs) return "stale";
     return cutOffMs >= 0 ? "stale" : "live";
   }
@@ -344,6 +342,20 @@ export class Store {
     const isKnown = Number.isFinite(sinceMs);
     if (!this.isUp) return nowMs - (isKnown ? Math.min(sinceMs, this.lostMs) : this.lostMs);
     return isKnown ? Math.max(0, nowMs - sinceMs) : 0;
+  }
+
+  /**
+   * Return the age of a value that is shown although its link is lost, in milliseconds; -1 for any
+   * other value.
+   *
+   * @param {string} name
+   * @param {number} nowMs
+   */
+  lastAgeMs(name, nowMs) {
+    const sample = this.samples.get(name);
+    if (!sample || this.state(name, nowMs) !== "stale") return -1;
+    if (this.cutOffMs(this.signals.get(name) ?? UNKNOWN, nowMs) < 0) return -1;
+    return Math.max(0, nowMs - sample.timeMs);
   }
 
   /**

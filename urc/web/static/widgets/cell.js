@@ -44,7 +44,8 @@
  */
 import { RenderBudget } from "./render_budget.js";
 import { contextOf } from "./context.js";
-import { t } from "./kit.js";
+import { ageText } from "../core/formatting.js";
+import { attribute, t } from "./kit.js";
 import { PICTURES } from "../live/store.js";
 
 /** Time limit for loading; after the limit, the cell shows a note. */
@@ -201,11 +202,7 @@ export class Cell {
   pictures(store) {
     if (!this.isMounted || !this.isVisible) return NONE;
     if (this.images.edition !== store.edition) {
-      const names = this.inputs.flatMap(({ input, signals }) => {
-        const places = this.looks.get(input);
-        return places ? signals.filter((_, place) => places.has(place)) : signals;
-      });
-      const found = names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
+      const found = this.visibleSignals().filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
       this.images = { edition: store.edition, names: found };
     }
     return this.images.names;
@@ -286,7 +283,29 @@ export class Cell {
       bound.seen = looks;
       bound.alarms = alarmsOf(signals, store);
     }
+    this.markOld(store, nowMs);
     this.measured(nowMs, () => this.call(readings, changed, outlets, isOutputNews));
+  }
+
+  /**
+   * Mark a widget that shows only values of lost links, with their age: a hatched cell is not live.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  markOld(store, nowMs) {
+    const ageMs = lastAgeMs(this.visibleSignals(), store, nowMs);
+    const age = ageMs < 0 ? null : ageText(ageMs / 1000);
+    attribute(this.el, "data-old", age && t("{age} old", { age }));
+    attribute(this.el, "data-old-age", age);
+  }
+
+  /** Return the signals of the inputs, without the images that the widget does not show. */
+  visibleSignals() {
+    return this.inputs.flatMap(({ input, signals }) => {
+      const places = this.looks.get(input);
+      return places ? signals.filter((_, place) => places.has(place)) : signals;
+    });
   }
 
   /**
@@ -421,6 +440,26 @@ export class Cell {
       console.warn(`widget ${this.config.widget}: destroy failed:`, error);
     }
   }
+}
+
+/**
+ * Return the age of the oldest image, or else of the newest value, if all links of the signals are
+ * lost; -1 if a signal is live, or if nothing is shown.
+ *
+ * @param {readonly string[]} signals
+ * @param {Store} store
+ * @param {number} nowMs
+ */
+function lastAgeMs(signals, store, nowMs) {
+  const images = signals.filter((name) => store.samples.get(name)?.image);
+  const ages = [];
+  for (const name of images.length > 0 ? images : signals) {
+    const ageMs = store.lastAgeMs(name, nowMs);
+    if (ageMs >= 0) ages.push(ageMs);
+    else if (store.state(name, nowMs) === "live") return -1;
+  }
+  if (ages.length === 0) return -1;
+  return images.length > 0 ? Math.max(...ages) : Math.min(...ages);
 }
 
 /**
