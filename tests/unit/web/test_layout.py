@@ -4,7 +4,7 @@ import pytest
 
 from urc.model.interface import Interface, Layout, Slot, Tab
 from urc.model.widget import Footprint
-from urc.web.show.layout import LEFT_HAND, grid_css, needs_turning
+from urc.web.show.layout import LEFT_HAND, drawer_slots, grid_css, needs_turning
 
 MARGIN = "minmax(0,.12fr)"
 ROW = "minmax(8rem,1fr)"
@@ -361,3 +361,60 @@ def test_a_grid_for_the_left_hand_may_lack_widgets_of_its_own() -> None:
     left = grid_css(drawn, ("a", "b")).split(REST, 1)[1].split(LEFT_HAND)
     assert not any("inline-flex" in part for part in left if not part.startswith(" .urc-robot"))
     assert sum("inline-flex" in part for part in left) == 1
+
+
+CROWDED = Layout(2, 3, (Slot("a", 0, 0), Slot("v", 0, 1), Slot("b", 1, 0), Slot("c", 1, 2)))
+FOOTPRINTS: dict[str, Footprint] = {"a": "lever", "v": "view", "b": "button", "c": "stick"}
+FILLED = ("g", "a", "v", "b", "c")
+
+
+def crowded(low: Layout, **tabs: Tab) -> Interface:
+    """Return an interface over a background, whose low screens show less."""
+    layouts = {} if tabs else {"landscape": CROWDED, "phone_landscape": low}
+    return Interface("i", layouts=layouts, tabs=tabs, background="g")
+
+
+def test_over_a_background_a_low_screen_has_a_drawer_for_what_it_lacks() -> None:
+    """But for views, which can be the background: they stay on the second page."""
+    interface = crowded(Layout(1, 2, (Slot("c", 0, 1),)))
+    assert drawer_slots(interface, FILLED, FOOTPRINTS) == {"a", "b"}
+    text = grid_css(interface, FILLED, FOOTPRINTS)
+    page, second = '.urc-grid[data-page="0"]', REST
+    low = text.split("@media (max-height: 29.999rem){", 1)[1].split("@media")[0]
+    assert f'{page} [data-place="1"]{{display:grid;grid-area:auto}}' in low
+    assert f'{page} [data-place="3"]{{display:grid;grid-area:auto}}' in low
+    assert f'{page} [data-place="2"]{{display:none}}' in low
+    short = text.split(second, 1)[1].split("@media (max-height: 29.999rem){", 1)[1]
+    assert f'{second} [data-place="1"]{{display:none}}' in short.split("@media")[0]
+    shown = f".urc-robot:has(> .urc-stage > {page}) [data-drawer-handle]{{display:inline-flex}}"
+    assert f"@media (max-height: 29.999rem) and (min-width: 37.5rem){{{shown}}}" in text
+    assert '--urc-rest:"1"' in text, "the button counts the view only"
+
+
+def test_only_a_background_leaves_room_for_a_drawer() -> None:
+    low = Layout(1, 2, (Slot("c", 0, 1),))
+    plain = crowded(low)._replace(background="")
+    assert drawer_slots(plain, FILLED, FOOTPRINTS) == frozenset()
+    assert "drawer" not in grid_css(plain, FILLED, FOOTPRINTS)
+    assert drawer_slots(crowded(low), ("a", "b", "c"), FOOTPRINTS) == frozenset(), "not filled"
+    assert drawer_slots(crowded(CROWDED), FILLED, FOOTPRINTS) == frozenset(), "all have a place"
+    assert drawer_slots(Interface("debug"), (), {}) == frozenset()
+    assert grid_css(Interface("debug"), ()) == ""
+
+
+def test_what_has_a_place_on_another_page_is_not_in_the_drawer() -> None:
+    """The pages share their cells."""
+    low = Layout(1, 2, (Slot("c", 0, 1),))
+    other = Layout(1, 2, (Slot("b", 0, 0), Slot("c", 0, 1)))
+    tabs = {
+        "one": Tab(name="one", layouts={"landscape": CROWDED, "phone_landscape": low}),
+        "two": Tab(name="two", layouts={"landscape": other}),
+    }
+    assert drawer_slots(crowded(low, **tabs), FILLED, FOOTPRINTS) == {"a"}
+
+
+def test_what_a_left_handed_layout_has_is_not_in_the_drawer() -> None:
+    low = Layout(1, 2, (Slot("c", 0, 1),))
+    left = {"phone_landscape": Layout(1, 2, (Slot("c", 0, 0), Slot("b", 0, 1)))}
+    interface = crowded(low)._replace(left_handed=left)
+    assert drawer_slots(interface, FILLED, FOOTPRINTS) == {"a"}

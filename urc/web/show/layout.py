@@ -19,7 +19,8 @@ extend down next to STOP. Over a background, columns of buttons and values in th
 extend down, but rows of buttons and values do not.
 
 A screen's grid can lack slots of the base grid, which is ``landscape`` or else the first grid. A
-button then switches to a second page with these slots.
+button then switches to a second page with these slots. Over a background on a phone in landscape,
+a drawer contains these slots, except for views, which can swap with the background.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -32,11 +33,13 @@ from urc.model.interface import Interface, Layout, Slot, Tab
 from urc.model.values import NOTHING
 from urc.model.widget import Footprint
 
-__all__ = ["grid_css", "mirrored", "needs_turning"]
+__all__ = ["drawer_slots", "grid_css", "mirrored", "needs_turning"]
 
 PHONE = "(max-width: 37.499rem)"
 SHORT = "(max-height: 29.999rem)"
 TALL = "(orientation: portrait)"
+LOW = f"{SHORT} and (min-width: 37.5rem)"
+"""Screens with a drawer: phones in landscape."""
 PHONE_COLUMNS = 2
 REST_COLUMNS = 3
 REST = "-rest"
@@ -86,7 +89,8 @@ def grid_css(
     """
     css = ""
     background = interface.background if interface.background in slots else ""
-    canvas = _Canvas(slots, background, footprints)
+    drawer = drawer_slots(interface, slots, footprints)
+    canvas = _Canvas(slots, background, footprints, drawer)
     turned = [needs_turning(page, slots) for page in interface.pages]
     for number, page in enumerate(interface.pages):
         place = f'.urc-grid[data-page="{number}"]'
@@ -96,13 +100,38 @@ def grid_css(
         right = _placed(page.layouts, canvas)
         left = _left_hand(page, right, canvas)
         css += _both_hands(place, right, left, canvas)
-        if any(_missing(grids, screen) for grids in (right, left) for screen in grids):
+        if drawer and drawer & {slot.name for slot in right["base"].slots}:
+            shown = "[data-drawer-handle]{display:inline-flex}"
+            css += f"@media {LOW}{{.urc-robot:has(> .urc-stage > {place}) {shown}}}"
+        if any(_missing(grids, screen, canvas) for grids in (right, left) for screen in grids):
             css += _both_hands(rest, _rest(right, canvas), _rest(left, canvas), canvas)
             both = f":is({place},{rest})"
-            css += "".join(_button(both, right, titles))
+            css += "".join(_button(both, right, titles, canvas))
             if left != right:
-                css += "".join(_button(both, left, titles, f"{LEFT_HAND} "))
+                css += "".join(_button(both, left, titles, canvas, f"{LEFT_HAND} "))
     return css
+
+
+def drawer_slots(
+    interface: Interface, slots: Sequence[str], footprints: Mapping[str, Footprint]
+) -> frozenset[str]:
+    """Return the slots in the drawer of a phone in landscape; see `grid_css` for the arguments.
+
+    These are the slots that every page with this slot lacks on such a phone, for both hands.
+    """
+    if interface.background not in slots:
+        return frozenset()
+    canvas = _Canvas(slots, interface.background, footprints)
+    lacking: set[str] = set()
+    kept = {slot for slot in slots if footprints.get(slot) == "view"}
+    for page in interface.pages:
+        right = _placed(page.layouts, canvas)
+        for grids in (right, _left_hand(page, right, canvas)) if right else ():
+            missing = {slot.name for slot in _missing(grids, SHORT, canvas)}
+            lacking |= missing
+            kept |= {slot.name for slot in grids["base"].slots} - missing
+            kept |= {slot.name for slot in grids[SHORT].slots}
+    return frozenset(lacking - kept)
 
 
 class _Canvas(NamedTuple):
@@ -112,6 +141,8 @@ class _Canvas(NamedTuple):
     background: str = ""
     """Slot behind all other slots, for example with a camera; "" if there is no background."""
     footprints: Mapping[str, Footprint] = NOTHING
+    drawer: frozenset[str] = frozenset()
+    """Slots that are in the drawer on a phone in landscape."""
 
 
 def _both_hands(
@@ -121,9 +152,11 @@ def _both_hands(
     return css if left == right else css + _screens(place, left, canvas, f"{LEFT_HAND} ")
 
 
-def _missing(grids: Mapping[str, Layout], screen: str) -> list[Slot]:
-    """Return the slots of the base grid that a screen's grid lacks, in reading order."""
+def _missing(grids: Mapping[str, Layout], screen: str, canvas: _Canvas) -> list[Slot]:
+    """Return the slots of the base grid that a screen's grid and drawer lack, in reading order."""
     names = {slot.name for slot in grids[screen].slots}
+    if screen == SHORT:
+        names |= canvas.drawer
     missing = [slot for slot in grids["base"].slots if slot.name not in names]
     return sorted(missing, key=lambda slot: (slot.row, slot.column))
 
@@ -135,7 +168,7 @@ def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
         columns = PHONE_COLUMNS if screen == PHONE else REST_COLUMNS
         slots = tuple(
             Slot(slot.name, place // columns, place % columns)
-            for place, slot in enumerate(_missing(grids, screen))
+            for place, slot in enumerate(_missing(grids, screen, canvas))
         )
         if slots:
             free = int(bool(canvas.background) and screen != PHONE)
@@ -144,11 +177,15 @@ def _rest(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
 
 
 def _button(
-    place: str, grids: Mapping[str, Layout], titles: Mapping[str, str], hand: str = ""
+    place: str,
+    grids: Mapping[str, Layout],
+    titles: Mapping[str, str],
+    canvas: _Canvas,
+    hand: str = "",
 ) -> Iterator[str]:
     """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
-        missing = _missing(grids, screen)
+        missing = _missing(grids, screen, canvas)
         shown = "display:none"
         if missing:
             first, others = missing[0].name, len(missing) - 1
@@ -239,6 +276,8 @@ def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[s
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
             rules = _place(places.get(name), grid, canvas, is_below)
+            if screen == SHORT and name in canvas.drawer and not place.endswith(f'{REST}"]'):
+                rules = "display:grid;grid-area:auto"
             yield f'{place} [data-place="{index}"]{{{rules}}}'
     corners = _corners(grid, canvas)
     sides = f"--urc-left:{corners['start']};--urc-right:{corners['end']}"

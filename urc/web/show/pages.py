@@ -34,7 +34,7 @@ from urc.web.show.interfaces import (
     is_turned,
     page_tabs,
 )
-from urc.web.show.layout import grid_css
+from urc.web.show.layout import drawer_slots, grid_css
 from urc.web.show.outputs import motion_lines, opens_on_demand
 from urc.web.show.shown_visitor import shown_visitor
 from urc.web.show.visitor_links import sees_audit
@@ -68,6 +68,16 @@ class PageHead:
 
 
 @dataclass(frozen=True, slots=True)
+class Drawer:
+    """The widgets in the drawer of phones in landscape."""
+
+    cells: frozenset[int]
+    """Indexes of their cells; empty if there is no drawer."""
+    title: str
+    """Title of the only widget, or a common title."""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotPage:
     """Context for ``robot.html.j2``: a robot's live interface."""
 
@@ -91,6 +101,7 @@ class RobotPage:
     debug: DebugPart | None
     """Content of the debug interface, which replaces the grid; None for other interfaces."""
     cells: tuple[Cell, ...]
+    drawer: Drawer
     stop_url: str
     """URL for STOP requests without a working socket."""
     alarms_url: str
@@ -180,13 +191,15 @@ def robot_page(
     watch = "&watch" if is_watching else ""
     tabs = page_tabs(interface, request.tab)
     transports = profile.driver.transports
+    titles = _titles(profile, uses)
+    footprints = _footprints(profile, uses)
     page = RobotPage(
         head=PageHead(
             nonce=request.nonce,
             title=profile.title,
             import_map=with_words(server.modules),
             widget_styles=_styles(profile, interface, uses, server.trust),
-            grid_css=grid_css(interface, slots, _footprints(profile, uses), _titles(profile, uses)),
+            grid_css=grid_css(interface, slots, footprints, titles),
         ),
         title=profile.title,
         url=url,
@@ -198,6 +211,7 @@ def robot_page(
         is_part=request.is_part,
         debug=debug_part(profile, request.dev_url) if interface is DEBUGGING else None,
         cells=_cells(profile, interface, uses, server.trust),
+        drawer=_drawer(slots, drawer_slots(interface, slots, footprints), titles),
         stop_url=f"{api}/stop",
         alarms_url=f"{api}/alarms",
         may_act=request.may_act and not is_watching,
@@ -234,6 +248,11 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }
     return {name: use for name, use in found.items() if use is not None}
+
+
+def _drawer(slots: tuple[str, ...], drawer: frozenset[str], titles: Mapping[str, str]) -> Drawer:
+    title = titles[min(drawer)] if len(drawer) == 1 else words.t("More controls")
+    return Drawer(frozenset(map(slots.index, drawer)), title)
 
 
 def _footprints(profile: Profile, uses: Mapping[str, WidgetUse]) -> dict[str, Footprint]:

@@ -275,6 +275,21 @@ export class Input {
     }
   }
 
+  /**
+   * Release the held controls inside an element; others stay held.
+   *
+   * @param {Element} place
+   * @param {string} reason shown by a dead-man control
+   */
+  letGoIn(place, reason) {
+    for (const grip of this.grips) if (place.contains(grip.spec.el)) grip.drop(ANY);
+    for (const gate of this.gates) {
+      if (!place.contains(gate.grip.spec.el)) continue;
+      gate.close(reason);
+      gate.grip.drop(ANY);
+    }
+  }
+
   /** End all gestures after STOP or the loss of the socket. @param {string} reason */
   spendAll(reason) {
     for (const gate of this.gates) if (!gate.spec.isHeld) gate.close(reason);

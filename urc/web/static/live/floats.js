@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The captions and buttons of the background (elements with `data-floats`), moved so that no widget,
- * STOP button or other float covers them.
+ * The captions and buttons of the background, and the handle of the drawer (elements with
+ * `data-floats`), moved so that no widget, STOP button or other float covers them.
  *
  * @typedef {{ left: number, top: number, right: number, bottom: number }} Box
  */
@@ -41,7 +41,13 @@ export function keepFloatsFree(stage, signal) {
   });
 }
 
-const buttonsIn = (/** @type {Element} */ el) => el.querySelectorAll("button").length;
+const HANDLE = "[data-drawer-handle]";
+/** The handle of the drawer chooses first. */
+const buttonsIn = (/** @type {Element} */ el) => (el.matches(HANDLE) ? Infinity : el.querySelectorAll("button").length);
+/** Whether a float is on the background. */
+const isOnGround = (/** @type {Element} */ el) => el.matches(HANDLE) || el.closest('[data-place="ground"]') !== null;
+/** Whether an open drawer contains a cell, so that the cell covers floats for a while. */
+const isInDrawer = (/** @type {Element} */ el) => el.closest("[data-drawer][data-open]") !== null;
 
 /** @param {HTMLElement} stage */
 function placeFloats(stage) {
@@ -54,10 +60,10 @@ function placeFloats(stage) {
   if (!matchMedia("(width >= 37.5rem)").matches) return;
   const cells = [...stage.querySelectorAll('.urc-cell:not([data-place="ground"])'), ...document.querySelectorAll(DOCK)];
   /** @type {Box[]} */
-  const taken = cells.filter(isShown).map((el) => el.getBoundingClientRect());
+  const taken = cells.filter((el) => isShown(el) && !isInDrawer(el)).map((el) => el.getBoundingClientRect());
   const room = stage.getBoundingClientRect();
   for (const el of floats) {
-    if (!el.closest('[data-place="ground"]') || !isShown(el) || !el.textContent?.trim()) continue;
+    if (!isOnGround(el) || !isShown(el) || !el.textContent?.trim()) continue;
     const box = el.getBoundingClientRect();
     const [x, y] = freeShift(box, taken, room);
     if (x || y) el.style.transform = `translate(${x}px, ${y}px)`;

@@ -8,10 +8,11 @@
  *
  * @typedef {object} More
  * @property {import("../widgets/host.js").Host} host
- * @property {Pick<import("../control/input.js").Input, "letGo" | "owns">} input
+ * @property {Pick<import("../control/input.js").Input, "letGo" | "letGoIn" | "owns">} input
  * @property {() => void} wake
  */
 import { part } from "./badge.js";
+import { watchDrawer } from "./drawer.js";
 import { keepFloatsFree } from "./floats.js";
 import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
@@ -68,6 +69,7 @@ export class ViewSwitch {
     const letGo = () => input.letGo(t("another page was opened"));
     tabsOf(this.el, letGo);
     watchRest(this.root, this.el, letGo, this.ends.signal);
+    watchDrawer(this.el, (drawer) => input.letGoIn(drawer, t("the drawer was closed")), this.ends.signal);
     const el = this.el.querySelector("[data-debug]");
     if (el instanceof HTMLElement) void this.search(el);
     wake();
