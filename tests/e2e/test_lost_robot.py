@@ -10,6 +10,7 @@ from tests.e2e.browser import Size, choose_theme
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute
 from tests.e2e.drawn import RED, plain
+from tests.e2e.motion.driving import LEASE_S, commands
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.values import Signal
 from urc.runtime.hub import LinkState
@@ -65,7 +66,7 @@ def seeing_robot() -> FakeRobot:
         WidgetUse("eye", "camera", {"image": "eye"}),
         WidgetUse("battery", "battery", {"level": "battery"}),
     )
-    profile = dashboard_profile(signals=signals, uses=uses)
+    profile = dashboard_profile(signals=signals, uses=uses, commands=commands(LEASE_S))
     grid = Layout(2, 2, (Slot("eye", 1, 1), Slot("battery", 0, 0)))
     interface = Interface("default", "Default", {"landscape": grid}, background="eye")
     return FakeRobot(profile._replace(interfaces={"default": interface}))
@@ -87,7 +88,9 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
     """Far longer than values of a live link; also after a reload; no longer than the loss."""
     robot = seeing_robot()
     async with running_dashboard(robot) as address:
-        page = await new_page(size=size)
+        other, page = await new_page(size=size), await new_page(size=size)
+        # The robot stays open while the page is loaded again.
+        await other.goto(f"{address}robots/puppet/")
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         robot.set_reading("eye", plain(RED))
@@ -108,7 +111,7 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
             assert "repeating-linear-gradient" in look["hatch"]
             await expect(page.locator(".battery")).to_contain_text("73")
             await expect(page.locator(".battery")).to_contain_text("2 min old")
-            assert await page.evaluate(COVERED) == []
+            await page.wait_for_function(f"({COVERED})().length === 0")
             await page.reload()
         robot.link("live")
         robot.set_reading("eye", plain(RED))

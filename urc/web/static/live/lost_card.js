@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The card above STOP on the page of an unreachable robot, with the cause, a hint, buttons, and the
- * age of the background. Meanwhile, the widgets show no messages, because the card replaces them.
+ * The card above STOP (or at the top, if it hides fewer values there) on the page of an unreachable
+ * robot, with the cause, a hint, buttons, and the age of the background. Meanwhile, the widgets show no messages, because the card replaces them.
  * They keep their last values, with their ages.
  *
  * @typedef {import("../core/types.js").Link} Link
@@ -77,12 +77,28 @@ export class LostCard {
     if (this.tries.textContent !== tries) this.tries.textContent = tries;
     const age = isShown ? lastWords(this.root.querySelector('[data-place="ground"]')) : "";
     if (this.age.textContent !== age) this.age.textContent = age;
+    if (isShown && !this.el.hidden) this.place();
     const key = isShown ? JSON.stringify(loss) : "";
     if (key === this.shown) return;
     this.shown = key;
     this.el.hidden = !isShown;
     this.root.toggleAttribute("data-robot-lost", isShown);
     if (loss && isShown) this.say(loss);
+  }
+
+  /** Put the card at the top of the page if it covers fewer old values there than above STOP. */
+  place() {
+    const room = this.el.getBoundingClientRect();
+    const card = part(this.el, ".urc-lost-card").getBoundingClientRect();
+    const top = this.age.textContent ? this.age.getBoundingClientRect().top : card.top;
+    const { paddingTop, paddingBottom } = getComputedStyle(this.el);
+    const height = card.bottom - top;
+    const old = this.root.querySelectorAll('.urc-cell[data-old]:not([data-place="ground"])');
+    const values = [...old].filter((el) => el.checkVisibility()).map((el) => el.getBoundingClientRect());
+    const covers = (/** @type {number} */ y) =>
+      values.filter((one) => one.left < card.right && one.right > card.left && one.top < y + height && one.bottom > y).length;
+    const below = covers(room.bottom - parseFloat(paddingBottom) - height);
+    this.el.toggleAttribute("data-top", covers(room.top + parseFloat(paddingTop)) < below);
   }
 
   /** @param {Loss} loss */
