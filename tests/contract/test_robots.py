@@ -94,6 +94,21 @@ def test_what_steers_it_is_seen_on_a_phone_that_lies(file: Path) -> None:
         assert steers & wide <= {slot.name for slot in filled}
 
 
+def test_the_drone_has_no_button_that_cuts_the_motors_next_to_land() -> None:
+    """On no screen: a thumb that misses Land must not make the drone fall."""
+    profile = profile_of(FOLDER / "tello.yaml")
+    layouts = profile.interfaces["default"].layouts
+    assert len(layouts) == 4
+    for name, layout in layouts.items():
+        slots = {slot.name: slot for slot in layout.slots}
+        cut, land = slots["cut"], slots["land"]
+        rows = max(land.row - cut.row - cut.row_span, cut.row - land.row - land.row_span)
+        columns = max(
+            land.column - cut.column - cut.column_span, cut.column - land.column - land.column_span
+        )
+        assert max(rows, columns) >= 1, name
+
+
 def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
     """The default interface and all others, the one for finding faults among them."""
     profile = profile_of(file)

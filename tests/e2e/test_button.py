@@ -15,8 +15,8 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.processes import UrcProcess
 from urc.model.driver import Command, Reply
-from urc.model.exchange import Hold
-from urc.model.interface import WidgetUse
+from urc.model.exchange import Confirm, Hold
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.values import Signal, Value
 from urc.runtime.one_shot_commands import HELD
@@ -305,3 +305,61 @@ async def test_a_command_that_must_be_held_is_given_by_no_tap(new_page: PageMake
                     pass
         assert (reply["ok"], reply["code"], reply["message"]) == (False, "refused", HELD)
         assert robot.commands == []
+
+
+AFFORDANCE = """() => {
+  const main = document.querySelector(".button-main");
+  const box = (el) => el.getBoundingClientRect();
+  const text = document.createRange();
+  text.selectNodeContents(document.querySelector(".button-label"));
+  const [frame, words] = [box(main), text.getBoundingClientRect()];
+  const track = box(document.querySelector(".button-track"));
+  const note = document.querySelector(".button-note");
+  const isWide = track.left >= frame.left && track.right <= frame.right;
+  const said = note.textContent ? box(note) : { bottom: track.top };
+  return {
+    isIn: isWide && track.bottom <= frame.bottom,
+    isClear: words.bottom <= track.top + 2 && said.bottom <= track.top + 2,
+    width: track.width / frame.width, height: track.height,
+    isMarked: document.querySelector(".button-end").checkVisibility(),
+    hatch: getComputedStyle(document.querySelector(".button-track")).backgroundImage,
+  };
+}"""
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1440, 900)])
+@pytest.mark.parametrize("cells", [1, 3, 12])
+async def test_the_button_of_a_hazard_has_a_track_at_every_size(
+    new_page: PageMaker, size: tuple[int, int], cells: int
+) -> None:
+    """With a hazard mark at its end; a note makes it thin, and covers neither it nor the label."""
+    hazard = Confirm(level="hazardous", text="The drone will fall.")
+    cut = Command("cut", "wire", WriteSpec("text", {}), confirm=hazard)
+    signals = {"at": Signal("at"), "eye": Signal("eye", "image")}
+    names = ["cut", *(f"v{place}" for place in range(cells - 1))]
+    uses = [
+        WidgetUse("cut", "button", {}, {"press": "cut"}, title="Cut the motors"),
+        *(WidgetUse(name, "value", {"value": "at"}) for name in names[1:]),
+        WidgetUse("eye", "camera", {"image": "eye"}),
+    ]
+    slots = tuple(Slot(name, *divmod(place, 3)) for place, name in enumerate(names))
+    grid = Layout(-(-cells // 3), min(cells, 3), slots)
+    profile = dashboard_profile(signals=signals, uses=uses, commands={"cut": cut})
+    interface = Interface("x", "X", {"landscape": grid, "phone_portrait": grid}, background="eye")
+    robot = FakeRobot(profile._replace(interfaces={"x": interface}))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.set_viewport_size({"width": size[0], "height": size[1]})
+        await page.goto(f"{address}robots/puppet/")
+        await until_text(page, NOTE, "")
+        seen = await page.evaluate(AFFORDANCE)
+        assert (seen["isIn"], seen["isClear"], seen["isMarked"]) == (True, True, True), seen
+        assert seen["width"] > 0.8
+        assert seen["height"] >= 12
+        assert "repeating-linear-gradient" in seen["hatch"]
+        await page.evaluate(
+            "document.querySelector('.button-note').textContent = '▲ refused: not in the air'"
+        )
+        noted = await page.evaluate(AFFORDANCE)
+        assert (noted["isIn"], noted["isClear"], noted["isMarked"]) == (True, True, False), noted
+        assert noted["height"] >= 5

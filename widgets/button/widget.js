@@ -61,14 +61,13 @@ class Button {
       const label = part(el, ".button-label").textContent;
       slide(this.main, { label, isReady, done: () => this.press(), onStop: ctx.onStop, signal });
     } else if (gesture === "tap" || gesture === "double" || gesture === "hold" || gesture === "repeat") {
-      const fill = part(el, ".button-fill");
       const end = listen(this.main, {
         gesture,
         repeatMs: Number(options["repeat_ms"] ?? 250),
         // A repeat skips a pending or cooling command. Without the robot, the gesture ends.
         isReady: gesture === "repeat" ? () => this.giver.isReady : isReady,
         done: () => this.press(),
-        progress: (share) => style(fill, "--button-share", share.toFixed(2)),
+        progress: (share) => style(this.main, "--button-share", share.toFixed(2)),
         signal,
       });
       ctx.onStop(({ phase }) => {
