@@ -86,14 +86,17 @@ export class LostCard {
     if (loss && isShown) this.say(loss);
   }
 
-  /** Put the card at the top of the page if it covers fewer old values there than above STOP. */
+  /**
+   * Put the card at the top of the page if it covers fewer old values there than above STOP. Views
+   * do not count, because the background at the top is one of them.
+   */
   place() {
     const room = this.el.getBoundingClientRect();
     const card = part(this.el, ".urc-lost-card").getBoundingClientRect();
     const top = this.age.textContent ? this.age.getBoundingClientRect().top : card.top;
     const { paddingTop, paddingBottom } = getComputedStyle(this.el);
     const height = card.bottom - top;
-    const old = this.root.querySelectorAll('.urc-cell[data-old]:not([data-place="ground"])');
+    const old = this.root.querySelectorAll('.urc-cell[data-old]:not([data-place="ground"], [data-footprint="view"])');
     const values = [...old].filter((el) => el.checkVisibility()).map((el) => el.getBoundingClientRect());
     const covers = (/** @type {number} */ y) =>
       values.filter((one) => one.left < card.right && one.right > card.left && one.top < y + height && one.bottom > y).length;
