@@ -5,7 +5,7 @@ import pytest
 from urc.expressions import compile_template
 from urc.model.driver import Driver, TransportSpec
 from urc.model.profile import Profile, Setting
-from urc.web.manage.setting_groups import CONNECTION, FURTHER, failed_field, groups_of
+from urc.web.manage.setting_groups import CONNECTION, FURTHER, failed_field, groups_of, place_field
 
 
 def uses(text: str) -> object:
@@ -85,3 +85,10 @@ def test_no_group_is_empty() -> None:
 )
 def test_a_failure_is_shown_at_the_field_behind_it(transport: str, cause: str, field: str) -> None:
     assert failed_field(PROFILE, transport, cause) == field  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("transport", "field"), [("wire", "host"), ("web", "host"), ("inner", "host"), ("gone", "")]
+)
+def test_a_transport_that_answers_is_shown_at_its_address(transport: str, field: str) -> None:
+    assert place_field(PROFILE, transport) == field

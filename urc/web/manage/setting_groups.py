@@ -1,4 +1,4 @@
-"""The groups of a robot's settings and the setting that probably caused a failed connection.
+"""The groups of a robot's settings and the setting that the result of a connection test concerns.
 
 Layer 5. Pure. Both the groups and this setting depend on how transport options use the settings.
 """
@@ -11,7 +11,7 @@ from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
 from urc.runtime.connection_cause import Cause
 
-__all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of"]
+__all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of", "place_field"]
 
 CONNECTION: Final = ""
 """Group of settings for the connection to the robot."""
@@ -75,6 +75,21 @@ def failed_field(profile: Profile, transport: str, cause: Cause) -> str:
     if spec is None:
         return ""
     return _first_of(spec, _OPTIONS.get(cause, ())) or _through(profile, spec, cause)
+
+
+def place_field(profile: Profile, transport: str) -> str:
+    """Return the setting for the address that a transport connects to; "" if unknown.
+
+    Args:
+        profile: profile of the robot.
+        transport: name of the transport.
+    """
+    spec = profile.driver.transports.get(transport)
+    if spec is None:
+        return ""
+    return _first_of(spec, (*_PLACE, "port")) or (
+        place_field(profile, spec.tunnel) if spec.tunnel else ""
+    )
 
 
 def _through(profile: Profile, spec: TransportSpec, cause: Cause) -> str:

@@ -136,7 +136,7 @@ def settings_page(
     place = quote(name, safe="")
     page = SettingsPage(
         head=PageHead(nonce, t("Settings of {title}", title=title)),
-        nav=Nav("", ways),
+        nav=Nav("settings", ways),
         name=name,
         title=title,
         url=f"/robots/{place}/",

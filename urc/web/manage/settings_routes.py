@@ -29,7 +29,7 @@ from urc.runtime.settings_store import StoredSettings
 from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
-from urc.web.manage.setting_groups import failed_field
+from urc.web.manage.setting_groups import failed_field, place_field
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
 from urc.web.serve.actors import actor_of
@@ -254,6 +254,10 @@ def _epoch(service: RobotService | None) -> int:
 
 
 def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
+    if tried.verdict == "answers":
+        field = place_field(profile, tried.transport)
+    else:
+        field = failed_field(profile, tried.transport, tried.cause)
     return ProbedTransport(
         tried.transport,
         tried.type,
@@ -262,7 +266,7 @@ def _line(tried: ProbeResult, profile: Profile) -> ProbedTransport:
         printable(tried.text),
         tried.advice,
         tried.cause,
-        "" if tried.verdict == "answers" else failed_field(profile, tried.transport, tried.cause),
+        field,
     )
 
 

@@ -364,7 +364,8 @@ class ProbedTransport(ManageMessage, frozen=True):
     cause: str = ""
     """Name of the failure's cause; "" if the cause is unknown."""
     field: str = ""
-    """Setting that most likely caused the failure; "" if this setting is unknown."""
+    """Setting that most likely caused the failure, or that holds the address of a transport that
+    answers; "" if this setting is unknown."""
 
 
 class SettingsAnswer(ManageMessage, frozen=True):

@@ -40,10 +40,8 @@ class Nav:
 
     current: str
     """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``,
-    ``audit``, ``people`` or ``account``. "" for any other page."""
+    ``audit``, ``people``, ``account`` or ``settings``, which belongs to the menu."""
     ways: NavigationLinks
-    is_sheet: bool = False
-    """Whether narrow screens show the links behind a button."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +134,7 @@ def menu_page(
         _broken(name, one, ways) for name, one in (broken or {}).items() if name not in robots
     ]
     tags = tuple(sorted({tag for card in cards for tag in card.tags}))
-    page = MenuPage(head, Nav("menu", ways, is_sheet=True), tuple(cards), tags, states)
+    page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states)
     return render("menu.html.j2", page)
 
 

@@ -11,7 +11,7 @@
  * @property {string} text
  * @property {string} advice
  * @property {string} cause name of the cause of a failure; "" if unknown
- * @property {string} field setting that most likely caused the failure; "" if unknown
+ * @property {string} field setting that the result concerns; "" if unknown
  *
  * @typedef {object} Answer
  * @property {boolean} isSaved
@@ -84,7 +84,7 @@ async function send({ test, anyway = false }) {
     });
     mistakes(answer.faults);
     lines(answer.lines);
-    blame(answer.lines);
+    showResults(answer.lines);
     tell(`${answer.isSaved ? "✓" : "▲"} ${answer.text}`, answer.isSaved ? "" : "urc-bad");
     if (answer.isSaved) saved();
     else if (answer.lines.length) offerAnyway();
@@ -133,6 +133,7 @@ function mistakes(faults) {
     told.hidden = !text;
     const field = box.querySelector("input, select");
     told.dataset["tone"] = "";
+    delete told.dataset["tested"];
     if (text) field?.setAttribute("aria-invalid", "true");
     else field?.removeAttribute("aria-invalid");
     if (text) unfold(box);
@@ -140,25 +141,47 @@ function mistakes(faults) {
 }
 
 /**
- * Show a failed test at the most likely field.
+ * Show the result of a test at the field that it concerns, the failures first.
  *
  * @param {Line[]} some
  */
-function blame(some) {
-  for (const { field: name, verdict, cause, address, text } of some) {
+function showResults(some) {
+  const order = ["fails", "opens", "answers"];
+  const sorted = [...some].sort((one, other) => order.indexOf(one.verdict) - order.indexOf(other.verdict));
+  for (const line of sorted) {
+    const { field: name, verdict } = line;
     const box = [...form.querySelectorAll("[data-field]")].find(
       (one) => one instanceof HTMLElement && name !== "" && one.dataset["field"] === name,
     );
     const told = box?.querySelector("[data-fault]");
     if (!box || !(told instanceof HTMLElement) || !told.hidden) continue;
-    const isFailed = verdict === "fails";
-    const words = causeWords(cause, address, text);
-    told.textContent = `${isFailed ? "▲" : "◆"} ${words.cause} ${words.step}`;
-    told.dataset["tone"] = isFailed ? "" : "caution";
+    told.textContent = resultOf(line, some.length > 1);
+    told.dataset["tone"] = { answers: "good", opens: "caution" }[String(verdict)] ?? "";
+    told.dataset["tested"] = "";
     told.hidden = false;
-    if (isFailed) box.querySelector("input, select")?.setAttribute("aria-invalid", "true");
-    unfold(box);
+    if (verdict === "fails") box.querySelector("input, select")?.setAttribute("aria-invalid", "true");
+    if (verdict !== "answers") unfold(box);
   }
+}
+
+/**
+ * @param {Line} line
+ * @param {boolean} isNamed whether the name of the transport is needed
+ */
+function resultOf({ verdict, transport, cause, address, text }, isNamed) {
+  const [sign, word] = VERDICTS[verdict] ?? ["", verdict];
+  if (verdict === "answers") return `${sign} ${isNamed ? `${transport}: ` : ""}${t(word)}`;
+  const words = causeWords(cause, address, text);
+  return `${sign} ${words.cause} ${words.step}`;
+}
+
+/** Remove the result of a test from a changed field. @param {Event} event */
+function outdate(event) {
+  const box = event.target instanceof Element ? event.target.closest("[data-field]") : null;
+  const told = box?.querySelector("[data-fault][data-tested]");
+  if (!box || !(told instanceof HTMLElement) || told.hidden) return;
+  told.hidden = true;
+  box.querySelector("input, select")?.removeAttribute("aria-invalid");
 }
 
 /** Open the group of a field. @param {Element} box */
@@ -190,6 +213,7 @@ form.addEventListener("submit", (event) => {
   event.preventDefault();
   void send({ test: true });
 });
+form.addEventListener("input", outdate);
 form.querySelector("[data-plain]")?.addEventListener("click", () => void send({ test: false }));
 for (const one of form.querySelectorAll("[data-forget]")) {
   one.addEventListener("click", () => {
