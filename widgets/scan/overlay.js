@@ -18,8 +18,6 @@ import { ringStep } from "./rays.js";
  * @property {Record<string, string> | undefined} ink
  */
 
-/** Minimum radius of a ring with a label, in pixels. */
-const LABELLED_RADIUS = 64;
 const FONT = "600 12px system-ui, sans-serif";
 
 export class Overlay {
@@ -54,7 +52,7 @@ export class Overlay {
  * @param {Scene} scene
  * @param {number} radius
  */
-function rings(pen, { most, near, stop, unit, ink }, radius) {
+function rings(pen, { most, near, stop, ink }, radius) {
   const step = ringStep(most, 4);
   const circle = (/** @type {number} */ distance) => {
     pen.beginPath();
@@ -62,24 +60,9 @@ function rings(pen, { most, near, stop, unit, ink }, radius) {
     pen.stroke();
   };
   pen.strokeStyle = ink?.["line"] ?? "";
-  pen.fillStyle = ink?.["muted"] ?? "";
   pen.globalAlpha = 0.5;
   for (let distance = step; distance <= most * 1.001; distance += step) circle(distance);
   pen.globalAlpha = 1;
-  // At the lower right, with an edge: the area ahead stays free, and dots do not cross the figures.
-  pen.textAlign = "center";
-  pen.textBaseline = "middle";
-  pen.strokeStyle = ink?.["raised"] ?? "";
-  pen.lineWidth = 4;
-  pen.lineJoin = "round";
-  const isRoomy = radius >= LABELLED_RADIUS;
-  for (let distance = step; isRoomy && distance < most * 0.99; distance += step) {
-    const words = `${format(unit.factor(distance))} ${unit.symbol}`.trim();
-    const at = (radius * distance * Math.SQRT1_2) / most;
-    pen.strokeText(words, at, at);
-    pen.fillText(words, at, at);
-  }
-  pen.lineWidth = 1;
   for (const [distance, name, dash] of /** @type {[number, string, number[]][]} */ ([[near, "caution", [8, 5]], [stop, "alarm", [3, 3]]])) {
     if (!(distance > 0) || distance >= most) continue;
     pen.strokeStyle = ink?.[name] ?? "";
@@ -147,17 +130,25 @@ function compass(pen, { heading, ink }, radius) {
  */
 function rows(pen, { width, height, most, unit, ink }) {
   const step = ringStep(most, 4);
-  pen.strokeStyle = ink?.["line"] ?? "";
-  pen.fillStyle = ink?.["muted"] ?? "";
+  pen.fillStyle = ink?.["text"] ?? "";
+  pen.lineJoin = "round";
   for (let distance = 0; distance <= most * 1.001; distance += step) {
     const y = height * (1 - distance / most);
+    pen.strokeStyle = ink?.["line"] ?? "";
+    pen.lineWidth = 1;
     pen.globalAlpha = 0.5;
     pen.beginPath();
     pen.moveTo(0, y);
     pen.lineTo(width, y);
     pen.stroke();
     pen.globalAlpha = 1;
-    if (distance > 0) pen.fillText(`${format(unit.factor(distance))} ${unit.symbol}`.trim(), 3, y + 12);
+    if (distance === 0) continue;
+    // With an edge, so that the curve does not cross the figure.
+    const words = `${format(unit.factor(distance))} ${unit.symbol}`.trim();
+    pen.strokeStyle = ink?.["raised"] ?? "";
+    pen.lineWidth = 4;
+    pen.strokeText(words, 3, y + 12);
+    pen.fillText(words, 3, y + 12);
   }
 }
 

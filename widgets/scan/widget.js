@@ -12,7 +12,7 @@ import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf,
 } from "./rays.js";
 
 /** Largest image in pixels; a slow device cannot fill more per frame. */
@@ -64,6 +64,7 @@ class Scan {
     this.face = part(el, ".scan-face");
     this.text = part(el, ".scan-text");
     this.note = part(el, ".scan-note");
+    this.scale = part(el, ".scan-scale");
     const [data, over] = el.querySelectorAll("canvas");
     if (!data || !over) throw new Error("the template has no canvas");
     this.sheet = new Sheet(data);
@@ -209,6 +210,7 @@ class Scan {
       unit: this.unit("ranges"),
       ink: this.css,
     });
+    this.tellScale();
     if (reading.serial === this.serial) return;
     this.serial = reading.serial;
     const scale = Math.min(1, MOST_PIXELS / Math.max(isFlat ? width : Math.min(width, height), 1));
@@ -218,6 +220,13 @@ class Scan {
     this.paint();
     this.sheet.pen.putImageData(this.image, 0, 0);
     this.sheet.show();
+  }
+
+  /** Write the distance between two rings beside the picture, where it covers no obstacle. */
+  tellScale() {
+    const hasRings = this.rim > 0 && (this.view === "polar" || this.view === "map");
+    const { symbol, factor } = this.unit("ranges");
+    write(this.scale, hasRings ? `◯ ${format(factor(ringStep(this.rim, 4)))} ${symbol}`.trim() : "");
   }
 
   /**

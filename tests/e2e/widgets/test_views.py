@@ -22,6 +22,16 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
 
+BESIDE = """() => {
+  const face = document.querySelector(".scan-face").getBoundingClientRect();
+  const words = document.querySelector(".scan-scale").getBoundingClientRect();
+  const [x, y] = [face.left + face.width / 2, face.top + face.height / 2];
+  const dx = Math.max(words.left - x, x - words.right, 0);
+  const dy = Math.max(words.top - y, y - words.bottom, 0);
+  return words.width > 0 && Math.hypot(dx, dy) >= Math.min(face.width, face.height) / 2 - 1;
+}"""
+"""Whether the figure of the scale lies outside the rings."""
+
 
 def told(name: str, *arguments: str, kind: Any = "number") -> Command:
     """Return a command that is given once."""
@@ -58,6 +68,8 @@ async def test_distances_around_the_robot(new_page: PageMaker) -> None:
         await until_pixel(page, ".scan-data", 0.5, 0.4, "r > 120 && r > b + 40 && a === 255")
         await until_pixel(page, ".scan-data", 0.75, 0.5, "a === 255 && Math.abs(r - b) < 40")
         await until_pixel(page, ".scan-data", 0.25, 0.5, "a === 0")
+        await until_text(page, ".scan-scale", "◯ 2 m")
+        assert await page.evaluate(BESIDE), "the figure covers obstacles"
         button = page.get_by_role("button", name="View: Dots")
         await button.click()
         await until_attribute(page, ".scan", "data-view", "map")
@@ -65,6 +77,7 @@ async def test_distances_around_the_robot(new_page: PageMaker) -> None:
         for name in ("graph", "depth", "arc"):
             await page.locator(".scan-view").click()
             await until_attribute(page, ".scan", "data-view", name)
+        await until_text(page, ".scan-scale", "")
         # On the arc: ahead is near and so bright and yellow, cividis' upper end.
         await until_pixel(page, ".scan-data", 0.5, 0.12, "a === 255 && r > 170 && r > b + 60")
 
