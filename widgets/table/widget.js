@@ -7,6 +7,7 @@
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
 import { attribute, many, noteOf, part, worst, write } from "urc/kit";
 import { rowsOf, rowsOfLists, shown } from "./rows.js";
+import { keepWholeRows } from "./whole_rows.js";
 
 /** Minimum interval between redraws; readers of a table need no faster updates. */
 const EVERY_MS = 200;
@@ -20,6 +21,10 @@ class Table {
     this.body = part(el, ".table-body");
     this.note = part(el, ".table-note");
     this.count = part(el, ".table-count");
+    const table = el.querySelector("table");
+    if (!table) throw new Error("the template has no table");
+    const [room, scroll, more] = [part(el, ".table-room"), part(el, ".table-scroll"), part(el, ".table-more")];
+    keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${t("+{count} more", { count })}`, ctx.signal);
     const filter = el.querySelector(".table-filter");
     this.filter = filter instanceof HTMLInputElement ? filter : null;
     this.filter?.addEventListener("input", () => this.draw(), { signal: ctx.signal });

@@ -41,6 +41,15 @@ SIGNALS = {
         Signal("seen", "image"),
     )
 }
+WHOLE_ROWS = """() => {
+  const scroll = document.querySelector(".table-scroll").getBoundingClientRect();
+  const rows = [...document.querySelectorAll(".table-body tr")]
+    .map((row) => row.getBoundingClientRect()).filter(({ top }) => top < scroll.bottom - 1);
+  return {
+    whole: rows.length,
+    cut: rows.filter(({ bottom }) => bottom > scroll.bottom + 1).map(({ bottom }) => bottom),
+  };
+}"""
 NO_EASING = """
 (selectors) => selectors.map((selector) => {
   const { transitionDuration, animationName } = getComputedStyle(document.querySelector(selector));
@@ -201,6 +210,25 @@ async def test_a_table_puts_the_gravest_first_and_filters(new_page: PageMaker) -
         assert await rows.evaluate_all(names) == ["amps"]
         await page.fill(".table-filter", "nothing has this")
         await until_text(page, ".table-body td:nth-child(2)", "no row matches the filter")
+
+
+async def test_a_table_shows_whole_rows_and_how_many_follow(new_page: PageMaker) -> None:
+    """The last visible row is never cut, at the start and at the end of the list."""
+    uses = (WidgetUse("table", "table", {"report": "report"}),)
+    async with shown(new_page, *uses) as (robot, page):
+        robot.set_reading("report", {f"part {number}": "ok" for number in range(40)})
+        for height in (420, 433, 446, 900):
+            await page.set_viewport_size({"width": 1000, "height": height})
+            await page.wait_for_function(
+                "() => /^▾ [+][0-9]+ more$/.test(document.querySelector('.table-more').textContent)"
+            )
+            seen = await page.evaluate(WHOLE_ROWS)
+            assert seen["cut"] == []
+            assert await page.inner_text(".table-more") == f"▾ +{40 - seen['whole']} more"
+        await page.eval_on_selector(".table-scroll", "(el) => el.scrollTo(0, el.scrollHeight)")
+        await until_text(page, ".table-more", "")
+        robot.set_reading("report", {"part 1": "ok"})
+        await page.locator(".table-more").wait_for(state="hidden")
 
 
 async def test_a_heading_is_chosen_and_then_sent(new_page: PageMaker) -> None:
