@@ -47,27 +47,51 @@ export function ruled(scale, limits, factor) {
 }
 
 /**
+ * Return the length of the first words that all names share, such as 6 for "Joint 1" and "Joint 2".
+ *
+ * @param {readonly string[]} names
+ * @returns {number} in characters, with the last space; 0 for a single name
+ */
+export function sharedWords(names) {
+  const [first = "", ...others] = names;
+  let shared = others.length > 0 ? first.lastIndexOf(" ") + 1 : 0;
+  while (shared > 0 && !others.every((name) => name.length > shared && name.startsWith(first.slice(0, shared)))) {
+    shared = first.lastIndexOf(" ", shared - 2) + 1;
+  }
+  return shared;
+}
+
+/**
  * Create one entry of the legend: a button that shows or hides the line of a signal.
  *
  * @param {string} name
+ * @param {number} shared number of its first characters that a small legend hides
  * @param {string} hint
  * @param {boolean} isShown
  */
-export function legendItem(name, hint, isShown) {
+export function legendItem(name, shared, hint, isShown) {
   const item = document.createElement("li");
   const button = document.createElement("button");
   button.type = "button";
   button.className = "plot-entry";
   button.setAttribute("aria-pressed", String(isShown));
   button.title = hint;
-  for (const [part, text] of Object.entries({ swatch: "", name, value: "—" })) {
-    const made = document.createElement("span");
-    made.className = `plot-${part}`;
-    made.textContent = text;
-    button.append(part === "value" ? roomFor(made) : made);
-  }
+  const [swatch, title, value] = [span("swatch"), span("name"), span("value", "—")];
+  title.append(span("shared", name.slice(0, shared)), name.slice(shared));
+  button.append(swatch, title, roomFor(value));
   item.append(button);
   return { item, button };
+}
+
+/**
+ * @param {string} name
+ * @param {string} [text]
+ */
+function span(name, text = "") {
+  const made = document.createElement("span");
+  made.className = `plot-${name}`;
+  made.textContent = text;
+  return made;
 }
 
 /** @param {HTMLElement} value */
@@ -88,11 +112,13 @@ const rooms = new WeakMap();
  *
  * @param {Element} el
  * @param {string} text
+ * @returns {boolean} whether it became wider
  */
 export function writeValue(el, text) {
   write(el, text);
   const room = el.parentElement;
-  if (!room || text.length <= (rooms.get(room) ?? CHARACTERS)) return;
+  if (!room || text.length <= (rooms.get(room) ?? CHARACTERS)) return false;
   rooms.set(room, text.length);
   style(room, "--plot-characters", String(text.length));
+  return true;
 }

@@ -7,7 +7,8 @@ import { ALARMS, DASH, attribute, clock, colours, figure, isStill, many, noteOf,
 import { spanOf } from "urc/axis_ticks";
 import { History } from "./history.js";
 import { Live } from "./live.js";
-import { epoch, legendItem, ruled, writeValue } from "./parts.js";
+import { epoch, legendItem, ruled, sharedWords, writeValue } from "./parts.js";
+import { SmallLegend } from "./small_legend.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
@@ -31,7 +32,7 @@ class Plot {
     this.root = part(el, ".plot");
     this.board = part(el, ".plot-board");
     this.note = part(el, ".plot-note");
-    this.legend = part(el, ".plot-legend");
+    this.legend = new SmallLegend(part(el, ".plot-legend"), ctx.signal);
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
     this.windowS = seconds(options["window"]);
@@ -157,13 +158,14 @@ class Plot {
   /** Rebuild the legend: one button for each signal, which hides its line. */
   list() {
     const { signal: end, t } = this.ctx;
-    const items = this.readings.map(({ signal }, place) => {
-      const name = signal.title || signal.name;
-      const { item, button } = legendItem(name, t("Show or hide {name}", { name }), this.live.traces[place]?.isShown ?? true);
+    const names = this.readings.map(({ signal }) => signal.title || signal.name);
+    const shared = sharedWords(names);
+    const items = names.map((name, place) => {
+      const { item, button } = legendItem(name, shared, t("Show or hide {name}", { name }), this.live.traces[place]?.isShown ?? true);
       button.addEventListener("click", () => this.show(place, button), { signal: end });
       return item;
     });
-    this.legend.replaceChildren(...items);
+    this.legend.fill(items);
   }
 
   /**
@@ -184,7 +186,7 @@ class Plot {
   /** Read the colours of the theme. */
   paint() {
     const palette = colours(this.root, COLOURS);
-    const swatches = this.legend.querySelectorAll(".plot-swatch");
+    const swatches = this.legend.list.querySelectorAll(".plot-swatch");
     this.live.traces.forEach((trace, place) => {
       trace.colour = palette[COLOURS[place % COLOURS.length] ?? "series-1"];
       const swatch = swatches[place];
@@ -269,13 +271,15 @@ class Plot {
       const name = worst.signal.title || worst.signal.name;
       write(this.note, this.readings.length > 1 ? `${name}: ${said}` : said);
     } else write(this.note, "");
-    const units = this.legend.querySelectorAll(".plot-value");
+    const units = this.legend.list.querySelectorAll(".plot-value");
+    let isWider = false;
     this.readings.forEach((reading, place) => {
       const value = units[place];
       if (!value) return;
-      writeValue(value, reading.value === null ? reading.text : `${reading.text} ${reading.unit}`.trim());
+      isWider = writeValue(value, reading.value === null ? reading.text : `${reading.text} ${reading.unit}`.trim()) || isWider;
       attribute(value, "data-state", reading.state);
     });
+    if (isWider) this.legend.fit();
   }
 
   async toggle() {
@@ -341,7 +345,7 @@ class Plot {
 
   /** @param {readonly (number | null)[]} values values of the legend */
   read(values) {
-    const places = this.legend.querySelectorAll(".plot-value");
+    const places = this.legend.list.querySelectorAll(".plot-value");
     this.signals.forEach(({ precision, unit = "" }, place) => {
       const value = values[place] ?? null;
       const symbol = this.isOneUnit ? this.symbol : unit;

@@ -22,8 +22,22 @@ BATTERY = """() => {
   };
 }"""
 SPEEDS = """() => [...document.querySelectorAll(".joystick .urc-speed, .joystick .urc-speed-next")]
-  .filter((one) => one.offsetWidth && one.scrollWidth > one.clientWidth)
+  .filter((one) => {
+    const [box, range] = [one.getBoundingClientRect(), document.createRange()];
+    range.selectNodeContents(one.lastChild);
+    const text = range.getBoundingClientRect();
+    return box.width && (text.left < box.left + 4 || text.right > box.right - 4);
+  })
   .map((one) => one.textContent.trim())"""
+"""Speed steps whose figures touch the edge of their button."""
+SIZE = """(el, [width, height]) => {
+  el.style.cssText = `width: ${width}px; height: ${height}px; place-self: start; min-height: 0`;
+}"""
+CUT_VALUES = """() => [...document.querySelectorAll(".plot-value")]
+  .filter((one) => one.offsetWidth > 0)
+  .filter((one) => one.scrollWidth > one.clientWidth
+    || one.getBoundingClientRect().right > one.closest("li").getBoundingClientRect().right + 1)
+  .map((one) => one.textContent)"""
 ENTRIES = """() => {
   const frame = document.querySelector(".plot-legend").getBoundingClientRect();
   return [...document.querySelectorAll(".plot-entry")].filter((one) => {
@@ -85,3 +99,29 @@ async def test_the_legend_of_a_plot_shows_every_signal(
             robot.set_reading(name, -90.25)
         await page.locator(".plot-value", has_text="-90.25 °").nth(5).wait_for(state="attached")
         assert await page.evaluate(ENTRIES) == len(names)
+
+
+@pytest.mark.parametrize(("width", "height"), [(144, 108), (160, 90), (205, 150), (231, 174)])
+async def test_a_small_plot_shows_the_values_that_fit_and_the_number_of_the_others(
+    new_page: PageMaker, width: int, height: int
+) -> None:
+    """Names lose the words that all share; no value is cut; the rest is counted."""
+    names = [f"joint_{number}" for number in range(8)]
+    signals = {name: Signal(name, unit="°", title=f"Joint {name[-1]}") for name in names}
+    plot = WidgetUse("plot", "plot", lists={"series": tuple(names)})
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=[plot]))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await page.eval_on_selector(".urc-cell", SIZE, [width, height])
+        for name in names:
+            robot.set_reading(name, -90.25)
+        await page.locator(".plot-value", has_text="-90.25 °").nth(7).wait_for(state="attached")
+        await page.wait_for_function("() => document.querySelector('.plot-rest')")
+        shown = await page.evaluate(ENTRIES)
+        rest = await page.inner_text(".plot-rest")
+        cut = await page.evaluate(CUT_VALUES)
+    assert shown >= 1
+    assert rest == f"+{len(names) - shown}"
+    assert cut == []

@@ -1,0 +1,61 @@
+// @ts-check
+/**
+ * The legend of a small plot, which the style sheet lays out as a grid: the values that fit, and the
+ * number of the others. A tap on the view shows all of them.
+ */
+import { style, write } from "urc/kit";
+
+export class SmallLegend {
+  /**
+   * @param {HTMLElement} list
+   * @param {AbortSignal} signal
+   */
+  constructor(list, signal) {
+    this.list = list;
+    this.rest = document.createElement("li");
+    this.rest.className = "plot-rest";
+    this.rest.setAttribute("aria-hidden", "true");
+    const sizes = new ResizeObserver(() => this.fit());
+    sizes.observe(list);
+    signal.addEventListener("abort", () => sizes.disconnect());
+  }
+
+  /** Replace the entries. @param {readonly HTMLElement[]} items */
+  fill(items) {
+    this.list.replaceChildren(...items);
+    this.fit();
+  }
+
+  /** Show as many entries as fit, after a change of the size, the entries or their widths. */
+  fit() {
+    const { list, rest } = this;
+    const items = [...list.children].filter((item) => item instanceof HTMLElement && item !== rest);
+    const { display, maxHeight, lineHeight, columnGap } = getComputedStyle(list);
+    const isSmall = display === "grid";
+    for (const item of items) item.toggleAttribute("data-hidden", false);
+    let shown = items.length;
+    if (isSmall && list.clientWidth > 0) {
+      const gap = parseFloat(columnGap) || 0;
+      const widest = Math.max(1, ...items.map((item) => widthOf(item)));
+      const columns = Math.max(1, Math.floor((list.clientWidth + gap) / (widest + gap)));
+      style(list, "--plot-columns", String(columns));
+      const room = Math.round(parseFloat(maxHeight) / parseFloat(lineHeight)) * columns;
+      if (items.length > room) shown = Math.max(1, room - 1);
+    }
+    items.forEach((item, place) => item.toggleAttribute("data-hidden", place >= shown));
+    if (shown < items.length) {
+      write(rest, `+${items.length - shown}`);
+      if (!rest.isConnected) list.append(rest);
+    } else rest.remove();
+  }
+}
+
+/** Return the width of an entry's content in pixels. @param {Element} item */
+function widthOf(item) {
+  const parts = [...(item.firstElementChild?.children ?? [])];
+  const widths = parts.map((part) => (part instanceof HTMLElement ? part.offsetWidth : 0));
+  return widths.reduce((sum, width) => sum + width, SPACES_PX);
+}
+
+/** Spaces between the parts of an entry, in pixels. */
+const SPACES_PX = 4;
